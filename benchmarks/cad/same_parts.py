@@ -27,6 +27,7 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from scanwright.design.errors import BuildError
+from scanwright.design.progress import no_progress
 from scanwright.design.scanner import Modules, Scanner, scanner_of
 
 SHIPPED = Path(__file__).parents[2] / "design/task/shipped"
@@ -43,7 +44,7 @@ def choose(file: Path, count: int) -> None:
 
     scanners: dict[str, Any] = {}
     for path in sorted(SHIPPED.glob("*.toml")):
-        optimum = find_optimum(load_task(path), lambda _: None)
+        optimum = find_optimum(load_task(path), no_progress)
         angles = angle_set(optimum.loaded, setting_built(optimum).family)
         scanners[path.stem] = _record(optimum.loaded.scanner(angles))
     scanners |= {f"random_{i}": _record(one) for i, one in zip(range(count), _random(load_catalogue()), strict=False)}
@@ -81,12 +82,12 @@ def _built(scanner: Scanner, parts_only: bool) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         try:
-            made = build_parts(scanner, folder, lambda _: None)
+            made = build_parts(scanner, folder, no_progress)
         except BuildError as error:
             return {"error": str(error), "files": {}, "checks": []}
-        checks = check_files(scanner, made.assembly, lambda _: None)
+        checks = check_files(scanner, made.assembly, no_progress)
         if not parts_only:
-            export_scanner(scanner, made, folder, lambda _: None)
+            export_scanner(scanner, made, folder, no_progress)
             write_files(folder, drawing_files(scanner, made.assembly, made.masses_g(), made.assembly.layout.digest))
         write_files(folder, checks)
         files = {

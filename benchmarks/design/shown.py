@@ -29,14 +29,16 @@ from scanwright.design.catalogue.products import Multibeam
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.comparison import compare, ready_made
 from scanwright.design.evaluation.comparison_table import notes, table
-from scanwright.design.evaluation.evaluation import evaluate
+from scanwright.design.evaluation.evaluation import Lever, evaluate
 from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.evaluation.poles import Pole
 from scanwright.design.motion import Shortest
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.density_sphere import density_sphere
@@ -95,19 +97,18 @@ def shown_task(rng: np.random.Generator, folder: Path) -> RandomTask:
     return replace(drawn, loaded=replace(drawn.loaded, task=task))
 
 
-def _shadow(drawn: RandomTask) -> Shadow | None:
+def _shadow(drawn: RandomTask) -> SelfOcclusion | None:
     """Beams that are missing as parts that turn with the laser, and a part that stands still before some others."""
     if drawn.beams.all():
         return None
     stator = np.zeros((len(drawn.beams), AXIS_STEPS), dtype=bool)
     stator[: len(drawn.beams) // 4, : AXIS_STEPS // 8] = True
-    return Shadow(~drawn.beams, stator)
+    return SelfOcclusion(~drawn.beams, stator)
 
 
 def _evaluate(drawn: RandomTask, _: Path) -> None:
-    found = evaluate(
-        drawn.loaded, drawn.angles_rad, "20,1000,5", "5,-3,1.0" if drawn.beams.all() else None, _quiet, _shadow(drawn)
-    )
+    lever = Lever(5, -3, 1.0) if drawn.beams.all() else None
+    found = evaluate(drawn.loaded, drawn.angles_rad, Pole(0.02, 1.0, 5.0), lever, no_progress, _shadow(drawn))
     "\n".join(found.lines())
     json.dumps({"angles_deg": drawn.angles_deg, **found.facts()})
     found.beam_directions()
@@ -165,10 +166,6 @@ def _studio(drawn: RandomTask, _: Path) -> None:
     scale_html(highest)
     density_colours(judge.problem, setting.angles_rad, hexagons().directions, highest)
     edges(judge.problem.field)
-
-
-def _quiet(_: str) -> None:
-    """Ignore progress."""
 
 
 def main() -> None:

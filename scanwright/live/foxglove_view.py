@@ -6,6 +6,7 @@ takes nothing from who connects but what to send: no parameters, no services, no
 
 from __future__ import annotations
 
+import logging
 import signal
 import time
 from collections.abc import Callable, Collection, Iterator
@@ -18,10 +19,11 @@ from mcap.writer import Writer
 
 from scanwright.design.angles import angles_in_use, load_angles
 from scanwright.design.errors import RecordingError, TaskError
-from scanwright.design.files.atomic_file import check_place, whole_file
-from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.design.files.atomic_file import atomic_write, check_place
+from scanwright.design.progress import Progress
+from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
@@ -30,26 +32,26 @@ from scanwright.firmware_io.scan.live_feed import Batch, Feed, Viewer, Watch, ba
 from scanwright.live.foxglove_channels import FoxgloveChannels, Log, channels
 from scanwright.live.foxglove_server import foxglove_server
 
+_LOG = logging.getLogger(__name__)
 PORT = 8765  # where Foxglove looks first
 _SETTLED_S = 0.5  # who subscribes does so topic by topic, and is served from a moment later on
-Say = Callable[[str], None]
 
 
 def view_recording(
     recording: Path,
     angles: Path,
-    say: Say,
+    progress: Progress,
     *,
     port: int = PORT,
     rate: float = 1.0,
     allow_origins: Collection[str] = (),
 ) -> None:
-    """Serve a recording at its own pace to each who begins to listen, until Ctrl-C.
+    """Serve a recording at its own pace to each viewer, until Ctrl-C.
 
     Args:
         recording: MCAP recording.
         angles: angle set of the scanner; `scanner.urdf` and `own_body.npz` are looked for beside it.
-        say: is told the address, at once.
+        progress: progress callback; gets the address first.
         port: on this computer; 0 for any that is free.
         rate: how many times as fast as it was recorded.
         allow_origins: pages that may look, beside Foxglove's own, such as "https://viewer.example.org".
@@ -59,17 +61,17 @@ def view_recording(
         TaskError: the port is taken.
     """
     open_recording(recording)  # what cannot be read is refused before an address is told
-    with foxglove_server(recording.name, channels(), port, say, allow_origins) as server:
+    with foxglove_server(recording.name, channels(), port, progress, allow_origins) as server:
         shown = _shown(recording, angles, server.log)
         while True:
-            _until(lambda: server.heard)
+            _until(lambda: server.has_subscribers)
             time.sleep(_SETTLED_S)
             shown.begin()
             scans, _ = replay(recording, shown, rate=rate)
             shown.close()
-            say(f"showed {scans:,} scans; Ctrl-C to end")
-            _until(lambda: not server.heard)
-            say("nobody listens any more: all again for the next one who does")
+            progress(f"showed {scans:,} scans; Ctrl-C to end")
+            _until(lambda: not server.has_subscribers)
+            progress("no viewer is connected; the next one gets the recording from its start")
 
 
 def _until(condition: Callable[[], bool]) -> None:
@@ -89,7 +91,7 @@ def write_for_foxglove(recording: Path, angles: Path, out: Path) -> int:
     check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: Foxglove reads MCAP; name it {out.with_suffix('.mcap').name}")
-    with whole_file(out, RecordingError) as part, mcap_log(part) as log:
+    with atomic_write(out, RecordingError) as part, mcap_log(part) as log:
         shown = _shown(recording, angles, log)
         scans, _ = replay(recording, shown, wait_until=lambda _: None)
         shown.close()
@@ -111,10 +113,10 @@ def mcap_log(path: Path) -> Iterator[Log]:
 
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
-    found = load_angles(angles)
-    smooth = not held_by(read_note(recording, NOTE))
-    urdf = description(angles.parent, found)
-    return FoxgloveChannels(found, own_body_beside(angles), urdf, log, smooth=smooth)
+    angle_set = load_angles(angles)
+    smooth = not rests_in_scans(read_note(recording, NOTE))
+    urdf = description(angles.parent, angle_set)
+    return FoxgloveChannels(angle_set, own_body_of(angles), urdf, log, smooth=smooth)
 
 
 @contextmanager
@@ -134,23 +136,24 @@ def _serve(receiving: Connection, folder: Path, allow_origins: tuple[str, ...]) 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
     urdf, wall_minus_ns = description(folder, in_use.angles), time.time_ns() - time.monotonic_ns()
-    own_body = own_body_beside(in_use.path)
-
-    def say(line: str) -> None:
-        print(line, flush=True)
+    own_body = own_body_of(in_use.path)
 
     try:
-        with foxglove_server(f"scan of {folder.name}", channels(), PORT, say, allow_origins) as server:
+        with foxglove_server(f"scan of {folder.name}", channels(), PORT, _print, allow_origins) as server:
             shown = FoxgloveChannels(in_use.angles, own_body, urdf, server.log, wall_minus_ns=wall_minus_ns)
             for batch in batches(receiving):
                 tell(batch, shown)
             shown.close()
     except TaskError as error:  # the port is taken: the scan goes on
-        say(f"warning: --foxglove: {error}")
+        _LOG.warning("no viewer can connect: %s", error)
+
+
+def _print(step: str, _fraction: float | None = None, /) -> None:
+    print(step, flush=True)
 
 
 def tell(batch: Batch, watch: Watch) -> None:
-    """Tell a batch in the order in which its things were measured."""
+    """Pass on the data of a batch in the order in which they were measured."""
     angles = [JointSample(*pair) for pair in zip(batch.time_ns.tolist(), batch.position_rad.tolist(), strict=True)]
     ended = [(one.time_ns, one) for one in angles] + [(int(scan.time_ns[-1]), scan) for scan in batch.scans]
     for _, thing in sorted(ended, key=lambda pair: pair[0]):
@@ -159,4 +162,4 @@ def tell(batch: Batch, watch: Watch) -> None:
         else:
             watch.joint(thing.time_ns, thing.position_rad)
     for line in batch.lines:
-        watch.told(line)
+        watch.message(line)

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from scanwright.design.arrays import Array
 from scanwright.design.errors import TaskError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.task.shapes import ConeRegion, MaskRegion, Region
 from scanwright.design.task.task import LoadedTask
 
@@ -23,7 +23,7 @@ BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0
 """Of the mounting angles: what a task file may say."""
 MOST_DABS = 60
 """Beyond it J takes its time: every edge of a region is a break of its quadrature."""
-DECIMALS = 4
+DECIMALS = 4  # of an axis in the task file: 0.006 deg
 
 Brush = Literal["matters", "does not matter", "hidden"]
 
@@ -45,11 +45,12 @@ class Setting:
         Raises:
             ValueError: they are not four finite numbers.
         """
-        given = np.array([float(angle) for angle in angles_deg])
-        if given.shape != (4,) or not np.isfinite(given).all():
-            raise ValueError(f"{given.tolist()}: not four finite angles")
+        angles = np.array([float(angle) for angle in angles_deg])
+        if angles.shape != (4,) or not np.isfinite(angles).all():
+            raise ValueError(f"{angles.tolist()}: not four finite angles")
         alpha_rot, beta_rot, alpha_laser, beta_laser = (
-            round(float(np.clip(angle, -bound, bound)), 2) + 0.0 for angle, bound in zip(given, BOUNDS_DEG, strict=True)
+            round(float(np.clip(angle, -bound, bound)), 2) + 0.0
+            for angle, bound in zip(angles, BOUNDS_DEG, strict=True)
         )
         return cls((alpha_rot, beta_rot, alpha_laser, beta_laser))
 
@@ -119,12 +120,12 @@ def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
         TaskError: there are more than `MOST_DABS`, or a dab is none that a task file could hold.
     """
     if len(dabs) > MOST_DABS:
-        raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; take a wider brush, or draw a map")
+        raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; use a wider brush, or a map")
     task = loaded.task
     try:
         weights: tuple[Region, ...] = tuple(dab.cone() for dab in dabs if dab.brush != "hidden")
         masks: tuple[MaskRegion, ...] = tuple(dab.cone() for dab in dabs if dab.brush == "hidden")
     except ValidationError as error:
-        raise TaskError(explain(error, "paint", ConeRegion)) from error
+        raise TaskError(format_validation_error(error, "paint", ConeRegion)) from error
     changed = task.model_copy(update={"weight": (*task.weight, *weights), "mask": (*task.mask, *masks)})
     return replace(loaded, task=changed)

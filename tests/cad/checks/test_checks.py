@@ -352,8 +352,8 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     code, out, complaints = command("check", tmp_path, "--json")
     assert code == 1
     assert complaints[:2] == [
-        "scanwright: check failed: a and b: gap: 0.1 mm, under 0.4",
-        "scanwright: 1 of 1 checks failed: do not make these parts",
+        "error: check failed: a and b: gap: 0.1 mm, under 0.4",
+        "error: 1 of 1 checks failed: do not make these parts",
     ]
     failed = [entry for entry in json.loads(out)["checks"] if entry["severity"] == "error"]
     assert [entry["where"] for entry in failed] == ["a and b"]

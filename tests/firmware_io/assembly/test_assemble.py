@@ -17,6 +17,7 @@ from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
 from scanwright.firmware_io.assembly.deskew import deskew, place
+from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.ply import read_ply
 from scanwright.firmware_io.poses.trajectory import Trajectory
@@ -99,7 +100,7 @@ def test_the_beams_of_another_sensor_are_told(tmp_path, sensor, first_deg, last_
     recording = write(tmp_path / "r.mcap", [scan], a_log(0.0, 1.0))
     angles = angle_set().model_copy(update={"sensor": sensor})
     said = [
-        line for line in assemble_recording(recording, angles, tmp_path / "o.ply").said if "another scanner" in line
+        line for line in assemble_recording(recording, angles, tmp_path / "o.ply").notes if "another scanner" in line
     ]
     assert len(said) == other
     assert all(sensor in line and f"from {first_deg} to {last_deg:.4g} deg" in line for line in said)
@@ -179,7 +180,7 @@ def test_organised_and_flat_clouds_hold_the_same_points(tmp_path):
     short = a_scan(1, 40, START + 10**8, intensity=np.arange(40, dtype=np.float32))
     scans = [a_scan(0, range_m=np.array([1, np.nan, 3] * 20, np.float32)), short, a_scan(2, 50, START + 3 * 10**9)]
     recording = write(tmp_path / "r.mcap", scans, a_log(0, 1))
-    organised = assemble_recording(recording, angle_set(), tmp_path / "o.ply", organised=True)
+    organised = assemble_recording(recording, angle_set(), tmp_path / "o.ply", AssembleOptions(organised=True))
     flat = assemble_recording(recording, angle_set(), tmp_path / "f.ply")
     assert (organised.rows, flat.rows) == (180, 80)
     assert organised.lines()[-1] == f"wrote 180 rows (80 points, 60 rows a scan) to {tmp_path / 'o.ply'}"
@@ -204,16 +205,18 @@ def test_each_turn_becomes_a_cloud_and_together_they_are_the_recording(tmp_path)
     log = a_log(1.0, 1.0 + 2.6 * 2 * np.pi, START, START + 2_600_000_000)
     recording = write(tmp_path / "r.mcap", scans, log)
     mount = angle_set(0, 90, 0, -90)
-    whole = assemble_recording(recording, mount, tmp_path / "w.ply", organised=True)
+    whole = assemble_recording(recording, mount, tmp_path / "w.ply", AssembleOptions(organised=True))
     for per, heights in (("turn", [20, 20, 12]), ("half", [10, 10, 10, 10, 10, 2])):
-        summary = assemble_recording(recording, mount, tmp_path / f"{per}.ply", per=per, organised=True)
+        summary = assemble_recording(
+            recording, mount, tmp_path / f"{per}.ply", AssembleOptions(per=per, organised=True)
+        )
         assert [path.name for path in summary.clouds] == [f"{per}_{k:03}.ply" for k in range(len(heights))]
         assert (summary.points, summary.height) == (whole.points, whole.height)
         rows = [read_ply(path) for path in summary.clouds]
         assert [part.size for part in rows] == [20 * height for height in heights]
         assert b"".join(part.tobytes() for part in rows) == read_ply(tmp_path / "w.ply").tobytes()
         assert f"comment height {heights[-1]}\n".encode() in summary.clouds[-1].read_bytes()[:400]
-        told = [line.partition(": leave it out")[0] for line in summary.said if "leave it out" in line]
+        told = [line.partition(": leave it out")[0] for line in summary.notes if "leave it out" in line]
         small = ["warning: half_005 holds 2 of the usual 10 scans of half a turn"]
         assert told == (small if per == "half" else []), "12 of 20 scans are more than half of a turn"
 
@@ -222,7 +225,9 @@ def test_a_turn_without_a_point_is_no_cloud(tmp_path):
     ranges = [np.full(20, 5.0 if 10 <= k < 20 else np.nan, np.float32) for k in range(40)]
     scans = [a_scan(0, 20, START + k * 100_000_000, time_increment_s=1e-4, range_m=r) for k, r in enumerate(ranges)]
     log = a_log(0.0, 4 * 2 * np.pi, START, START + 4_000_000_000)
-    summary = assemble_recording(write(tmp_path / "r.mcap", scans, log), angle_set(), tmp_path / "c.ply", per="turn")
+    summary = assemble_recording(
+        write(tmp_path / "r.mcap", scans, log), angle_set(), tmp_path / "c.ply", AssembleOptions(per="turn")
+    )
     assert [path.name for path in summary.clouds] == ["c_001.ply"]
     assert summary.left_out == {"no_return": 600}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c_001.ply", "r.mcap"]
@@ -233,10 +238,10 @@ def test_a_turn_without_a_point_is_no_cloud(tmp_path):
     first=angle_deg,
     ways_rad=st.lists(st.floats(0.1, 20), min_size=1, max_size=4),
     sign=st.sampled_from([1, -1]),
-    whole_rad=st.sampled_from([np.pi, 2 * np.pi]),
+    turn_rad=st.sampled_from([np.pi, 2 * np.pi]),
     noise_rad=st.sampled_from([0.0, 0.004]),
 )
-def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign, whole_rad, noise_rad):
+def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign, turn_rad, noise_rad):
     """There, back, there again ... at 1 rad/s; noise of the encoder is no turning point."""
     corner_s = np.concatenate([[0], np.cumsum(ways_rad)])
     signs = sign * (-1.0) ** np.arange(len(ways_rad))
@@ -252,8 +257,8 @@ def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign,
     )
     expected = list(corner_s[1:-1])
     for begin_s, way_rad in zip(corner_s[:-1], ways_rad, strict=True):
-        expected += [begin_s + k * whole_rad for k in range(1, int(way_rad / whole_rad) + 1)]
-    found_s = (turn_starts(log, int(time_ns[0]), whole_rad) - START) / 1e9
+        expected += [begin_s + k * turn_rad for k in range(1, int(way_rad / turn_rad) + 1)]
+    found_s = (turn_starts(log, int(time_ns[0]), turn_rad) - START) / 1e9
     # a whole turn that ends within the noise of a turning point may be seen or not
     sure = [t for t in expected if np.abs(corner_s[1:] - t).min() > 0.03 or t in corner_s]
     assert all(np.abs(found_s - t).min() < 0.02 for t in sure)
@@ -295,10 +300,11 @@ def test_a_mask_of_another_sensor_is_matched_by_bearing_and_says_what_it_does_no
     fine_rad = np.linspace(-1.95, 1.0, 400) + 2 * np.pi  # the same bearings, counted one turn further
     np.savez(tmp_path / "own_body.npz", beams=np.abs(fine_rad - 2 * np.pi) < 0.25, bearing_rad=fine_rad)
     words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
-    code, printed, _ = command(*words, "--organised")
+    code, _, complaints = command(*words, "--organised")
     bearing_rad = a_scan(0, 40).bearing_rad
     assert code == 0
-    assert f"warning: {np.sum((bearing_rad < -1.96) | (bearing_rad > 1.01))} of 40 beams have no bearing" in printed
+    unknown = np.sum((bearing_rad < -1.96) | (bearing_rad > 1.01))
+    assert complaints[0].startswith(f"warning: {unknown} of 40 beams have no bearing")
     np.testing.assert_array_equal(np.isnan(read_ply(tmp_path / "c.ply")["x"]), np.abs(bearing_rad) < 0.25)
 
 
@@ -341,8 +347,8 @@ def test_a_gyro_says_how_the_platform_turned_between_two_poses(tmp_path, command
     words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
     words += ["--imu", tmp_path / "imu.csv"]
     posed = [*words, "--poses", tmp_path / "poses.tum"]
-    assert "name the --poses too" in command(*words)[2][0]
-    assert "say how it stands there by --imu-rpy-deg" in command(*posed)[2][0]
+    assert "`--imu` requires `--poses`" in command(*words)[2][0]
+    assert "pass its orientation on the platform as --imu-rpy-deg" in command(*posed)[2][0]
     code, printed, complaints = command(*posed, "--imu-rpy-deg", 0, 0, 0)
     assert (code, complaints) == (0, [])
     assert "poses: 3, usually 1 s apart, going straight between them is off by 0 mm at most" in printed
@@ -357,7 +363,7 @@ def test_far_poses_and_gaps_between_them_are_told(tmp_path):
     recording = write(tmp_path / "r.mcap", [a_scan()], a_log(0.0, 1.0))
     time_ns = START + np.append(np.arange(-30, 0), [50, 51]) * 100_000_000
     poses = Trajectory(time_ns, np.full((32, 3), 5e5), np.tile([0, 0, 0, 1.0], (32, 1)))
-    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", poses=poses).said
+    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", platform=poses).notes
     assert "going straight between them is off by 0 mm and 0 deg at most" in said[1]
     assert "between two poses lie up to 5.10 s" in said[2]
     assert "500 km from 0, where float32 steps by 1 mm or more" in said[3]
@@ -375,7 +381,9 @@ def test_the_steps_of_the_encoder_are_smoothed_unless_the_motor_stopped_or_one_a
                 writer.joint(*sample)
             for scan in scans:
                 writer.scan(scan)
-        summary = assemble_recording(tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply", **options)
+        summary = assemble_recording(
+            tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply", AssembleOptions(**options)
+        )
         rows = read_ply(summary.out)
         off_m[name] = 20 * np.abs(rows["joint_rad"] - 0.35 * rows["time_s"]).max()
     assert off_m["smooth"] < 0.004
@@ -395,7 +403,7 @@ def test_time_without_a_scan_is_said_but_not_the_way_between_two_stops(tmp_path,
             for k, time_s in enumerate(times_s):
                 writer.scan(a_scan(k, stamp_ns=START + round(time_s * 1e9)))
         summary = assemble_recording(tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply")
-        told = [line for line in summary.said if "without a scan" in line]
+        told = [line for line in summary.notes if "without a scan" in line]
         expected = (
             [] if stops and hold == "true" else ["warning: 2.0 s without a scan at 0.9 s (usually 0.100 s apart)"]
         )
@@ -421,7 +429,7 @@ def test_a_recording_without_a_single_point_is_refused(tmp_path):
 def test_wrong_input_is_one_line_and_leaves_no_file(tmp_path, recording, out, lag_s, says):
     write(tmp_path / "r.mcap", [a_scan()], a_log(0, 1))
     with pytest.raises(RecordingError, match=says):
-        assemble_recording(tmp_path / recording, angle_set(), tmp_path / out, lag_s=lag_s)
+        assemble_recording(tmp_path / recording, angle_set(), tmp_path / out, AssembleOptions(lag_s=lag_s))
     assert [path.name for path in tmp_path.iterdir()] == ["r.mcap"]
 
 
@@ -464,7 +472,7 @@ def room(tmp_path_factory):
 
 def distance_m(room, angles, out, **more):
     recording, expected = room
-    assemble_recording(recording, angles, out, organised=True, **more)
+    assemble_recording(recording, angles, out, AssembleOptions(organised=True), **more)
     rows = read_ply(out)
     points = np.stack([rows[name] for name in "xyz"], axis=1)
     np.testing.assert_array_equal(np.isnan(points), np.isnan(expected))

@@ -17,6 +17,7 @@ from patience import BOUND_S, until
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.clouds.ply import read_ply
 
 ROS = os.environ.get("SCANWRIGHT_ROS")
@@ -74,7 +75,7 @@ def test_somebody_elses_program_rebuilds_the_cloud_of_a_recording(tmp_path, doma
     assert found["lines"] == 80
     assert np.isfinite(found["said"]).all()
     assert np.abs(found["said"] - found["rebuilt"]).max() < 1e-4
-    assemble_recording(recording, ANGLES, tmp_path / "r.ply", smooth=False)
+    assemble_recording(recording, ANGLES, tmp_path / "r.ply", AssembleOptions(smooth=False))
     rows = read_ply(tmp_path / "r.ply")
     np.testing.assert_array_equal(found["said"], np.stack([rows[axis] for axis in "xyz"], axis=1))
 
@@ -84,7 +85,9 @@ def test_turns_and_other_names_are_to_be_had(tmp_path, domain):
     setup = Setup(beams=100, sweeps=((90.0, 180.0), (-90.0, 180.0)), step_deg=360 / 4096)
     recording = write(tmp_path / "r.mcap", simulate(FURNISHED, setup, Truth()))
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
-    whole = assemble_recording(recording, ANGLES, tmp_path / "r.ply", smooth=False, organised=True, per="turn")
+    whole = assemble_recording(
+        recording, ANGLES, tmp_path / "r.ply", AssembleOptions(smooth=False, organised=True, per="turn")
+    )
     names = ("--ros-args", "-r", "points:=front/cloud", "-r", "__ns:=/robot")
     collecting = started(
         HERE / "collect_points.py", 2, tmp_path / "f.npz", *names, domain=domain, stdout=subprocess.PIPE
@@ -117,9 +120,9 @@ def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_p
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
     with subprocess.Popen(
         [sys.executable, "-m", "scanwright", "emulate", str(tmp_path)], stdout=subprocess.DEVNULL
-    ) as twins:
+    ) as emulators:
         try:
-            until(lambda: (tmp_path / "emulated.json").exists() or twins.poll() is not None)
+            until(lambda: (tmp_path / "emulated.json").exists() or emulators.poll() is not None)
             (tmp_path / "scanner.urdf").write_text(URDF)
             killed = listening(domain, 10**6, tmp_path / "none.npz")
             node = started("-m", "scanwright", "ros2", tmp_path, "--straight", domain=domain, stderr=subprocess.PIPE)
@@ -136,7 +139,7 @@ def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_p
             assert node.returncode == 130, told
             assert "stopped, as a parameter asks" in told
         finally:
-            twins.terminate()
+            emulators.terminate()
     found = np.load(tmp_path / "found.npz")
     assert found["lines"] >= 20  # of 30: who joins late has not heard all topics at first
     gaps_s = np.diff(found["stamp_ns"]) / 1e9

@@ -24,7 +24,7 @@ from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
 from scanwright.firmware_io.scan import scan_end
 from scanwright.firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
-from scanwright.firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
+from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray
@@ -74,7 +74,7 @@ def test_points_of_the_view_are_those_of_the_frame_chain():
         feed.joint(when, angle)
     for scan in scans:
         feed.scan(scan)
-    feed.told("a line")
+    feed.message("a line")
     feed.close()
     reader.join(120)
     expected = np.concatenate([deskew(scan, log, ANGLES) for scan in scans])
@@ -131,7 +131,7 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         assert view.points == 3000 and shown + view.forgotten == 3000 and shown <= 2000
         colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])
         assert len(colours) == shown and len(np.unique(colours, axis=0)) > 10
-        assert "left out 7 scans" in view.facts.content
+        assert "dropped 7 scans" in view.facts.content
         kept = view.cloud()
         assert len(kept.points_m) == shown and set(kept.columns["time_s"]) == set(range(30 - shown // 100, 30))
         ranges = np.concatenate([chunk.values["range"] for chunk in view.chunks])
@@ -150,11 +150,11 @@ def noted(error, *notes):
 
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
-TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: take its power (no answer)")
+TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: cut its power (no answer)")
 SHINES = UnsafeNote("its laser may still be on: no answer")
 ENDS = {
-    "done": (scan_end.finished(summary(left_out={ON_THE_WAY: 8}), ["wrote 90 points"]), "wrote 90 points"),
-    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "left out 12: bad packets"),
+    "done": (scan_end.finished(summary(left_out={BETWEEN_STOPS: 8}), ["wrote 90 points"]), "wrote 90 points"),
+    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "dropped 12: bad packets"),
     "reconnected": (scan_end.finished(summary(reconnects=2)), "the lidar was away 2 times"),
     "failed": (
         scan_end.failed(noted(DeviceError("<b>nothing</b> came"), OFF)),
@@ -215,7 +215,7 @@ class Seen:
 @pytest.mark.parametrize(
     ("error", "case", "code"),
     [
-        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 2),
+        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 3),
         (noted(KeyboardInterrupt(), TURNS), "stopped, servo turns", 130),
     ],
     ids=["error", "Ctrl-C"],
@@ -231,7 +231,7 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
     monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
     with pytest.raises(typer.Exit) as ended:
         devices.scan(Path("out"))
-    said = [line.removeprefix("scanwright: ") for line in capsys.readouterr().err.splitlines()]
+    said = [line.removeprefix("error: ") for line in capsys.readouterr().err.splitlines()]
     assert ended.value.exit_code == code
     assert said == [*ENDS[case][0].lines, f"what was recorded is in {__file__}"]
     (end, closed) = seen.ends
@@ -340,12 +340,12 @@ def test_two_clicks_are_a_length_and_a_third_begins_anew():
     with guarded_server("a page") as (server, _):
         ruler = Ruler(server, lambda: [points])
         ruler.click(np.zeros(3), np.array([1.0, 0, 0]))
-        assert ruler.said == ""
+        assert ruler.text == ""
         ruler.click(np.zeros(3), np.array([0.0, 0, -1]))  # at nothing
         ruler.click(np.zeros(3), np.array([4.0, 3, 0]))
-        assert ruler.said == "3.000 m"
+        assert ruler.text == "3.000 m"
         ruler.click(np.zeros(3), np.array([4.0, 0, 1]))
-        assert ruler.said == ""
+        assert ruler.text == ""
 
 
 def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_path):
@@ -370,7 +370,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
                 page.mouse.up()
                 with suppress(AssertionError):
                     until(lambda number=number: len(view.ruler.ends) == number, 3)
-        assert re.fullmatch(r"\d\.\d{3} m", view.ruler.said)
+        assert re.fullmatch(r"\d\.\d{3} m", view.ruler.text)
         with page.expect_download() as download:
             page.get_by_role("button", name="Save what is seen").click()
         assert download.value.suggested_filename == "hall.ply"

@@ -13,7 +13,7 @@ from scanwright.cli.app import run as scanwright_command
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import BuildError, DeviceError
 from scanwright.design.evaluation.comparison_table import write_csv
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.device_ports import Ports, announced
 from scanwright.pipeline import records
 from scanwright.pipeline.folder import fresh_folder
@@ -141,7 +141,7 @@ def test_everything_that_writes_into_a_folder_of_results_refuses_or_replaces_a_l
     with pytest.raises(BuildError, match=r"abc.json: a symbolic link"):
         Results(folder, "").put("abc", {})
     write_csv(folder / "compare.csv", [])
-    with whole_file(folder / "study.csv", BuildError) as part:
+    with atomic_write(folder / "study.csv", BuildError) as part:
         part.write_text("text")
     put(folder, MANIFEST, '{"files": {}}')
     (folder / f"{MANIFEST}.part").symlink_to(precious)
@@ -164,7 +164,7 @@ def test_a_scan_does_not_record_through_a_linked_folder_one_line_and_exit_2(tmp_
         scanwright_command()
     (line,) = capsys.readouterr().err.splitlines()
     assert ended.value.code == 2
-    assert line.startswith(f"scanwright: {tmp_path / 'recordings'}: a symbolic link")
+    assert line.startswith(f"error: {tmp_path / 'recordings'}: a symbolic link")
     monkeypatch.setattr("sys.argv", ["scanwright", *words, "--recording", str(tmp_path / "recordings" / "r.mcap")])
     with pytest.raises(SystemExit) as ended:
         scanwright_command()  # a place that the person names is theirs to choose

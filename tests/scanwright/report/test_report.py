@@ -16,7 +16,7 @@ from report_folder import ANGLES, EVIL, Page, drawn, own_body, sphere
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import NODES, problem_of
 from scanwright.design.objective.score import quick_J, score
-from scanwright.design.shadow import AXIS_STEPS, load_own_body
+from scanwright.design.self_occlusion import AXIS_STEPS, load_self_occlusion
 from scanwright.design.task.task import Limits, load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.report import page as report_page
@@ -79,7 +79,7 @@ def test_the_manifest_is_in_the_order_of_a_manifest_written_last(folder, tmp_pat
 
 
 def answered(folder):
-    return answer(load_task(folder / "task.toml"), ANGLES, load_own_body(folder / "own_body.npz")[0])
+    return answer(load_task(folder / "task.toml"), ANGLES, load_self_occlusion(folder / "own_body.npz")[0])
 
 
 def test_the_answer_says_what_the_files_say(folder, page):
@@ -177,7 +177,7 @@ def test_a_file_that_no_build_wrote_is_one_line(name, content, tmp_path, command
     (tmp_path / name).write_bytes(content)
     code, out, complaint = command("report", tmp_path)
     assert (code, out, len(complaint)) == (2, "", 1)
-    assert complaint[0].startswith(f"scanwright: {tmp_path}") and name in complaint[0]
+    assert complaint[0].startswith(f"error: {tmp_path}") and name in complaint[0]
     assert "build the folder again" in complaint[0]
 
 

@@ -1,4 +1,4 @@
-"""What a scanner must see, as a person says it in metres, and as regions of a task file."""
+"""Regions that a scanner must see: as `scanwright new` reads them, and as lines of a task file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pydantic import TypeAdapter, ValidationError
 
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.files.faults import faults_of
+from scanwright.design.files.faults import faults_in
 from scanwright.design.task.shapes import Region
 from scanwright.design.task.task import SMALLEST_BALL_DEG, Task
 
@@ -24,35 +24,35 @@ SEEN: dict[str, tuple[str, Numbers]] = {
     "all": ("all, every direction", ()),
     "thing": ("thing:SIZE:DISTANCE, what it must not miss anywhere in the rest", (0.1, 3.0)),
 }
-"""What can be asked for: how it is written, and its numbers where they are left out."""
+"""Word of a region -> how to write it, and the defaults of its numbers."""
 
 
-def parse_wish(text: str) -> tuple[str, Numbers]:
-    """What a person asks for: the word of `SEEN`, and its numbers.
+def parse_region(text: str) -> tuple[str, Numbers]:
+    """Return the word of `SEEN` and the numbers of a text such as "ground:0.5:5".
 
     Raises:
-        TaskError: there is no such thing to see, or its numbers are none.
+        TaskError: there is no such region, or its numbers are invalid.
     """
-    word, *given = text.split(":")
+    word, *values = text.split(":")
     if word not in SEEN:
-        raise TaskError(f"--see {text}: not a thing to see{suggest(word, SEEN)}; {known_wishes()}")
+        raise TaskError(f"see = '{text}': unknown region{suggest(word, SEEN)}; {known_regions()}")
     how, usual = SEEN[word]
     try:
-        numbers = [float(each) for each in given]
+        numbers = [float(each) for each in values]
     except ValueError as error:
-        raise TaskError(f"--see {text}: numbers after the colons: {how}") from error
+        raise TaskError(f"see = '{text}': needs numbers after the colons: {how}") from error
     if len(numbers) > len(usual) or not all(math.isfinite(each) for each in numbers):
-        raise TaskError(f"--see {text}: {len(usual)} numbers at most, and finite: {how}")
+        raise TaskError(f"see = '{text}': needs at most {len(usual)} finite numbers: {how}")
     return word, (*numbers, *usual[len(numbers) :])
 
 
-def known_wishes() -> str:
-    """How each of them is written."""
+def known_regions() -> str:
+    """Return how to write each region."""
     return "; ".join(how for how, _ in SEEN.values())
 
 
 def density_lines(things: Sequence[Numbers]) -> list[str]:
-    """The ball in which beams are counted, of half the width of the smallest thing that must not be missed.
+    """Return lines of a task file: the ball has half the width of the smallest thing that must not be missed.
 
     Raises:
         TaskError: a size or a distance is not above 0, or the thing is too small for a ball.
@@ -61,23 +61,23 @@ def density_lines(things: Sequence[Numbers]) -> list[str]:
         return []
     size_m, distance_m = min(things, key=lambda each: each[0] / each[1] if each[1] > 0 else 0.0)
     if not (size_m > 0 and distance_m > 0):
-        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: a size and a distance above 0")
+        raise TaskError(f"see = 'thing:{size_m:g}:{distance_m:g}': size and distance must be above 0")
     radius_deg = math.degrees(math.atan2(size_m / 2, distance_m))
     if radius_deg < SMALLEST_BALL_DEG:
-        looks = f"looks {2 * radius_deg:.2g} deg wide, at least {2 * SMALLEST_BALL_DEG:g}"
-        raise TaskError(f"--see thing:{size_m:g}:{distance_m:g}: {looks}")
+        seen = f"appears {2 * radius_deg:.2g} deg wide, minimum {2 * SMALLEST_BALL_DEG:g}"
+        raise TaskError(f"see = 'thing:{size_m:g}:{distance_m:g}': {seen}")
     return [
         f"[density]  # what is {size_m:g} m wide, {distance_m:g} m away: beams within half its width count for it",
         f"ball_radius_deg = {radius_deg:.2g}",
         "",
-        "# [limits]  # take the # away to be refused an answer by which it may be hit less than twice",
+        "# [limits]  # remove the # to reject mounts with fewer than two beams on it",
         "# min_density = 2",
         "",
     ]
 
 
 def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
-    """The lines of a task file that ask for it; `height_m` is that of the scanner over the ground.
+    """Return the lines of a task file for a region; `height_m` is that of the scanner above the ground.
 
     Raises:
         TaskError: there is no such region.
@@ -86,8 +86,8 @@ def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
     try:
         _REGION.validate_python(tomllib.loads("\n".join(lines)))
     except ValidationError as error:
-        wish = ":".join([word, *(f"{each:g}" for each in numbers)])
-        raise TaskError(f"--see {wish}: {'; '.join(map(str, faults_of(error, Task)))}") from error
+        region = ":".join([word, *(f"{each:g}" for each in numbers)])
+        raise TaskError(f"see = '{region}': {'; '.join(map(str, faults_in(error, Task)))}") from error
     return ["[[weight]]", *lines, ""]
 
 
