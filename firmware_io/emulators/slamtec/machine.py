@@ -25,10 +25,10 @@ _STOP, _RESET, _SCAN, _FORCE_SCAN, _EXPRESS_SCAN = 0x25, 0x40, 0x20, 0x21, 0x82
 _INFO, _HEALTH, _SAMPLE_TIMES, _GET_CONF = 0x50, 0x52, 0x59, 0x84
 _MOTOR_PWM, _MOTOR_RPM, _BOARD_FLAG = 0xF0, 0xA8, 0xFF
 
-_CHUNK_NS = 8_000_000
+_CHUNK_NS = 8_000_000  # measured at once: some ms cost a computer little and delay nothing
 _BOOT_NS = 1_000_000_000  # [assumed]
 _SPIN_UP_S = 0.5  # time constant of the motor [assumed]: after 1.5 s it has 95 % of its speed
-_NEVER_NS = 1 << 62
+_NEVER_NS = 1 << 62  # 146 years
 _POINTS: Final = {STANDARD: 8, EXPRESS: 32, ULTRA: 96, DENSE: 40}  # of a packet; nodes are sent 8 together
 _SIZES: Final = {STANDARD: 5, EXPRESS: 84, ULTRA: 132, DENSE: 84}
 _MOST_MM: Final = {STANDARD: 16_383, EXPRESS: 16_383, ULTRA: 28_655, DENSE: 65_535}  # that a packet can hold
