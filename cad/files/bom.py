@@ -325,5 +325,11 @@ def _total(items: list[BomItem]) -> BomItem:
         round(sum(usd for item in items if (usd := getattr(item, end)) is not None)) for end in ("low_usd", "high_usd")
     )
     return BomItem(
-        "total", "all rows with a price", total_usd=round(sum(known), 2), low_usd=low, high_usd=high, note=note
+        kind="total",
+        part="all rows with a price",
+        quantity=None,
+        total_usd=round(sum(known), 2),
+        low_usd=low,
+        high_usd=high,
+        note=note,
     )

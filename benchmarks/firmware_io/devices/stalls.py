@@ -123,8 +123,8 @@ def held_up(
     """The lidar, opened on a line whose reader is held up, and the stalls that are still to come."""
     line = HeldUpLine(model, stalls, buffer_bytes)
     clocks = [patch.object(module, "time", line) for module in (sensor_line, dialogue, slamtec, ldrobot, lms2xx)]
-    at_speed = patch.object(slamtec_emulator, "_SPIN_UP_S", 1e-6)  # turns are counted at full speed
-    with patch.object(sensor_line, "open_stream", lambda _: line), at_speed:
+    spun_up = patch.object(slamtec_emulator, "_SPIN_UP_S", 1e-6)  # turns are counted at full speed
+    with patch.object(sensor_line, "open_stream", lambda _: line), spun_up:
         for clock in clocks:
             clock.start()
         try:

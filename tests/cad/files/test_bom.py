@@ -53,6 +53,7 @@ def test_prices_are_the_catalogues_and_unknown_ones_stay_empty(rows, made):
     assert float(total["total_usd"]) == sum(float(row["total_usd"]) for row in bought.values() if row["total_usd"])
     without = sum(row["total_usd"] == "" for row in rows)
     assert f"{without} rows without a price" in total["note"]
+    assert total["quantity"] == ""
 
 
 def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range(rows):
