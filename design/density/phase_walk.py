@@ -92,11 +92,15 @@ def windows_at(
     """Where line 0 enters the windows of the beams at a polar angle and leaves them, by turns, in `edges` [steps].
 
     `beam_steps` are the azimuths of the beams. The edges are not brought back to one turn. Returned: their number, and
-    how many beams see all lines, for which there are none.
+    how many beams see all lines, for which there are none. With sines and cosines of two polar angles, (4, n), the
+    windows are the narrower ones: a half-width has one maximum over the polar angle, so no window between the two
+    angles is narrower.
     """
     n, whole = 0, 0
     for b in range(ends[0, i], ends[1, i]):
         half = half_width(polar[0, i], polar[1, i], beams[0, b], beams[1, b], ball[0], ball[1])
+        if len(polar) > 2:
+            half = min(half, half_width(polar[2, i], polar[3, i], beams[0, b], beams[1, b], ball[0], ball[1]))
         if half >= np.pi:
             whole += 1
         elif half >= 0.0:

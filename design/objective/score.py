@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int64
 from numpy import ndarray
 
 from scanwright.design.arrays import Setting
@@ -30,7 +30,7 @@ from scanwright.design.sphere.total_weight import require_drawn
 MOST_NODES = 200_000
 ROUNDING = 1e-6  # floor of the stated error
 MISSED_AGAIN = 3.0  # times what a third of the nodes misses: each further third finds less
-LOWEST, LOOKS = 16, 16  # nodes of the lowest counts that are looked about, and where
+RANGE, MOST_RANGES, SLIVER_RAD = 16, 2048, 1e-6  # of the search for the lowest count: nodes of a first range, ...
 SETS = 8  # of directions for a sweep
 SURE = 4.5  # standard errors of their mean: by Student's t three in a thousand are further off
 
@@ -148,12 +148,12 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
     moment = problem.objective.moments[index]
     rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
 
-    def seen(polar_rad: Float[ndarray, " n"]) -> Zones:
-        return zones(polar_rad, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
+    def seen(polar_rad: Float[ndarray, " n"], until_rad: Float[ndarray, " n"] | None = None) -> Zones:
+        return zones(polar_rad, polar, azimuth, problem.lines, problem.ball_rad, moment.g, until_rad)
 
     z = seen(rule.polar_rad)
     if stated and not problem.grid_step_deg:  # of the paper's grid nothing between the nodes counts
-        z = replace(z, least=_with_lower(seen, rule, z))
+        z = replace(z, least=_with_lowest(seen, rule, z))
     blind = np.zeros(len(rule.polar_rad), dtype=bool)
     for low, high in problem.blind_zones(polar):
         blind |= (low < rule.polar_rad) & (rule.polar_rad < high)
@@ -172,29 +172,47 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
     return replace(found, error=error, lower=float(share @ moment.g(z.mean)))
 
 
-def _with_lower(seen: Callable[[Float[ndarray, " n"]], Zones], rule: PolarRule, z: Zones) -> Float[ndarray, " n"]:
-    """Lowest counts at the nodes, that of the lowest node replaced by what is lower between nodes, shape (n,).
+def _with_lowest(
+    seen: Callable[[Float[ndarray, " n"], Float[ndarray, " n"] | None], Zones], rule: PolarRule, z: Zones
+) -> Float[ndarray, " n"]:
+    """Lowest counts at the nodes, that of the lowest node replaced by the lowest of the whole region, shape (n,).
 
-    A count dips where windows of several beams begin and end within less than a node: the nodes of the lowest counts
-    are looked about, then the lowest of what is found.
+    A count dips where windows of several beams begin and end within less than a node. Branch and bound over ranges of
+    the polar angle: those whose bound is not below the lowest count so far are done, the others are halved until they
+    are shorter than `SLIVER_RAD`. Of more than `MOST_RANGES` those of the highest bounds are dropped.
     """
     t, there = rule.polar_rad, rule.fine > 0
-    order = np.lexsort((z.mean, z.least, ~there))[: min(LOWEST, int(there.sum()))]
-    step = np.diff(t)
-    apart = (rule.segment[1:] != rule.segment[:-1]) | ~there[1:] | ~there[:-1]
-    # nodes crowd at the ends of a segment: the first is an eighth of a step from it
-    below = np.where(np.append(True, apart), np.append(step, step[-1:]) / 8, np.append(0.0, step))[order]
-    above = np.where(np.append(apart, True), np.append(step[:1], step) / 8, np.append(step, 0.0))[order]
-    share = (np.arange(LOOKS) + 0.5) / LOOKS
-    first = (t[order] - below)[:, None] + (below + above)[:, None] * share
-    reach = np.repeat((below + above) / LOOKS, LOOKS)
-    near = seen(first.ravel())
-    again = np.lexsort((near.mean, near.least))[:LOWEST]
-    second = first.ravel()[again][:, None] + reach[again][:, None] * (share - 0.5)
-    lower = min(int(near.least.min()), int(seen(second.ravel()).least.min()))
+    lowest = np.flatnonzero(there)[np.argmin(z.least[there])]
     least = z.least.copy()
-    least[order[0]] = min(least[order[0]], lower)
+    low, high = _weighted_ranges(t, there, rule.segment)
+    while len(low) and least[lowest] > 0:
+        bound = seen(low, high).least
+        open_ = np.flatnonzero(bound < least[lowest])
+        open_ = open_[np.argsort(bound[open_], kind="stable")[:MOST_RANGES]]
+        low, high = low[open_], high[open_]
+        middle = (low + high) / 2
+        if len(middle):
+            least[lowest] = min(least[lowest], seen(middle, None).least.min())
+        wide = high - low > SLIVER_RAD
+        low, middle, high = low[wide], middle[wide], high[wide]
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
     return least
+
+
+def _weighted_ranges(
+    t: Float[ndarray, " n"], there: Bool[ndarray, " n"], segment: Int64[ndarray, " n"]
+) -> tuple[Float[ndarray, " ranges"], Float[ndarray, " ranges"]]:
+    """Ranges of some nodes each that together are all segments with weight: their lower and their upper ends."""
+    apart = (segment[1:] != segment[:-1]) | ~there[1:] | ~there[:-1]
+    first, last = np.flatnonzero(np.append(True, apart)), np.flatnonzero(np.append(apart, True))
+    first, last = first[last > first], last[last > first]
+    ends = [
+        # nodes crowd at the ends of a segment: the first is an eighth of a step from it
+        np.array([t[i] - (t[i + 1] - t[i]) / 8, *t[i + RANGE : k : RANGE], t[k] + (t[k] - t[k - 1]) / 8])
+        for i, k in zip(first, last, strict=True)
+    ]
+    none = [np.empty(0)]
+    return np.concatenate([each[:-1] for each in ends] or none), np.concatenate([each[1:] for each in ends] or none)
 
 
 def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
