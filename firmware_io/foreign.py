@@ -47,8 +47,8 @@ def of_file(path: Path) -> Iterator[None]:
 def foreign_items(what: str, items: Iterable[T]) -> Iterator[T]:
     """Pass on what a foreign reader yields; only the reader's own failures become RecordingError, not the caller's."""
     iterator = foreign(what, iter, items)
-    while found := foreign(what, _next, iterator):
-        yield from found
+    while item := foreign(what, _next, iterator):
+        yield from item
 
 
 def _next(iterator: Iterator[T]) -> tuple[T] | tuple[()]:

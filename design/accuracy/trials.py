@@ -21,7 +21,7 @@ from scanwright.design.accuracy.front import dominators
 from scanwright.design.accuracy.machine import this_machine
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.picture_files import save_picture
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 
 T = TypeVar("T")
 REPEATS = 3
@@ -92,7 +92,7 @@ def write_trials(path: Path, trials: Sequence[Trial]) -> None:
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a CSV file."""
-    with whole_file(path, BuildError) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path, BuildError) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)

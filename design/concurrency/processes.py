@@ -52,7 +52,7 @@ class Packed(Generic[T]):
 
 
 @contextmanager
-def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Begin]:
+def worker_processes(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Begin]:
     """What begins work in so many processes beside this one; they end with the block, their work done or not.
 
     Functions, arguments and results are pickled: functions of modules only. A process that has loaded `modules`, which
@@ -65,7 +65,7 @@ def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Be
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(modules))
     resource_tracker.ensure_running()  # first, for to start it lets Ctrl-C through
-    with ctrl_c_held_back(), one_thread_each():
+    with sigint_deferred(), one_thread_each():
         forkserver.ensure_running()
     pool = ProcessPoolExecutor(count, context, _attend)
 
@@ -112,7 +112,7 @@ def spawn_pool() -> ProcessPoolExecutor:
 
 
 @contextmanager
-def ctrl_c_held_back() -> Iterator[None]:
+def sigint_deferred() -> Iterator[None]:
     """Ctrl-C waits for the end of the block, and what is born in it cannot hear it before it turns a deaf ear.
 
     Blocked in this thread it would still come by another one, and Python would raise it here: in the middle of what a

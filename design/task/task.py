@@ -22,8 +22,8 @@ from scanwright.design.camera import Camera
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.deck_holes import DeckHoles
-from scanwright.design.errors import ScanwrightError, TaskError
-from scanwright.design.files.faults import Fault, faults_of, tell
+from scanwright.design.errors import ScanwrightError, TaskError, suggest
+from scanwright.design.files.faults import Fault, faults_in, format_faults
 from scanwright.design.files.record import Record
 from scanwright.design.motion import Motion, Shortest, Sweep
 from scanwright.design.scanner import NO_MODULES, Modules, Scanner, scanner_of
@@ -32,6 +32,7 @@ from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.map_file import read_map
 from scanwright.design.task.named_products import NAMED, motion_faults
 from scanwright.design.task.named_record import named_table, names_in
+from scanwright.design.task.objective_names import SHIPPED_OBJECTIVES, objectives
 from scanwright.design.task.shapes import (
     LITTLE,
     BoxRegion,
@@ -68,9 +69,7 @@ class DensityRules(Record):
     ball_radius_deg: Number = Field(
         default=2.0, ge=SMALLEST_BALL_DEG, le=90, description="beams this near to a direction count for it"
     )
-    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = Field(
-        default="log", description="what J is; see Definitions"
-    )
+    objective: str = Field(default="log", description="what J is; see Definitions", examples=[*SHIPPED_OBJECTIVES])
     required: Required = None
     background: Value = Field(default=0.0, description="how much directions matter that no weight names")
     quadrature: Literal["solid_angle", "equal_angle"] = Field(
@@ -79,6 +78,13 @@ class DensityRules(Record):
     grid_step_deg: GridStep = Field(default=1.0, description="of the paper's sum")
     tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
     budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
+
+    @field_validator("objective")
+    @classmethod
+    def _is_an_objective(cls, name: str) -> str:
+        if name not in (known := objectives()):
+            raise ValueError(f"no objective of that name{suggest(name, known)}")
+        return name
 
 
 class Limits(Record):
@@ -95,10 +101,10 @@ class Task(Record):
     """One task file with every default written out."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="of the task and its build folder")
-    sensor: str = Field(description="the 2D lidar: `scanwright catalogue --kind lidar` lists them")
-    servo: str = Field(description="what turns it: `scanwright catalogue --kind servo` lists them")
+    sensor: str = Field(description="the 2D lidar, by its name in the catalogue")
+    servo: str = Field(description="what turns it, by its name in the catalogue")
     slip_ring: str | None = Field(default=None, description="what lets its cable turn for ever; a sweep needs none")
-    printer: str = Field(default="fdm-0.4", description="how the parts are made: `scanwright catalogue --kind printer`")
+    printer: str = Field(default="fdm-0.4", description="how the parts are made, by its name in the catalogue")
     catalogue: tuple[str, ...] = Field(default=(), description="product files of your own, beside the task")
     deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck")
     modules: Modules = Field(default=NO_MODULES, description="parts that it works without: none by default")
@@ -264,7 +270,7 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     """The task of a table, with its products and maps; all that is wrong is told at once."""
     task, faults = _sound_part(table)
     if task is None:
-        raise TaskError(tell(faults, source))
+        raise TaskError(format_faults(faults, source))
     try:
         products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
         own_products = ""
@@ -291,7 +297,7 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     ]
     surface = None if task.scene is None else tried("scene", partial(_surface, task.scene, source.parent))
     if faults or own_products:
-        raise TaskError("\n".join(each for each in (own_products, tell(faults, source)) if each))
+        raise TaskError("\n".join(each for each in (own_products, format_faults(faults, source)) if each))
     return LoadedTask(task, source, products, tuple(each for each in maps if each is not None), surface)
 
 
@@ -300,7 +306,7 @@ def _sound_part(table: dict[str, Any]) -> tuple[Task | None, list[Fault]]:
     try:
         return Task.model_validate(table), []
     except ValidationError as error:
-        faults = faults_of(error, Task)
+        faults = faults_in(error, Task)
     wrong = {fault.path[0] for fault in faults if fault.path}
     wrong |= {"motion"} if wrong & {"servo", "slip_ring"} else set()  # what these cannot do is asked for by the motion
     sound = {key: value for key, value in table.items() if key not in wrong}
