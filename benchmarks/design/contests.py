@@ -79,7 +79,7 @@ def contest(
         tol=1e-6,
         polish=False,
         rng=seed,
-        callback=lambda intermediate_result: process_time() > end,
+        callback=lambda *_: process_time() > end,
     )
     setting = low.copy()
     setting[free] = evolved.x

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from scanwright.design.accuracy.reference import Reference, is_smooth, reference
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.objective.problem import Problem
+from scanwright.design.progress import Progress
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
@@ -27,8 +28,6 @@ LOOK_DEG = 2.0  # how far around the setting a method's own minimum is looked fo
 LOOKS = 9
 OTHERS, OTHERS_DRAWN = 7, 2  # settings beside the first; fewer where each reference is drawn at random
 SEED = 0
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)

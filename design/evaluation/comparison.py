@@ -36,7 +36,7 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import NODES, Problem, with_scanner
 from scanwright.design.objective.score import Score, blind_share, score_on
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress, no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.search.search import search
@@ -101,7 +101,7 @@ def compare(
     problem: Problem,
     best: Family,
     mounts: tuple[TunedMount, ...],
-    progress: Progress = lambda _: None,
+    progress: Progress = no_progress,
     built: tuple[Setting, SelfOcclusion] | None = None,
 ) -> list[ComparisonRow]:
     """Rows of the answer, the reference mounts, other scanners, and every multibeam of the catalogue.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
 from scanwright.design.objective.tolerance import rise_words, sensitivity
+from scanwright.design.progress import Progress
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
@@ -183,7 +184,7 @@ def evaluate(
     angles_rad: Setting,
     pole: str | None,
     lever: str | None,
-    progress: Callable[[str], None],
+    progress: Progress,
     shadow: SelfOcclusion | None = None,
 ) -> Evaluation:
     """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
@@ -193,7 +194,7 @@ def evaluate(
         angles_rad: the setting.
         pole: as `parse_pole` reads it, None for no pole.
         lever: `X_MM,Y_MM,RANGE_M`, None for an optical centre on the axis.
-        progress: is told what is being computed.
+        progress: called with what is being computed.
         shadow: beams that the parts of this very setting block, if it was built.
 
     Raises:

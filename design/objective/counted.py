@@ -124,7 +124,6 @@ def counted_J(
     objective = density.objective
     moments, least, none, weighted = [], np.iinfo(int).max, 0.0, 0.0
 
-
     def counted(cubes: list[Array]) -> _Sample:
         directions, value, area, required, phase = (
             _weighted(layers, cubes) if nodes is None else _at_nodes(nodes, cubes)

@@ -25,7 +25,7 @@ NEAR = 5e-3  # a wrong field is off by far more
 SETS = 16
 FIRST = 256  # directions of each set, in all regions together: their spread tells how many are needed
 AIM = 0.8  # of NEAR: the spread of few directions is itself uncertain
-MOST_WORK = 1.2e5  # directions of one set times what each costs: 0.3 s of processor in all
+MOST_WORK = 2.4e5  # directions of one set times what each costs: 0.3 s of processor in all
 PER_LAYER = 4.0  # what a direction costs for each region that may contain it, in beams
 AGAIN = 8  # times more before a difference is an error: one count in a thousand is off by more than it states
 
@@ -83,7 +83,7 @@ def _counted(
     near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, task.density.ball_radius_deg / 60))
     cost = near + PER_LAYER * (len(task.weight) + len(task.mask)) / max(count.weighted, 1e-3)
     needed = points * (SURE * count.J_error / (AIM * NEAR)) ** 2 if np.isfinite(count.J_error) else np.inf
-    more = int(min(needed, MOST_WORK / cost))
+    more = 2 ** int(min(np.ceil(np.log2(max(needed, 1.0))), np.log2(MOST_WORK / cost)))  # as a net has points
     if more > points:
         points = more
         count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)

@@ -21,6 +21,7 @@ from scanwright.design.density.beams import beam_directions_rot, polar_and_azimu
 from scanwright.design.density.spin import mean_count, zones
 from scanwright.design.objective.named_objectives import Objective
 from scanwright.design.objective.problem import Problem
+from scanwright.design.progress import Progress
 from scanwright.design.search.constraints import AtMost, Constraint, NoHole, fan_reach
 from scanwright.design.search.grid_classes import Folded
 from scanwright.design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
@@ -37,8 +38,6 @@ BLIND_MARGIN = 0.02  # what a blind share told from nodes may be off by: the few
 REPORT = 1000  # planes between two lines of progress
 SCOUTED = 0.05  # what a bound over the scouts may be above that over all axes: else all are visited twice
 SCOUTS = 1500  # axes that tell how low a plane's bound comes, before all are visited
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +172,7 @@ def settled(
         size: numbers of planes and axes.
         batch_size: planes that are made exact before the bounds are asked again.
         margin: what J may be off by.
-        progress: is told every `REPORT` planes.
+        progress: called every `REPORT` planes, with the share of the planes that are exact: not all need to be.
     """
     step = max(1, size[1] // SCOUTS)
     everything, scouts = slice(None), slice(None, None, step)
@@ -187,11 +186,11 @@ def settled(
             if not len(batch):
                 continue
             if exact.sum() // REPORT > (exact.sum() - batch_size) // REPORT:
-                progress(f"exact densities: {exact.sum()} of at most {len(exact):,} scan planes")
+                progress("exact densities of the scan planes", exact.mean())
             look(batch)
             exact[batch] = True
             best = np.minimum(best, _by_plane(lowest_of(batch, scouts)).min(axis=1))
-        progress(f"all axes of all {len(exact):,} scan planes")
+        progress("all axes of all scan planes")
         plain, kept = lowest_of(everything, everything)
         bounds = _by_plane((plain, kept))
         best = np.where(exact, bounds, np.inf).min(axis=1)

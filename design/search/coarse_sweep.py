@@ -17,7 +17,8 @@ from scanwright.design.errors import TaskError
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import blind_to_sweep
-from scanwright.design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, settled
+from scanwright.design.progress import Progress
+from scanwright.design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, settled
 from scanwright.design.search.constraints import AtMost, Constraint
 from scanwright.design.search.grid_classes import Folded
 from scanwright.design.search.plane_axis_product import Lowest, lowest, one_way

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from itertools import chain, count
 
@@ -16,7 +15,8 @@ from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import NODES, Problem
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_within
-from scanwright.design.search.coarse import Landscape, Progress
+from scanwright.design.progress import Progress, no_progress
+from scanwright.design.search.coarse import Landscape
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.grid_classes import Folded
 from scanwright.design.search.refinement import INDIFFERENT, REFINE_ROUNDS, allowed_setting, refined_setting
@@ -203,10 +203,10 @@ def refine_leaders(
     leaders: list[Leader],
     required: Requirements,
     rounds: int = len(REFINE_ROUNDS),
-    progress: Progress = lambda _: None,
+    progress: Progress = no_progress,
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
-    start, done = time.perf_counter(), count(1)
+    done = count(1)
     different = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
     ordered = sorted(different.values(), key=lambda pair: pair[0].J)
 
@@ -216,8 +216,7 @@ def refine_leaders(
         refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
         allowed = allowed_setting(refined, leader.angles_deg, required)
         ready = next(done)
-        left_s = (time.perf_counter() - start) * (len(apart) - ready) / ready
-        progress(f"refined {ready} of {max(ready, len(apart))} minima, about {max(0.0, left_s):.0f} s left")
+        progress("refining the minima", ready / max(ready, len(apart)))
         return allowed
 
     # all at once, but those that are in the winner's valley already

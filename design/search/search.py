@@ -14,7 +14,8 @@ from scanwright.design.left_out import LeftOut
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.named_objectives import Moment, Objective
 from scanwright.design.objective.problem import Problem
-from scanwright.design.search.coarse import USUAL, Effort, Landscape, Progress, coarse_landscape
+from scanwright.design.progress import Progress, no_progress
+from scanwright.design.search.coarse import USUAL, Effort, Landscape, coarse_landscape
 from scanwright.design.search.coarse_sweep import swept_landscape
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
@@ -64,7 +65,7 @@ class SearchResult:
 def search(
     problem: Problem,
     ranges: AngleRanges,
-    progress: Progress = lambda _: None,
+    progress: Progress = no_progress,
     limits: Limits = NONE,
     effort: Effort = USUAL,
 ) -> SearchResult:

@@ -14,7 +14,7 @@ from scanwright.design.motion import Shortest, Spin
 from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.objective.score import score
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.limits import line_gaps_deg

@@ -23,7 +23,7 @@ from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.self_check import require_counted
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.grid_classes import mirrors_of
 from scanwright.design.self_occlusion import SelfOcclusion

@@ -247,7 +247,7 @@ def _drawn(scanner: Scanner, parts: Packed[PartsResult], say: Say) -> dict[str, 
 def _at(say: Say, stage: str) -> Say:
     """Progress that tells how much of the whole build is behind it."""
     share = BEHIND[stage]
-    return lambda line: say(f"{line} ({share:.0%})")
+    return lambda line, _fraction=None, /: say(f"{line} ({share:.0%})")
 
 
 def _made_again(loaded: LoadedTask, target: Path, say: Say) -> Made:

@@ -42,7 +42,7 @@ class Searching:
     def _run(self, canvas: Canvas) -> None:
         said = 0
 
-        def told(line: str) -> None:
+        def told(line: str, _fraction: float | None = None, /) -> None:
             nonlocal said
             said += 1
             put(self._controls.progress, min(100.0 * said / SEARCH_STEPS, 95.0))

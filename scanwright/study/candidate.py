@@ -19,6 +19,7 @@ from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import Problem
+from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.front import six_digits
@@ -56,7 +57,7 @@ def addresses(loaded: LoadedTask) -> tuple[str, str]:
 def search_candidate(loaded: LoadedTask) -> Result:
     """Families of settings of a search record, its period, and what no setting with parts can be better than."""
     try:
-        optimum = find_optimum(loaded, lambda _: None)
+        optimum = find_optimum(loaded, no_progress)
     except TaskError as error:
         return {"status": "refused", "reason": why(error, loaded)}
     reference_J = min(mount.score.J for mount in optimum.mounts)
