@@ -228,7 +228,7 @@ def _weighted_ranges(
 
 
 def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
-    """A moment over `SETS` sets of directions; `SURE` standard errors of their mean are its error."""
+    """A moment over `SETS` sets of directions, of which `SURE` standard errors are its error, or over the grid."""
     assert problem.sweep is not None
     moment = problem.objective.moments[index]
     R = R_world_rot(angles_rad[0], angles_rad[1])
@@ -255,7 +255,7 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     if moment.gathered == "highest":
         error = max(float(np.ptp(values)), _one_less(moment, least))
     else:
-        error = SURE * float(np.std(values, ddof=1)) / SETS**0.5
+        error = SURE * float(np.std(values, ddof=1)) / SETS**0.5 if len(values) > 1 else 0.0
     return _Found(
         value=float(gather(values)),
         error=error,

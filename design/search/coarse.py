@@ -122,6 +122,7 @@ def coarse_landscape(
             over[id(field)] = weights_over_polar(field, axes.representatives, nodes, circles, problem.grid_step_deg)
         return over[id(field)]
 
+    progress("weights and outline of the region")
     weights = tuple(weights_of(moment.field) for moment in moments)
     shown = np.radians(planes.settings_deg[planes.first])
     means = in_chunks(lambda chunk: _means(problem, polar, shown[chunk]), len(shown), smallest=8)

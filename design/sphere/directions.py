@@ -85,12 +85,12 @@ def require_weight(field: Field) -> None:
 
 @lru_cache(maxsize=8)
 def sample_sets(field: Field, grid_step_deg: float | None, wanted: int, count: int) -> tuple[Samples, ...]:
-    """The first so many of `sample_set`, kept: a search asks for the same ones for every setting.
+    """Return the first so many of `sample_set`, or the paper's grid once; cached, as all settings use the same.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    return tuple(sample_set(field, grid_step_deg, wanted, index) for index in range(count))
+    return tuple(sample_set(field, grid_step_deg, wanted, index) for index in range(1 if grid_step_deg else count))
 
 
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:
