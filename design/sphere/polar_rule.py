@@ -70,6 +70,7 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
 
     Raises:
         NumericalError: weight is missing: the nodes sum to less or more than its integral.
+        TaskError: the same, and the region is thinner than what is resolved.
     """
     if not has_all_breaks(field):
         return _sampled_rule(field, axis, breaks_rad, nodes)
