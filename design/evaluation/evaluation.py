@@ -160,10 +160,10 @@ class Evaluation:
         if gap.half_turn_misses is not None:
             lines.append(f"half a turn    misses {gap.half_turn_misses:.1%} of the weight that a full turn sees")
         if self.hit is not None:
-            for found in self.hit.chances:
-                beams = f"{found.beams} beam{'s' if found.beams > 1 else ''}"
-                _, error = rounded_to_error(100 * found.chance, 100 * found.error)
-                chance = f"{found.chance:.2%} +- {error:g}%"
+            for result in self.hit.chances:
+                beams = f"{result.beams} beam{'s' if result.beams > 1 else ''}"
+                _, error = rounded_to_error(100 * result.chance, 100 * result.error)
+                chance = f"{result.chance:.2%} +- {error:g}%"
                 lines.append(f"pole           {chance} get at least {beams} ({self.hit.stands} azimuths)")
         if self.surfaces is not None:
             low, middle = self.surfaces["lowest_points_per_m2"], self.surfaces["median_points_per_m2"]
@@ -211,7 +211,7 @@ def evaluate(
     progress("closed form")
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
     interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
-    found = checked_score(loaded, problem, angles_rad, None)
+    result = checked_score(loaded, problem, angles_rad, None)
     built = None
     if shadow is not None:
         built = as_built(problem, loaded.task, angles_rad, shadow, checked_score(loaded, problem, angles_rad, shadow))
@@ -220,7 +220,7 @@ def evaluate(
         problem=problem,
         angles_rad=angles_rad,
         lever=off_axis,
-        score=found,
+        score=result,
         ball=ball_score(problem, angles_rad),
         holes=holes(problem, angles_rad),
         coverage=coverage(problem, angles_rad),

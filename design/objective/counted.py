@@ -216,12 +216,12 @@ def _digits(count: int) -> Array:
 
 
 def _about_the_lowest(
-    cubes: list[Array], counts: Array, reach: float, looks: int, rng: np.random.Generator
+    cubes: list[Array], counts: Array, reach: float, tries: int, rng: np.random.Generator
 ) -> list[Array]:
     """Draw points of the unit cubes about those of the lowest counts: chance seldom meets a lowest count."""
     owner = np.repeat(np.arange(len(cubes)), [len(cube) for cube in cubes])
     lowest = np.argsort(counts, kind="stable")[:LOWEST]
-    near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], looks, axis=0) for i in range(len(cubes))]
+    near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], tries, axis=0) for i in range(len(cubes))]
     moved = [cube + reach * rng.uniform(-1, 1, cube.shape) for cube in near]
     if near[0].shape[1] == 2:  # nodes stay, at any phase
         moved = [np.column_stack([cube[:, 0], rng.uniform(0, 1, len(cube))]) for cube in near]

@@ -67,12 +67,12 @@ def score(problem: Problem, angles_rad: Setting) -> Score:
     """
     nodes, before = problem.nodes, None
     while True:
-        found = score_on(problem, angles_rad, nodes)
-        if found.J_error <= problem.tolerance or nodes >= MOST_NODES or problem.grid_step_deg:
-            return found
-        if (found.J, found.J_error) == before:  # a whole count, which no nodes make smaller
-            return found
-        nodes, before = nodes * 3, (found.J, found.J_error)
+        result = score_on(problem, angles_rad, nodes)
+        if result.J_error <= problem.tolerance or nodes >= MOST_NODES or problem.grid_step_deg:
+            return result
+        if (result.J, result.J_error) == before:  # a whole count, which no nodes make smaller
+            return result
+        nodes, before = nodes * 3, (result.J, result.J_error)
 
 
 def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool = True) -> Score:
@@ -88,18 +88,18 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool 
     """
     join, moments = problem.objective.join, problem.objective.moments
     if problem.sweep is None:
-        found = [_moment_on_circles(problem, k, angles_rad, nodes, stated) for k in range(len(moments))]
+        result = [_moment_on_circles(problem, k, angles_rad, nodes, stated) for k in range(len(moments))]
     else:
-        found = [_moment_on_directions(problem, k, angles_rad, nodes) for k in range(len(moments))]
-    values = np.array([moment.value for moment in found])
+        result = [_moment_on_directions(problem, k, angles_rad, nodes) for k in range(len(moments))]
+    values = np.array([moment.value for moment in result])
     J = float(join(values))
     J_error = J_lower = np.nan
     if stated:
         each = np.arange(len(values))
-        moved = np.array([join(np.where(each == k, m.value + m.error, values)) for k, m in enumerate(found)])
+        moved = np.array([join(np.where(each == k, m.value + m.error, values)) for k, m in enumerate(result)])
         J_error = float(np.linalg.norm(moved - J)) + problem.objective.join_error + ROUNDING if np.isfinite(J) else 0.0
-        J_lower = float(join(np.array([moment.lower for moment in found])))
-    spoken = [(moment.share, m) for moment, m in zip(moments, found, strict=True) if moment.share > 0]
+        J_lower = float(join(np.array([moment.lower for moment in result])))
+    spoken = [(moment.share, m) for moment, m in zip(moments, result, strict=True) if moment.share > 0]
     return Score(
         J=J,
         J_error=J_error,
@@ -138,7 +138,7 @@ def blind_to_sweep(
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _MomentValue:
     """A moment of one setting, with the least count, the share that is blind, and its error and its lower bound."""
 
     value: float
@@ -148,7 +148,7 @@ class _Found:
     lower: float = np.nan
 
 
-def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes: int, stated: bool) -> _Found:
+def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes: int, stated: bool) -> _MomentValue:
     """A moment by quadrature over the polar angle."""
     moment = problem.objective.moments[index]
     rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
@@ -166,11 +166,11 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
         return _highest(moment, z, moment.g(z.mean), rule.fine, blind)
     total = rule.fine.sum()
     share = rule.fine / total
-    found = _Found(float(share @ z.mean_g), int(z.least[share > 0].min()), blind_share(rule.fine, blind))
+    result = _MomentValue(float(share @ z.mean_g), int(z.least[share > 0].min()), blind_share(rule.fine, blind))
     if not stated:
-        return found
-    error = ERROR_SHARE[nodes >= MANY_NODES] * _misfit(rule, share, z.mean_g - found.value)
-    return replace(found, error=error, lower=float(share @ moment.g(z.mean)))
+        return result
+    error = ERROR_SHARE[nodes >= MANY_NODES] * _misfit(rule, share, z.mean_g - result.value)
+    return replace(result, error=error, lower=float(share @ moment.g(z.mean)))
 
 
 def _misfit(rule: PolarRule, share: Float[ndarray, " n"], g: Float[ndarray, " n"]) -> float:
@@ -227,7 +227,7 @@ def _weighted_ranges(
     return np.concatenate([each[:-1] for each in ends] or none), np.concatenate([each[1:] for each in ends] or none)
 
 
-def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _Found:
+def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nodes: int) -> _MomentValue:
     """A moment over `SETS` sets of directions, of which `SURE` standard errors are its error, or over the grid."""
     assert problem.sweep is not None
     moment = problem.objective.moments[index]
@@ -240,28 +240,28 @@ def _moment_on_directions(problem: Problem, index: int, angles_rad: Setting, nod
     z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, moment.g)
     blind = blind_to_sweep(problem, directions, beams, z.mean)
     lower = moment.g(z.mean)
-    found, first = [], 0
+    result, first = [], 0
     for samples in sets:
         own = slice(first, first := first + len(samples.weights))
         if moment.gathered == "highest":
-            found.append(_highest(moment, z.of(own), lower[own], samples.weights, blind[own]))
+            result.append(_highest(moment, z.of(own), lower[own], samples.weights, blind[own]))
         else:
             share = samples.weights / samples.weights.sum()
             value, bound = (float(share @ of[own]) for of in (z.mean_g, lower))
             hidden = blind_share(samples.weights, blind[own])
-            found.append(_Found(value, int(z.least[own].min()), hidden, lower=bound))
-    values, least = np.array([f.value for f in found]), min(f.least for f in found)
+            result.append(_MomentValue(value, int(z.least[own].min()), hidden, lower=bound))
+    values, least = np.array([f.value for f in result]), min(f.least for f in result)
     gather = np.max if moment.gathered == "highest" else np.mean
     if moment.gathered == "highest":
         error = max(float(np.ptp(values)), _one_less(moment, least))
     else:
         error = SURE * float(np.std(values, ddof=1)) / SETS**0.5 if len(values) > 1 else 0.0
-    return _Found(
+    return _MomentValue(
         value=float(gather(values)),
         error=error,
-        lower=float(gather([f.lower for f in found])),
+        lower=float(gather([f.lower for f in result])),
         least=least,
-        blind=float(np.mean([f.blind for f in found])),
+        blind=float(np.mean([f.blind for f in result])),
     )
 
 
@@ -271,7 +271,7 @@ def _highest(
     lower: Float[ndarray, " n"],
     fine: Float[ndarray, " n"],
     blind: Bool[ndarray, " n"],
-) -> _Found:
+) -> _MomentValue:
     """The highest g anywhere; what every third of the nodes misses in the mean tells what all of them do.
 
     All thirds may meet the same count where a sliver between two nodes has one less, so that is the least error.
@@ -280,7 +280,7 @@ def _highest(
     least = int(z.least[fine > 0].min())
     value = float(g.max())
     thirds = [highest for highest in (g[i::3].max(initial=-np.inf) for i in range(3)) if np.isfinite(highest)]
-    return _Found(
+    return _MomentValue(
         value=value,
         error=max(MISSED_AGAIN * (value - float(np.mean(thirds))), _one_less(moment, least)),
         lower=float(lower[fine > 0].max()),
@@ -293,5 +293,5 @@ def _one_less(moment: Moment, least: int) -> float:
     """How much g rises where a count is one less than `least`; 0 where there is none less."""
     if not least:
         return 0.0
-    fewer, as_found = moment.g(np.array([least - 1.0, least]))
-    return float(fewer - as_found)
+    fewer, now = moment.g(np.array([least - 1.0, least]))
+    return float(fewer - now)

@@ -33,7 +33,7 @@ AGAIN = 8  # times more before a difference is an error: one count in a thousand
 def require_counted(
     loaded: LoadedTask,
     angles_rad: Setting,
-    found: Score,
+    result: Score,
     shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = NO_LEVER,
 ) -> None:
@@ -45,7 +45,7 @@ def require_counted(
     Args:
         loaded: the task, with the motion of the score.
         angles_rad: the setting.
-        found: its score, with the parts if `shadow` is given.
+        result: its score, with the parts if `shadow` is given.
         shadow: the beams that its parts block.
         lever: of the optical centre off the axis, as in `design.objective.problem.Problem`.
 
@@ -57,16 +57,17 @@ def require_counted(
     if objective == "worst" or objective not in COUNTED:
         if shadow is None and lever == NO_LEVER:
             if objective == "worst":
-                _require_least(loaded, angles_rad, found)
+                _require_least(loaded, angles_rad, result)
             _require_log(loaded, angles_rad)
         return
     J, J_error, points = _counted(loaded, angles_rad, shadow, lever)
-    if J != found.J and abs(J - found.J) > found.J_error + J_error:
+    if J != result.J and abs(J - result.J) > result.J_error + J_error:
         again = counted_J(loaded, angles_rad, AGAIN * points, AGAIN * points, SETS, shadow=shadow, lever=lever)
         J, J_error = again.J, SURE * again.J_error
-    if J != found.J and abs(J - found.J) > found.J_error + J_error:
+    if J != result.J and abs(J - result.J) > result.J_error + J_error:
         raise NumericalError(
-            f"J = {found.J:.6g} +- {found.J_error:.1g}, but a count over simulated beams gives {J:.6g} +- {J_error:.1g}"
+            f"J = {result.J:.6g} +- {result.J_error:.1g}, "
+            f"but a count over simulated beams gives {J:.6g} +- {J_error:.1g}"
         )
 
 
@@ -90,10 +91,10 @@ def _counted(
     return count.J, SURE * count.J_error, points
 
 
-def _require_least(loaded: LoadedTask, angles_rad: Setting, found: Score) -> None:
+def _require_least(loaded: LoadedTask, angles_rad: Setting, result: Score) -> None:
     count = counted_J(loaded, angles_rad, 0, FIRST, 2)
-    if found.J + found.J_error < count.J:
-        raise NumericalError(f"min_density = {found.least}, but a count over simulated beams finds {count.least}")
+    if result.J + result.J_error < count.J:
+        raise NumericalError(f"min_density = {result.least}, but a count over simulated beams finds {count.least}")
 
 
 def _require_log(loaded: LoadedTask, angles_rad: Setting) -> None:

@@ -24,7 +24,7 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.progress import Progress
 from scanwright.design.search.constraints import AtMost, Constraint, NoHole, fan_reach
 from scanwright.design.search.grid_classes import Folded
-from scanwright.design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
+from scanwright.design.search.plane_axis_product import Lowest, both_orientations, gathered, lowest
 from scanwright.design.sphere.outline import reach_about
 from scanwright.design.sphere.polar_weights import weights_over_polar
 from scanwright.design.sphere.regions import Field
@@ -51,7 +51,7 @@ class Landscape:
         blind: whether nodes are beyond a ball radius of the fan of a plane class, 1 or 0, (planes, nodes).
         constraints: what settings must keep.
         plain: lowest J of all settings.
-        kept: lowest J of those that keep the constraints.
+        feasible: lowest J of those that keep the constraints.
     """
 
     objective: Objective
@@ -60,7 +60,7 @@ class Landscape:
     blind: Array
     constraints: tuple[Constraint, ...]
     plain: Lowest
-    kept: Lowest
+    feasible: Lowest
 
     def about_axes(self, planes: slice) -> Float[ndarray, "planes ways axes"]:
         """J of plane classes, not flipped, about each axis class, not flipped and flipped, shape (planes, 2, axes)."""
@@ -72,8 +72,8 @@ class Landscape:
 
     def broken(self, planes: slice) -> Bool[ndarray, "planes ways axes"]:
         """Settings of those plane classes that break a constraint, shape (planes, 2, axes)."""
-        found = [np.stack(constraint.broken(planes, slice(None)), axis=1) for constraint in self.constraints]
-        return np.any(found, axis=0) if found else np.zeros((1, 1, 1), dtype=bool)
+        result = [np.stack(constraint.broken(planes, slice(None)), axis=1) for constraint in self.constraints]
+        return np.any(result, axis=0) if result else np.zeros((1, 1, 1), dtype=bool)
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,17 +144,19 @@ def coarse_landscape(
     open_planes = planes.has | planes.own
 
     def lowest_of(these: slice | Ints, every: slice) -> tuple[Lowest, Lowest]:
-        ways = [both_ways(m, of_g[these], w[every]) for m, of_g, w in zip(moments, g, weights, strict=True)]
-        kept = [constraint.of(these, every) for constraint in constraints]
-        return lowest(problem.objective, ways, open_planes[:, these], axes.has[:, every], kept)
+        orientations = [
+            both_orientations(m, of_g[these], w[every]) for m, of_g, w in zip(moments, g, weights, strict=True)
+        ]
+        feasible = [constraint.of(these, every) for constraint in constraints]
+        return lowest(problem.objective, orientations, open_planes[:, these], axes.has[:, every], feasible)
 
     def look(batch: Ints) -> None:
         g[:, batch], least[batch] = _exact(problem, polar, shown[batch])
         if limits.min_density is not None:
             thin[batch] = least[batch] < limits.min_density
 
-    plain, kept, exact = settled(lowest_of, look, (g.shape[1], len(axes.first)), BATCH, effort.margin, progress)
-    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), exact
+    plain, feasible, exact = settled(lowest_of, look, (g.shape[1], len(axes.first)), BATCH, effort.margin, progress)
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, feasible), exact
 
 
 def settled(
@@ -192,11 +194,11 @@ def settled(
             exact[batch] = True
             best = np.minimum(best, _by_plane(lowest_of(batch, scouts)).min(axis=1))
         progress("all axes of all scan planes")
-        plain, kept = lowest_of(everything, everything)
-        bounds = _by_plane((plain, kept))
+        plain, feasible = lowest_of(everything, everything)
+        bounds = _by_plane((plain, feasible))
         best = np.where(exact, bounds, np.inf).min(axis=1)
         if not np.any(_may_win(bounds, best + margin) & ~exact):
-            return plain, kept, int(exact.sum())
+            return plain, feasible, int(exact.sum())
 
 
 def _by_plane(both: tuple[Lowest, Lowest]) -> Float[ndarray, "2 planes"]:
@@ -242,5 +244,5 @@ def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) ->
         return np.stack(out), z.least
 
     parts = in_chunks(lambda chunk: [rows(plane) for plane in planes_rad[chunk]], len(planes_rad), smallest=1)
-    found = [row for part in parts for row in part]
-    return np.stack([g for g, _ in found], axis=1), np.stack([least for _, least in found])
+    result = [row for part in parts for row in part]
+    return np.stack([g for g, _ in result], axis=1), np.stack([least for _, least in result])

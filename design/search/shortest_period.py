@@ -84,8 +84,8 @@ def shortest_period_s(
 
     def enough(count: int) -> bool:
         lines = ScanLines(count, 2 * np.pi / count)
-        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
-        return bool(found.least.min() >= least)
+        results = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
+        return bool(results.least.min() >= least)
 
     upper = 1
     while not enough(upper):

@@ -84,10 +84,10 @@ def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
     """Where the weight begins: arcs of edges, and points of cells of maps and all corners, shape (n, 3)."""
     arcs = []
     for plane in field.planes:
-        whole = _Arcs(frames_about(plane[None, :3])[0], float(plane[3]), 2 * np.pi * np.arange(AROUND) / AROUND)
-        begins = _on_both_sides(field.weight_at(whole.sides()).reshape(2, -1).T)
+        full = _Arcs(frames_about(plane[None, :3])[0], float(plane[3]), 2 * np.pi * np.arange(AROUND) / AROUND)
+        begins = _on_both_sides(field.weight_at(full.sides()).reshape(2, -1).T)
         if begins.any():
-            arcs.append(replace(whole, azimuth_rad=whole.azimuth_rad[begins]))
+            arcs.append(replace(full, azimuth_rad=full.azimuth_rad[begins]))
     cells = [
         _on_cells(layers.tables[int(row[1])], row)
         for layers in (field.weight, field.mask)
@@ -95,8 +95,8 @@ def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
     ]
     points = np.concatenate([np.empty((0, 3)), *cells])
     corners = edge_corners(field)
-    begun = corners.points[_on_both_sides(corners.weights)]
-    return tuple(arcs), np.concatenate([points[_begins(field, points)], begun])
+    started = corners.points[_on_both_sides(corners.weights)]
+    return tuple(arcs), np.concatenate([points[_begins(field, points)], started])
 
 
 def _begins(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:

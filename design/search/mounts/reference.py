@@ -97,10 +97,10 @@ def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
     """
     limits = Requirements(problem, task.limits, avoid_holes=False)
     required = Requirements(problem, task.limits, task.angles.holes == "avoid")
-    found = [(name, angles_deg, score(problem, np.radians(angles_deg))) for name, angles_deg in STANDARD_DEG.items()]
-    found += [(name, *_tuned(required, lines)) for name, lines in TUNED.items()]
+    result = [(name, angles_deg, score(problem, np.radians(angles_deg))) for name, angles_deg in STANDARD_DEG.items()]
+    result += [(name, *_tuned(required, lines)) for name, lines in TUNED.items()]
     out = []
-    for name, angles_deg, judged in found:
+    for name, angles_deg, judged in result:
         keeps_limits = limits.keeps(judged, np.array(angles_deg))
         allowed = [same for same in _same(problem, angles_deg) if task.angles.hold(same)]
         out.append(TunedMount(name, (allowed or [angles_deg])[0], judged, keeps_limits, bool(allowed)))
@@ -128,15 +128,15 @@ def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Fou
         look(line, angle_deg + step_deg * np.arange(-AROUND, AROUND + 1))
     ordered = sorted(known, key=known.__getitem__)
     for setting in [each for each in ordered if not known[each][0]][:LOOKS]:
-        if (found := required.score(np.array(setting))) is not None:
-            return setting, found
+        if (result := required.score(np.array(setting))) is not None:
+            return setting, result
     return ordered[0], score(required.problem, np.radians(ordered[0]))
 
 
 def _same(problem: Problem, angles_deg: Four) -> list[Four]:
     """Settings of the same J, itself first; an axis that is turned over may be turned either way."""
-    found = equivalents(problem, angles_deg, AngleRanges())
-    return [*found, *((180.0, b, c, d) for a, b, c, d in found if a == -180)]
+    result = equivalents(problem, angles_deg, AngleRanges())
+    return [*result, *((180.0, b, c, d) for a, b, c, d in result if a == -180)]
 
 
 def _rolls_alike(problem: Problem) -> bool:

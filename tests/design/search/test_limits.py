@@ -184,14 +184,14 @@ def test_a_region_that_no_setting_sees_is_told():
 
 def test_holes_between_the_nodes_of_every_setting_are_no_refusal(monkeypatch):
     """A task without limits has an answer where no setting is free of holes, even if none shows them at the nodes."""
-    real = search_module.best_leader
+    real = search_module.best_candidate
 
     def with_holes(land, planes, axes, required, **more):
         return None if required.avoid_holes else real(land, planes, axes, required, **more)
 
     task, told = loaded(angles=ANGLES | {"step_deg": 45}), []
     free = search(problem_of(task), task.task.angles)
-    monkeypatch.setattr(search_module, "best_leader", with_holes)
+    monkeypatch.setattr(search_module, "best_candidate", with_holes)
     found = search(problem_of(task), task.task.angles, told.append)
     assert found.best[0].score.J <= free.best[0].score.J and found.least_blind is not None
     assert "no setting of the grid sees all of the region: the lowest J of all" in told
