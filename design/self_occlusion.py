@@ -13,7 +13,7 @@ from numpy import ndarray
 from scanwright.design.errors import BuildError
 from scanwright.design.files.numpy_files import read_npz
 
-AXIS_STEPS = 720  # equal steps of the axis angle in [0, 2 pi): 0.5 deg, finer than the width of a beam
+AXIS_STEPS = 720  # equal steps of the axis angle in [0, 2 pi), 0.5 deg each
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -225,7 +225,7 @@ def made(entry: Entry) -> None:
         task.unlink(missing_ok=True)
         words = ["new", entry.name, *shlex.split(entry.words), "-o", str(task)]
         subprocess.run([sys.executable, "-m", "scanwright", *words], check=True, capture_output=True)
-    if failed := sw.build(task, OUT, say=print).failed:
+    if failed := sw.build(task, OUT, progress=print).failed:
         sys.exit(f"{entry.name}: {failed[0].message}")
 
 

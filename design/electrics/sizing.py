@@ -9,7 +9,7 @@ WIRES_A = ((0.25, 2.0), (0.5, 5.0), (0.75, 7.5), (1.0, 10.0), (1.5, 15.0), (2.5,
 FUSES_A = (1.0, 2.0, 3.0, 4.0, 5.0, 7.5, 10.0, 15.0, 20.0)  # blades, ISO 8820-3
 SUPPLIES_A = (2.1, 3.0, 5.0, 6.0, 8.5, 12.5, 17.0)  # enclosed 12 V supplies of 25 to 200 W
 OVER_PEAK = 1.1  # rating of a fuse over the largest current of its branch, assumed
-COPPER_OHM_MM2_PER_M = 0.0178  # at 20 deg C, wire as sold
+COPPER_OHM_MM2_PER_M = 0.0178  # at 20 deg C
 RING_OHM = 0.05  # one circuit with its leads, assumed: makers of data rings quote contacts of 0.01, capsules vary
 CONVERTER = 0.85  # efficiency of a converter, assumed
 

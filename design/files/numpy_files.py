@@ -11,6 +11,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from scanwright.design.errors import ScanwrightError
+from scanwright.design.files.text_files import first_line
 
 _NUMBERS = "biuf"  # kinds of dtype
 _MOST_BYTES = 1 << 30  # unpacked, or 4 times the archive if that is more: zip compresses up to a thousandfold
@@ -28,7 +29,7 @@ def read_npy(path: Path, refusal: type[ScanwrightError]) -> NDArray[Any]:
     except OSError as error:
         raise refusal(f"{path}: cannot read: {error.strerror}") from error
     except Exception as error:
-        raise refusal(f"{path}: not an array of NumPy: {_first_line(error)}") from error
+        raise refusal(f"{path}: not an array of NumPy: {first_line(error)}") from error
 
 
 def read_npz(path: Path, refusal: type[ScanwrightError]) -> dict[str, NDArray[Any]]:
@@ -49,9 +50,9 @@ def read_npz(path: Path, refusal: type[ScanwrightError]) -> dict[str, NDArray[An
                     arrays[member.filename.removesuffix(".npy")] = _array(stream, member.file_size)
             return arrays
     except OSError as error:
-        raise refusal(f"{path}: cannot read: {error.strerror or _first_line(error)}") from error
+        raise refusal(f"{path}: cannot read: {error.strerror or first_line(error)}") from error
     except Exception as error:
-        raise refusal(f"{path}: not an archive of NumPy, or damaged: {_first_line(error)}") from error
+        raise refusal(f"{path}: not an archive of NumPy, or damaged: {first_line(error)}") from error
 
 
 def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
@@ -68,7 +69,3 @@ def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
     data = stream.read(count * kind.itemsize)
     array = np.frombuffer(data, kind, count).reshape(shape, order="F" if fortran else "C")
     return array.astype(kind.newbyteorder("="))
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

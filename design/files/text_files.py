@@ -38,13 +38,10 @@ def read_text_of(path: Path, what: str) -> str:
     try:
         return read_text(path)
     except NotADirectoryError as error:
-        raise TaskError(
-            f"{path.parent}: this is a file; name the folder of a build, which contains {path.name}"
-        ) from error
-    except FileNotFoundError as error:
-        raise MissingFileError(f"{path}: cannot read {what}: {error.strerror}") from error
+        raise TaskError(f"{path.parent}: this is a file; name the build folder that contains {path.name}") from error
     except (OSError, ValueError) as error:
-        raise TaskError(f"{path}: cannot read {what}: {getattr(error, 'strerror', None) or error}") from error
+        kind = MissingFileError if isinstance(error, FileNotFoundError) else TaskError
+        raise kind(f"{path}: cannot read {what}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -60,3 +57,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise TaskError(f"{path}: not a TOML file: nested too deeply") from error
     except tomllib.TOMLDecodeError as error:
         raise TaskError(f"{path}: not a TOML file: {error}") from error
+
+
+def first_line(error: Exception) -> str:
+    """Return the first line of an error of other libraries, or its type if it has no text."""
+    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -156,9 +156,10 @@ def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
     names = rows.dtype.names or ()
     if not {*"xyz"} <= set(names):
         raise RecordingError(f"the columns are {' '.join(names)}; a cloud has x y z")
-    real = np.float32 if all(rows.dtype[axis].itemsize == 4 for axis in "xyz") else np.float64
+    real = np.float32 if all(rows.dtype[axis].str[1:] == "f4" for axis in "xyz") else np.float64
     points_m: NDArray[np.floating] = np.stack([rows[axis] for axis in "xyz"], axis=1).astype(real)
-    return with_header(Cloud(points_m, {name: np.array(rows[name]) for name in names if name not in "xyz"}), lines)
+    columns = {name: rows[name].astype(rows.dtype[name].newbyteorder("=")) for name in names if name not in "xyz"}
+    return with_header(Cloud(points_m, columns), lines)
 
 
 def headlines(cloud: Cloud) -> list[str]:

@@ -16,10 +16,10 @@ from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.world import turned_deg
 
-BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
-_POINTS = 12
-_BYTES = 47
-_BACKLOG = 1 << 10
+BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
+_POINTS = 12  # LD19 development manual
+_BYTES = 47  # LD19 development manual
+_BACKLOG = 1 << 10  # bytes [assumed]: some packets
 _CHUNK_NS = 8_000_000  # measured at once: a ray alone costs as much as a hundred
 _BOOT_NS = 1_000_000_000  # [assumed]
 

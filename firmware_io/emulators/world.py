@@ -22,9 +22,9 @@ from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import TaskError
 from scanwright.design.scene.ray_caster import Hits, Scene, build_scene, cast, load_scene
 
-_MOST_NOISE_MM = 1e5
-_WANDER = 0.01
-_WANDER_S = 1.7
+_MOST_NOISE_MM = 1e5  # more is a wrong unit
+_WANDER = 0.01  # of the speed [assumed]
+_WANDER_S = 1.7  # period of it [assumed]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import numpy as np
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.sizing import belt_stack
 from scanwright.cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Need, Rod
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
@@ -78,7 +78,7 @@ def belt_drive(scanner: Scanner) -> DriveLayout:
         stacked=STACKED,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
         borne=((names.SHAFT_RING, names.BEARING_TOWER),),
-        needs=((SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
+        needs=(Need("wiring", "soft tube", SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
     )
 
 

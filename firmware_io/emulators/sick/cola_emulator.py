@@ -15,10 +15,11 @@ from scanwright.firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, W
 from scanwright.firmware_io.lidar.sick.scan_data import WRAP_US, Channel, ScanData, telegram_of
 from scanwright.firmware_io.lidar.sick.values import Reader
 
-_NEVER_NS = 1 << 62
+_NEVER_NS = 1 << 62  # 146 years
 _SEND_NS = 3_000_000  # from the last beam to the telegram: between the captures of an LMS100 and of a TiM55x
-_BOOT_NS = 1_000_000_000
+_BOOT_NS = 1_000_000_000  # [assumed]
 _HEAD = 100  # bytes of a telegram before its ranges
+# of the access levels, from the factory; telegram listing 8014631
 _PASSWORDS = {2: 0xB21ACE26, 3: 0xF4724744, 4: 0x81BE23AA}
 _ACCESS_DENIED, _UNKNOWN_METHOD, _UNKNOWN_VARIABLE, _INVALID = 1, 2, 3, 5
 

@@ -519,7 +519,7 @@ def test_a_servo_that_cannot_turn_that_fast_is_refused_and_the_period_named_is_o
     table = {"name": "fast", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "UH1256-02-0610-06S"}
     with pytest.raises(TaskError, match=r"rpm, and servo = 'MX-64R' turns at 63 rpm at most") as refused:
         load_task(table | {"motion": motion | {"period_s": period_s}})
-    least_s = float(re.search(r"take ([\d.]+) or more", str(refused.value))[1])
+    least_s = float(re.search(r"use ([\d.]+) or more", str(refused.value))[1])
     load_task(table | {"motion": motion | {"period_s": least_s}})
-    with pytest.raises(TaskError, match="take"):
+    with pytest.raises(TaskError, match="use"):
         load_task(table | {"motion": motion | {"period_s": least_s - 0.002}})

@@ -137,13 +137,13 @@ def test_a_moving_scanner_has_seen_each_point_from_where_it_was():
         ({"outliers": -1.0}, "outliers = -1"),
         ({"min_range_m": 3.0, "max_range_m": 2.0}, "min_range_m = 3.0, max_range_m = 2.0"),
         ({"edges_deg": 60.0}, "edges_deg = 60"),
-        ({"voxel_m": 0.1, "organised": True}, "every beam keeps its row"),
+        ({"voxel_m": 0.1, "organised": True}, "which drop beams"),
         ({"min_range_m": 25.0}, "none of the 9600 beams becomes a point"),
     ],
 )
 def test_what_cannot_be_done_is_said_and_nothing_is_written(recording, tmp_path, options, says):
     with pytest.raises(RecordingError, match=says):
         api.assemble(recording, ANGLES, tmp_path / "c.ply", **options)
-    with pytest.raises(RecordingError, match="is no format of clouds"):
+    with pytest.raises(RecordingError, match="is not a format of clouds"):
         api.assemble(recording, ANGLES, tmp_path / "c.png")
     assert not list(tmp_path.iterdir())

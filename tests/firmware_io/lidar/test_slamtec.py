@@ -3,6 +3,7 @@
 import socket
 import time
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
-from scanwright.firmware_io.emulators.slamtec import IDENTITIES, SlamtecEmulator
+from scanwright.firmware_io.emulators.slamtec import machine
+from scanwright.firmware_io.emulators.slamtec.machine import SlamtecEmulator
+from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
 
@@ -44,6 +47,7 @@ def patience(monkeypatch):
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
+    monkeypatch.setattr(machine, "_SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
 
 
 def lidar(model):
@@ -52,6 +56,11 @@ def lidar(model):
 
 def wall_m(bearing_rad):
     return 2.0 + np.sin(bearing_rad)
+
+
+def rounded_m(model):
+    """Ultra capsules have steps of 4 mm from 2 m on."""
+    return 5e-3 if " A" in model else 1.5e-3
 
 
 def ranging(time_ns, bearing_rad):
@@ -81,6 +90,63 @@ def test_a_emulator_answers_published_requests_with_published_descriptors():
     assert wrong == b""
 
 
+# What ultra_simple of rplidar_sdk 2.1 sends to an A1 and an S2, and the answers that it needs.
+SDK_DIALOGUES = {
+    "RPLIDAR A1": [
+        ("A5 50", "A5 5A 14 00 00 00 04 18 1D 01 07"),
+        ("A5 52", "A5 5A 03 00 00 00 06 00 00 00"),
+        ("A5 84 04 01 00 00 00 24", "A5 5A 08 00 00 00 20 01 00 00 00 58 02 94 02"),
+        ("A5 84 04 7C 00 00 00 59", "A5 5A 06 00 00 00 20 7C 00 00 00 03 00"),
+        ("A5 84 06 71 00 00 00 03 00 55", "A5 5A 08 00 00 00 20 71 00 00 00 00 7F 00 00"),
+        ("A5 84 06 74 00 00 00 03 00 50", "A5 5A 08 00 00 00 20 74 00 00 00 00 0C 00 00"),
+        ("A5 84 06 75 00 00 00 03 00 51", "A5 5A 05 00 00 00 20 75 00 00 00 84"),
+        ("A5 84 06 7F 00 00 00 03 00 5B", "A5 5A 10 00 00 00 20 7F 00 00 00" + b"Sensitivity\0".hex()),
+        ("A5 82 05 03 00 00 00 00 21", "A5 5A 84 00 00 40 84"),
+        ("A5 25", ""),
+        ("A5 21", "A5 5A 05 00 00 40 81"),
+    ],
+    "RPLIDAR S2": [
+        ("A5 84 04 7C 00 00 00 59", "A5 5A 06 00 00 00 20 7C 00 00 00 01 00"),
+        ("A5 84 06 71 00 00 00 01 00 57", "A5 5A 08 00 00 00 20 71 00 00 00 40 1F 00 00"),
+        ("A5 84 06 75 00 00 00 01 00 53", "A5 5A 05 00 00 00 20 75 00 00 00 85"),
+        ("A5 A8 02 58 02 55", ""),
+        ("A5 82 05 01 00 00 00 00 23", "A5 5A 54 00 00 40 85"),
+        ("A5 84 06 71 00 00 00 07 00 51", ""),
+    ],
+    "RPLIDAR A3": [("A5 FF 04 00 00 00 00 5E", "A5 5A 04 00 00 00 FF 01 00 00 00"), ("A5 F0 02 94 02 C1", "")],
+}
+
+
+@pytest.mark.parametrize("model", sorted(SDK_DIALOGUES))
+def test_an_emulator_answers_what_the_makers_program_asks(model):
+    emulator = SlamtecEmulator(lidar(model), ranging)
+    for request, answer in SDK_DIALOGUES[model]:
+        got, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
+        assert got[: len(bytes.fromhex(answer))] == bytes.fromhex(answer), request
+        assert bool(got) == bool(answer) and rest == b""
+
+
+def test_a_serial_line_sends_no_faster_than_it_can():
+    for model, identity in IDENTITIES.items():
+        emulator = SlamtecEmulator(lidar(model), ranging)
+        for number, mode in enumerate(identity.modes):
+            command = protocol.SCAN if mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
+            request = protocol.request(command, bytes([number, 0, 0, 0, 0]))
+            emulator.machine.hear(request, emulator.machine.began_ns)
+            sent = [one for _ in range(60) for one in emulator.machine.next_packets()]
+            bytes_s = sum(len(data) for _, data in sent[1:]) * 1e9 / (sent[-1][0] - sent[0][0])
+            assert bytes_s < 1.0001 * identity.baud / 10, (model, mode.name)
+
+
+def test_old_firmware_streams_express_capsules():
+    """Before 1.24 it does not answer GET_LIDAR_CONF; it states the time between two points instead."""
+    with SlamtecEmulator(lidar("RPLIDAR A1"), ranging) as emulator:
+        emulator.machine.identity = replace(IDENTITIES["RPLIDAR A1"], firmware=(1, 20), modes=())
+        with open_lidar(emulator.port, "RPLIDAR A1") as ours:
+            ours.start()
+            assert ours.firmware == "1.20" and 680 < ours.read().scan.range_m.size < 760
+
+
 def test_a_node_is_read_by_its_bits():
     # quality 15, a new turn, 90 deg, 1234.5 mm
     angle = 90 * 64 << 1 | 1
@@ -104,9 +170,9 @@ def test_a_cabin_is_read_by_its_bits():
     np.testing.assert_array_equal(packet.offset_deg[:4], [2.5, -1.0, 2.5, -1.0])
 
 
-def stream_of(model, turns=0.3):
+def stream_of(model, mode, turns=0.3):
     emulator = SlamtecEmulator(lidar(model), ranging)
-    start = protocol.request(protocol.SCAN if model == "RPLIDAR C1" else protocol.EXPRESS_SCAN, bytes(5))
+    start = protocol.request(protocol.EXPRESS_SCAN, bytes([mode, 0, 0, 0, 0]))
     emulator.machine.hear(start, emulator.machine.began_ns)
     data = b""
     while len(data) < 84 * 12 * turns:
@@ -114,14 +180,19 @@ def stream_of(model, turns=0.3):
     return data
 
 
-STREAMS = {model: stream_of(model) for model in ("RPLIDAR C1", "RPLIDAR A1", "RPLIDAR S2")}
+STREAMS = {  # nodes, capsules, ultra capsules and dense ones
+    ("RPLIDAR C1", 0): stream_of("RPLIDAR C1", 0),
+    ("RPLIDAR A1", 1): stream_of("RPLIDAR A1", 1),
+    ("RPLIDAR A1", 3): stream_of("RPLIDAR A1", 3),
+    ("RPLIDAR S2", 1): stream_of("RPLIDAR S2", 1),
+}
 
 
 @seed(19)
 @settings(max_examples=300, deadline=None)
 @given(st.sampled_from(sorted(STREAMS)), st.data())
 def test_damaged_streams_give_packets_or_nothing(model, data):
-    kind = IDENTITIES[model].stream
+    kind = IDENTITIES[model[0]].modes[model[1]].kind
     stream = bytearray(STREAMS[model])
     for _ in range(data.draw(st.integers(0, 12))):
         at = data.draw(st.integers(0, len(stream) - 1))
@@ -139,7 +210,15 @@ def test_damaged_streams_give_packets_or_nothing(model, data):
     assert len(splitter.feed(STREAMS[model])) >= len(STREAMS[model]) // protocol.SIZES[kind] - 30
 
 
-READERS = [protocol.descriptor, protocol.info, protocol.health, protocol.node, protocol.capsule, protocol.dense]
+READERS = [
+    protocol.descriptor,
+    protocol.info,
+    protocol.health,
+    protocol.node,
+    protocol.capsule,
+    protocol.ultra,
+    protocol.dense,
+]
 
 
 @seed(19)
@@ -164,14 +243,15 @@ def test_turns_come_as_they_were_seen(model):
             missing = np.rint(steps - 1).sum()  # on a busy computer the emulator leaves some out
             assert ours.bad_packets == 0 and abs(ours.dropped - missing) <= 1
         until(lambda: emulator.machine.scanning is None)  # `with` puts it out
-    usual = IDENTITIES[model].points_s / lidar(model).scan_rate_hz
+    usual = 1e6 / IDENTITIES[model].usual.point_us / lidar(model).scan_rate_hz
+    assert usual > 0.98 * lidar(model).steps_per_turn
     for one in timed:
         scan = one.scan
         assert 0.9 * usual < scan.range_m.size < 1.1 * usual
         lost = np.isnan(scan.range_m)
         assert 0.02 < lost.mean() < 0.07
-        # angles are told in sixty-fourths, and between two starts straight
-        np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=1.5e-3)
+        # angles are in sixty-fourths, and between two starts straight
+        np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=rounded_m(model))
         assert scan.time_ns[-1] < one.arrival_ns
 
 
@@ -193,7 +273,7 @@ def test_bad_capsules_are_counted_and_never_handed_out(model):
         for _ in range(4):
             scan = ours.read().scan
             seen = ~np.isnan(scan.range_m)
-            np.testing.assert_allclose(scan.range_m[seen], wall_m(scan.bearing_rad[seen]), atol=1.5e-3)
+            np.testing.assert_allclose(scan.range_m[seen], wall_m(scan.bearing_rad[seen]), atol=rounded_m(model))
         assert 4 <= ours.bad_packets <= 20
 
 

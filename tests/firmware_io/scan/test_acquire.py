@@ -140,7 +140,7 @@ def test_roundings_do_not_line_up_where_a_question_comes_with_every_step(monkeyp
     assert len(heard) > 90
     time_ns = np.array([state.time_ns for state in heard])
     log = JointLog(time_ns, np.array([state.position_rad for state in heard]))
-    error_rad = axis_curve(log, held=False)[0].angle_at(time_ns) - servo.true_rad(time_ns)
+    error_rad = axis_curve(log, at_rest=False)[0].angle_at(time_ns) - servo.true_rad(time_ns)
     assert np.sqrt(np.mean(error_rad**2)) < 0.17 * servo.step_rad  # rounding alone is 0.29
     assert abs(np.diff(time_ns).mean() - 10e6) < 1e6
 
@@ -206,7 +206,7 @@ def test_what_cannot_be_scanned_is_one_line(tmp_path, command, monkeypatch, angl
     if angles is not None:
         (tmp_path / "angles.json").write_text(angles.to_json())
     code, _, complaints = command("scan", tmp_path, *words)
-    assert code == 2
+    assert code == (3 if "port" in says or "lidar" in says else 2)
     assert len(complaints) == 1
     assert says in complaints[0]
     assert not (tmp_path / "recordings").exists()
@@ -506,7 +506,7 @@ def test_the_doctor_says_what_is_wrong_and_the_remedy(emulators, command, monkey
 def test_a_scanner_is_not_emulated_twice_nor_where_nothing_is_to_be_seen(out, command):
     (out / "emulated.json").write_text(json.dumps({"lidar": "L", "servo": "S", "pid": os.getpid()}))
     code, _, complaints = command("emulate", out)
-    assert (code, len(complaints)) == (2, 1)
+    assert (code, len(complaints)) == (3, 1)
     assert f"process {os.getpid()} emulates this scanner already" in complaints[0]
     code, _, complaints = command("emulate", out, "--at", 500, 0, 0)
     assert code == 2

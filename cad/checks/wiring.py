@@ -1,0 +1,22 @@
+"""The electrical rule check of the wiring, and the values that it lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from scanwright.design.electrics.rules import check_network
+from scanwright.design.electrics.wiring import network_of
+from scanwright.design.findings import Finding
+from scanwright.design.scanner import Scanner
+
+
+def wiring_checks(scanner: Scanner) -> list[Finding]:
+    """Return every broken rule of the wiring, or one finding that it keeps them; then the values it lacks."""
+    network = network_of(scanner)
+    summary = (
+        f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "
+        "supply is overloaded, and every device gets its voltage"
+    )
+    ok = Finding("wiring", "ok", f"{scanner.lidar.name} and {scanner.servo.name}", summary)
+    broken = [replace(fault, code="wiring") for fault in check_network(network)]
+    return [*(broken or [ok]), *network.unknown]
