@@ -90,13 +90,12 @@ def zones(
     beam_steps = azimuth_b / lines.step_rad
 
     def walk(which: Ints, table: Array) -> tuple[Array, Array, Array, Array, Ints]:
-        ends, polar, *rest = meetings(polar_rad[which], polar_b, ball_rad)
+        ends, polar, beams, ball = meetings(polar_rad[which], polar_b, ball_rad)
         if until_rad is not None:
             polar = np.concatenate([polar, halves(until_rad[which])])
-        met = ends, polar, *rest
         if even:
-            return even_zones(*met, beam_steps, lines.count, table)
-        return seam_zones(*met, beam_steps, turn, table)
+            return even_zones(ends, polar, beams, ball, beam_steps, lines.count, table)
+        return seam_zones(ends, polar, beams, ball, beam_steps, turn, table)
 
     mean_g, mean, least, most = walked(walk, len(polar_rad), g, lines.repeats, smallest=512)
     return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)

@@ -173,8 +173,7 @@ def counted_J(
         return Counted(-float(np.log(1 + least)), 0.0, least, none, weighted)
     J = _joined(objective, np.mean(moments, axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):  # a set in which nothing has a weight, or nothing is seen
-        each = np.array([_joined(objective, m) for m in moments])
-        J_error = float(3 * np.std(each, ddof=1) / sets**0.5)
+        J_error = float(3 * np.std([_joined(objective, m) for m in moments], ddof=1) / sets**0.5)
     return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
 
 
