@@ -18,6 +18,7 @@ from scanwright.cad.layout.names import (
     ROTOR_LEADS,
     SERVO,
     SERVO_CASE,
+    SERVO_FRAME,
     SLIP_RING_ADAPTER,
     STANDING_LEADS,
 )
@@ -29,6 +30,12 @@ ON_DECK = Step(
     f"{screws(SERVO_CASE, DECK)} Leave room for the plugs.",
     "the horn turns freely, and the case lies flat on the deck",
     (SERVO,),
+)
+FRAME_ON_DECK = Step(
+    "Frame on the deck",
+    "The axis stands upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
+    f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame.",
+    "the horn turns freely, and the frame does not rock on its four feet",
 )
 LIDAR_STEP = Step(
     "Lidar on its seat",
@@ -63,7 +70,7 @@ def _of_bought(assembly: Assembly) -> dict[str, Step]:
     if any(lead.path is not None for lead in assembly.standing):
         steps[STANDING_LEADS] = Step(STANDING_TITLE, standing_words(layout, assembly.standing), STANDING_CHECK)
     if layout.deck.flat:
-        steps[DECK] = ON_DECK
+        steps[DECK] = ON_DECK if layout.drive.mounted.onto == SERVO_CASE else FRAME_ON_DECK
     return steps
 
 

@@ -10,11 +10,10 @@ from scanwright.cad.checks.check import Check, Severity, at_most, doubted, note,
 from scanwright.cad.checks.loads.belt import belt_loads
 from scanwright.cad.checks.loads.direct import direct_loads
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.balance.counterweight import RUBS_NM
 from scanwright.cad.layout.balance.imbalance import keeps_flank, play_matters
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.drive import Stack
-from scanwright.cad.layout.loads import FAR_MM, Weight
+from scanwright.cad.layout.loads import FAR_MM, Weight, friction_nm
 from scanwright.cad.layout.names import SERVO
 from scanwright.design.scanner import Scanner
 
@@ -52,11 +51,14 @@ def load_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) 
 
 def _torques(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_nm: float) -> list[Check]:
     servo = scanner.servo
-    limit = servo.lasting_torque_nm
-    static = weight.across_n * weight.off_axis_m
+    limit = servo.continuous_torque_nm
+    rubs = friction_nm(scanner)[1]
+    static = weight.across_n * weight.off_axis_m + rubs
     spin_up = spin_up_nm(scanner, rotor, weight)
     what = f"of {servo.name}, a fifth of its stall torque"
-    holds, spins = f"torque that holds the imbalance, {what}", f"torque to full speed in {SPIN_UP_S:g} s, {what}"
+    with_friction = f"with {rubs:g} N m of friction, {what}"
+    holds = f"torque that turns the imbalance, {with_friction}"
+    spins = f"torque to full speed in {SPIN_UP_S:g} s, {with_friction}"
     return [
         at_most("static_torque", static, limit, "N m", SERVO, holds, doubt_nm),
         at_most("spin_up_torque", spin_up, limit, "N m", SERVO, spins, doubt_nm),
@@ -64,36 +66,38 @@ def _torques(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_nm: float)
 
 
 def spin_up_nm(scanner: Scanner, rotor: Inertial, weight: Weight) -> float:
-    """Torque that brings the rotor to full speed in SPIN_UP_S against its imbalance."""
+    """Torque that brings the rotor to full speed in SPIN_UP_S against imbalance and friction."""
     motion = scanner.angles.motion
     period = SLOWEST_PERIOD_S if motion is None else getattr(motion, "period_s", SLOWEST_PERIOD_S)
     x, y = rotor.centre_m[:2]
     about_axis = float(rotor.inertia_kg_m2[2, 2] + rotor.mass_kg * (x**2 + y**2))
-    return weight.across_n * weight.off_axis_m + about_axis * 2 * math.pi / period / SPIN_UP_S
+    still = weight.across_n * weight.off_axis_m + friction_nm(scanner)[1]
+    return still + about_axis * 2 * math.pi / period / SPIN_UP_S
 
 
 def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_m: float) -> Check:
     """Where gravity swings the load from one flank of the gears to the other by the play between them.
 
-    The friction of ring and bearing, which would hold one flank, is in no data sheet: taken for `RUBS_NM`.
+    The friction of ring and bearing holds one flank: the least that the catalogue states.
     """
+    rubs = friction_nm(scanner)[0]
     servo, torque, doubt = scanner.servo, weight.across_n * weight.off_axis_m, weight.across_n * doubt_m
     turns = f"with {doubted(torque, doubt)} N m"
     severity: Severity = "warning" if play_matters(scanner) else "note"
-    if torque + doubt <= RUBS_NM:
-        message = f"{SERVO}: gravity turns it {turns}, no more than ring and bearing rub with"
-        return Check("flanks", "pass", tidy(torque), RUBS_NM, "N m", SERVO, message)
+    if torque + doubt <= rubs:
+        message = f"{SERVO}: gravity turns it {turns}, no more than the friction of ring and bearing"
+        return Check("flanks", "pass", tidy(torque), rubs, "N m", SERVO, message)
     if keeps_flank(scanner, rotor.centre_m[:2], doubt_m):
         message = f"{SERVO}: gravity turns it {turns}, one way all over the sweep"
         return Check("flanks", "pass", tidy(torque), None, "N m", SERVO, message)
-    if torque <= RUBS_NM:
+    if torque <= rubs:
         message = (
-            f"{SERVO}: gravity turns {servo.name} {turns}, of {RUBS_NM:g} that ring and bearing rub with: nobody tells "
-            f"where the centre of mass of {scanner.lidar.name} is, within {LIDAR_DOUBT_MM:g} mm of the middle of its "
-            "body or so; look at the ripple that `scanwright scan` prints, and move the balancing weight, where there "
+            f"{SERVO}: gravity turns {servo.name} {turns}, of {rubs:g} N m of friction of ring and bearing; the "
+            f"centre of mass of {scanner.lidar.name} is unverified, within {LIDAR_DOUBT_MM:g} mm of the middle of "
+            "its body; look at the ripple that `scanwright scan` prints, and move the balancing weight, where there "
             "is one, until it is least"
         )
-        return Check("flanks", severity, tidy(torque), RUBS_NM, "N m", SERVO, message)
+        return Check("flanks", severity, tidy(torque), rubs, "N m", SERVO, message)
     grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
     x, y = rotor.centre_m[:2]
     azimuth = round(math.degrees(math.atan2(-y, -x))) % 360
@@ -106,4 +110,4 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, doubt_m: float) -
         f"{play}: an encoder on the output shaft sees that, one on the motor does not; {grams:.0f} g at "
         f"{BALANCE_AT_MM:g} mm from the axis, {azimuth} deg from +x, would balance it"
     )
-    return Check("flanks", severity, tidy(torque), RUBS_NM, "N m", SERVO, message)
+    return Check("flanks", severity, tidy(torque), rubs, "N m", SERVO, message)

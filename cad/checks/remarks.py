@@ -16,17 +16,19 @@ from scanwright.cad.layout.drive import DriveLayout, Mounted
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from scanwright.cad.layout.modules.unasked import unasked
-from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE, TRIPOD_FOOT
 from scanwright.cad.screws import passing_hole
+from scanwright.design.catalogue.holes import Hole, what_holds
+from scanwright.design.catalogue.measuring import how_to_measure
 from scanwright.design.catalogue.products import Printer, Product
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 # Values of a product that shape no part alone.
 SHAPING = {
-    "lidar.mount_thread_depth_mm": "the length of the screws in the lidar",
+    "lidar.holes": "the screws of the lidar",
     "printer.screw_clearance_mm": "every screw hole",
-    "servo.case_rear_holes_mm": "the holes in the deck",
+    "servo.holes": "the screws of the servo's case",
 }
 
 
@@ -114,10 +116,10 @@ def _tilt_moment(scanner: Scanner, stack: DirectStack, bodies: dict[str, Inertia
 def _held_by_screws(scanner: Scanner, mounted: Mounted) -> PartFinding:
     hole = passing_hole(mounted.screw, scanner.printer)
     named = ", ".join(f"({x:g}, {y:g})" for x, y in mounted.holes)
+    what = f"{scanner.servo.name} by its rear holes" if mounted.onto == SERVO_CASE else f"{mounted.onto} by its feet"
     message = (
-        f"{BASE_MOUNT}: left out, the axis stands upright: hold {scanner.servo.name} by its rear holes with 4 x "
-        f"{mounted.screw.name} from below through the deck, {hole:g} mm holes at "
-        f"{named} mm from the axis; leave room for the plugs"
+        f"{BASE_MOUNT}: left out, the axis stands upright: hold {what} with 4 x {mounted.screw.name} from below "
+        f"through the deck, {hole:g} mm holes at {named} mm from the axis; leave room for the plugs"
     )
     return PartFinding("servo_on_deck", "note", BASE_MOUNT, message)
 
@@ -137,7 +139,7 @@ def unverified(product: Product, assembly: Assembly) -> list[PartFinding]:
             "warning",
             product.name,
             f"{product.name}: {field} = {_shown(getattr(product, field))} is not verified "
-            f"({provenance[field].source}): measure yours, it shapes {shaping[f'{product.kind}.{field}']}",
+            f"({provenance[field].source}): {how_to_measure(field)}, it shapes {shaping[f'{product.kind}.{field}']}",
             f"{field} = {_shown(getattr(product, field))}",
         )
         for field in product.unverified()
@@ -146,5 +148,7 @@ def unverified(product: Product, assembly: Assembly) -> list[PartFinding]:
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, tuple) and value and isinstance(value[0], Hole):
+        return what_holds(value)
     text = str(list(value)) if isinstance(value, tuple) else str(value)
     return text if len(text) < 60 else text[:57] + "..."

@@ -21,7 +21,9 @@ from scanwright.cad.checks.printing import printing_checks
 from scanwright.cad.checks.remarks import left_out_of, products_of, unverified
 from scanwright.cad.checks.retention import retention_checks
 from scanwright.cad.checks.rotor_leads import lead_checks, standing_checks
+from scanwright.cad.layout.names import RING
 from scanwright.design.catalogue.products import Product
+from scanwright.design.electrics.cautions import data_fault
 from scanwright.design.electrics.rules import broken_rules
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.left_out import LeftOut
@@ -64,7 +66,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[lis
     printed = {name: solid for name, solid in assembly.made.items() if not assembly.parts[name].metal}
     products = products_of(scanner, layout.drive)
     doubts = [
-        Check("unverified", "note", None, None, "", product.name, finding.message)
+        Check("unverified", "warning", None, None, "", product.name, finding.message)
         for product in products
         for finding in unverified(product, assembly)
     ]
@@ -140,6 +142,10 @@ def electric_checks(scanner: Scanner) -> list[Check]:
         Check("wiring", "warning", None, None, "", fact.split(":")[0], f"{fact} is not in the catalogue: ask its maker")
         for fact in network.unknown
     ]
+    slow = "" if scanner.slip_ring is None else data_fault(scanner.slip_ring, scanner.lidar)
+    if slow:
+        message = f"{slow}: data can be lost while it turns; test the link through the ring before you build"
+        doubts.append(Check("ring_data", "warning", None, None, "", RING, message))
     return [
         *(faults or [Check("wiring", "pass", None, None, "", f"{scanner.lidar.name} and {scanner.servo.name}", kept)]),
         *doubts,

@@ -15,9 +15,9 @@ from scanwright.cad.layout.deck import FOOT_THICKNESS, UNDER_MOUNT_HEAD, Deck
 from scanwright.cad.layout.direct.joints import direct_joints
 from scanwright.cad.layout.envelope import EAR_SCREW, PLATE_THICKNESS, SUB_PLATE_THICKNESS
 from scanwright.cad.layout.joints import (
-    CASE_EAR,
     DECK_MM,
     Joint,
+    fixing_of,
     held_in,
     inward_axes,
     lidar_thread_mm,
@@ -69,13 +69,15 @@ def _of_lidar(layout: Layout) -> Iterator[Joint]:
     deep = lidar_thread_mm(layout.scanner.lidar)
     axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), R)
     slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
-    yield Joint(part, names.LIDAR_BODY, "thread", p.screw, axes, grip_mm=grip, thread_mm=deep, slot_mm=slot)
+    how = fixing_of(layout.scanner.lidar.base)
+    heel = min(layout.scanner.lidar.half_mm) if len(p.holes) == 2 else None
+    yield Joint(part, names.LIDAR_BODY, how, p.screw, axes, grip_mm=grip, thread_mm=deep, slot_mm=slot, heel_mm=heel)
     if p.ears is not None:
         thread = p.ear_thread
         deep = PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth)
         axes = placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), R)
-        onto, how = names.ALIGNMENT_LINKAGE, held_in(thread)
-        yield Joint(part, onto, how, EAR_SCREW, axes, grip_mm=grip, thread_mm=deep, thread=thread)
+        onto, into = names.ALIGNMENT_LINKAGE, held_in(thread)
+        yield Joint(part, onto, into, EAR_SCREW, axes, grip_mm=grip, thread_mm=deep, thread=thread)
 
 
 def _on_deck(layout: Layout) -> Iterator[Joint]:
@@ -83,16 +85,18 @@ def _on_deck(layout: Layout) -> Iterator[Joint]:
     mounted, deck, stack = layout.drive.mounted, layout.deck, layout.stack
     if deck.flat:
         axes = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0)
-        yield Joint(names.DECK, mounted.onto, "nut", mounted.screw, axes, grip_mm=DECK_MM, thread_mm=CASE_EAR)
+        yield Joint(
+            names.DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=mounted.ear_mm
+        )
         return
     thread = tower_of(layout.scanner, stack).foot if isinstance(stack, BeltStack) else None
-    deep = CASE_EAR
+    deep = mounted.ear_mm
     if thread is not None:
         deep = FOOT - 1.0 if thread.trap is None else UNDER_FOOT_NUT
     yield Joint(
         names.BASE_MOUNT,
         mounted.onto,
-        "nut" if thread is None else held_in(thread),
+        mounted.fixing if thread is None else held_in(thread),
         mounted.screw,
         upright_axes(mounted.holes, mounted.ears - UNDER_MOUNT_HEAD, 1.0),
         grip_mm=UNDER_MOUNT_HEAD,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.joints import Fixing
 from scanwright.cad.screws import Screw
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Bearing, Belt
@@ -61,6 +62,8 @@ class Mounted:
         screw: that goes through the mount into them.
         holes: x and y of the four.
         corners: of boxes around all that stands still, shape (n, 3).
+        fixing: what the screws hold in: a nut behind the holes, or their thread.
+        ear_mm: of material before the nut, or of thread.
         discs: radius and height of what else must stay clear of the deck, round about the axis.
         stands_alone: whether it may stand on a flat deck without a mount where the axis is upright.
     """
@@ -70,6 +73,8 @@ class Mounted:
     ears: float
     screw: Screw
     holes: tuple[tuple[float, float], ...]
+    fixing: Fixing
+    ear_mm: float
     corners: Array
     discs: tuple[tuple[float, float], ...]
     stands_alone: bool

@@ -16,13 +16,14 @@ from scanwright.cad.parts.journal_sleeve import sleeve_spec
 from scanwright.cad.parts.main_shaft import main_shaft_spec
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from scanwright.cad.parts.servo_frame import frame_spec
 from scanwright.cad.parts.servo_shaft import servo_shaft_spec
 from scanwright.cad.parts.shaft_ring import shaft_ring_spec
 from scanwright.cad.parts.slip_ring_adapter import adapter_spec
 from scanwright.cad.parts.sub_plate import sub_plate_spec
 from scanwright.cad.parts.tripod_foot import tripod_foot_spec
 
-OF_DIRECT = (servo_shaft_spec, adapter_spec, base_spec, bell_spec)
+OF_DIRECT = (frame_spec, servo_shaft_spec, adapter_spec, base_spec, bell_spec)
 OF_BELT = (
     main_shaft_spec,
     shaft_pulley_spec,

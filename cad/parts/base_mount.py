@@ -30,7 +30,7 @@ from scanwright.cad.layout.deck import (
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
+from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.parts.linkage_hub import tie_slots
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import passing_hole
@@ -40,9 +40,7 @@ from scanwright.design.catalogue.products import Printer
 OF_SERVO = (
     "servo.case_min_mm",
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_rear_holes_mm",
-    "servo.case_rear_holes_z_mm",
+    "servo.holes",
 )
 RAIL_HALF_WIDTH = 4.0  # least
 FOOT_RADIUS = 3.0
@@ -61,6 +59,14 @@ def mount_spec(layout: Layout) -> PartSpec | None:
         check="the case does not rock on its four feet, nor the mount on the deck",
         brings=(SERVO,),
     )
+    onto = layout.drive.mounted.onto
+    if onto == SERVO_FRAME:
+        step = Step(
+            "Frame on the mount",
+            f"Put the frame on the rails of the base mount. {screws(SERVO_FRAME)} Connect the servo's cable now, and "
+            f"lay a cable tie into the slots of the foot where it leaves. {screws(DECK)}",
+            check="the frame does not rock on its four feet, nor the mount on the deck",
+        )
     if isinstance(layout.stack, BeltStack):
         step = Step(
             "Tower on the mount",
@@ -73,7 +79,7 @@ def mount_spec(layout: Layout) -> PartSpec | None:
         turns=False,
         make=partial(base_mount, layout),
         step=step,
-        shaped_by=() if isinstance(layout.stack, BeltStack) else OF_SERVO,
+        shaped_by=OF_SERVO if onto == SERVO_CASE else (),
         angles="rot",
     )
 

@@ -125,7 +125,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
     """
     stack = p.stack
     last = min(y for _, y in p.holes) - FOOT_RADIUS - 1.5
-    with building(CAGE_BASE, "plate and boss", "case_holes_mm", p.holes) as checked:
+    with building(CAGE_BASE, "plate and boss", "holes", p.holes) as checked:
         reaches_out = -last > stack.cage_outer + ROOM + 2 * FOOT_RADIUS
         tail = solids.box((-p.half_x, last, p.low), (p.half_x, 0.0, p.high if reaches_out else p.foot))
         around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
@@ -133,7 +133,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
         body = body.cut(solids.upright(p.opening, p.low - 1.0, p.high + 1.0))
         body = checked(body)
-    with building(CAGE_BASE, "feet and screw holes", "case_holes_mm", p.holes) as checked:
+    with building(CAGE_BASE, "feet and screw holes", "holes", p.holes) as checked:
         feet = [solids.upright(FOOT_RADIUS, p.ears, p.low + 1.0, x, y) for x, y in p.holes]
         body = body.fuse(*feet)
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.front, p.high + 1.0)]

@@ -23,9 +23,7 @@ from scanwright.design.scanner import Scanner
 
 OF_SERVO = (
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_holes_mm",
-    "servo.case_holes_z_mm",
+    "servo.holes",
     "servo.horn_diameter_mm",
 )
 FOOT_RADIUS = 3.0
@@ -57,11 +55,11 @@ def drive_plate(p: DrivePlate) -> cq.Solid:
     stack = p.stack
     low, high = stack.tower_top, stack.tower_top + PLATE
     y0, y1 = stack.plate_y
-    with building(DRIVE_PLATE, "plate and feet", "case_holes_mm", p.holes) as checked:
+    with building(DRIVE_PLATE, "plate and feet", "holes", p.holes) as checked:
         plate = solids.prism(outlines.octagon(stack.plate_x, (y1 - y0) / 2, 3.0, (y0 + y1) / 2), low, high)
         feet = [solids.upright(FOOT_RADIUS, p.ears, low + 1.0, x, y) for x, y in p.holes]
         body = checked(plate.fuse(*feet))
-    with building(DRIVE_PLATE, "opening, holes and slots", "case_holes_mm", p.holes) as checked:
+    with building(DRIVE_PLATE, "opening, holes and slots", "holes", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.ears - 1.0, high + 1.0)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, high + 1.0, x, y))

@@ -84,7 +84,7 @@ def _fork(p: SlipRingAdapter, outer: float) -> cq.Shape:
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5
-    with building(SLIP_RING_ADAPTER, "fork", "case_holes_mm", p.holes) as checked:
+    with building(SLIP_RING_ADAPTER, "fork", "holes", p.holes) as checked:
         tail = solids.box((-p.half_x, last, low), (p.half_x, first, top))
         prongs = solids.box((-outer, min(first, slot_end - 12.0), low), (outer, ARM_HALF_WIDTH, top))
         feet = [solids.upright(FOOT_RADIUS, p.ears, low + 1.0, x, y) for x, y in p.holes]

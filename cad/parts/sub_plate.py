@@ -64,13 +64,13 @@ def sub_plate(scanner: Scanner, stack: Stack, axis: Axis) -> cq.Solid:
         BuildError: a step did not give one valid solid.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    half_x, half_y = lidar.half_mm
     low, high = -lidar.optical_height_mm - SUB_PLATE_THICKNESS, -lidar.optical_height_mm
-    hole, ear_hole = passing_hole(SCREWS[lidar.mount_screw], printer) / 2, passing_hole(EAR_SCREW, printer) / 2
+    hole, ear_hole = passing_hole(SCREWS[lidar.base.screw], printer) / 2, passing_hole(EAR_SCREW, printer) / 2
     with building(SUB_PLATE, "plate and holes", "ears along", axis) as checked:
         body: cq.Shape = solids.prism(outlines.octagon(half_x, half_y, CHAMFER), low, high)
         body = body.fuse(solids.prism(outlines.octagon(*ear_corner(lidar, axis), CHAMFER), low, high))
-        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.mount_holes_mm]
+        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.base.places]
         cuts = [solids.slot(hole, *each, low - 1.0, high + 1.0) for each in ends]
         cuts += [solids.upright(ear_hole, low - 1.0, high + 1.0, *at) for at in ear_screws(lidar, axis)]
         front = front_mark(half_x + (EAR_REACH if axis == "x" else 0.0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from scanwright.design.catalogue.products import Lidar, SlipRing, Ways
+from scanwright.design.catalogue.products import Circuits, Lidar, SlipRing
 from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of
 from scanwright.design.electrics.loads import (
     CHANGER,
@@ -94,7 +94,7 @@ def _nets(lidar: Lidar) -> list[tuple[str, float]]:
 
 def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
     """For each net the first circuit that carries its current, of its own use if there is one; the others are spare."""
-    nobody_tells = (Ways(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
+    nobody_tells = (Circuits(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
     ways = [(group.amps, group.use) for group in ring.ways or nobody_tells for _ in range(group.count)]
     left, taken = list(range(len(ways))), dict[int, tuple[str, float]]()
     for net, amps in _nets(lidar):

@@ -16,7 +16,7 @@ from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
 from scanwright.firmware_io.emulators.world import turned_deg
 
-BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
+BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}
 _POINTS = 12
 _BYTES = 47
 _BACKLOG = 1 << 10

@@ -92,13 +92,13 @@ def _asked(
     scan_s: float | None,
 ) -> tuple[str, str, float, str, list[str], float]:
     """The five questions, but for those that flags have answered; an answer that makes no sense is asked for again."""
-    from scanwright.design.catalogue.table import DOUBT, chosen, table_lines
+    from scanwright.design.catalogue.table import MARK, chosen, table_lines
     from scanwright.pipeline.new_task import Answers, check_answers
 
     def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:
         of_kind = chosen(products, kind=kind)
         show(table_lines(of_kind)[:-2])
-        print(f"{DOUBT}: a number that nobody has verified; -: unknown")
+        print(f"{MARK}: not verified; -: unknown")
         return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
 
     def checked(**answers: Any) -> None:

@@ -14,6 +14,7 @@ from scanwright.cad.layout.layout import drive_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.electrics.cautions import data_fault
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
@@ -113,20 +114,21 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
 
 
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
-    """Refuse a lidar whose weight alone, its middle off a level axis, asks more of the servo than it gives all day."""
+    """Reject a lidar whose weight alone, its middle off a level axis, needs more than the servo's continuous torque."""
     off_m = abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
     needed = lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * off_m
-    if needed > servo.lasting_torque_nm:
+    if needed > servo.continuous_torque_nm:
         raise TaskError(
             f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * off_m:.0f} mm off "
-            f"a level axis, need {needed:.2g} N m, and the servo gives {servo.lasting_torque_nm:.2g} N m all day"
+            f"a level axis, need {needed:.2g} N m, and the servo gives {servo.continuous_torque_nm:.2g} N m all day"
         )
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
     """The ring that lets the cable turn on and on; None for a servo that cannot turn so.
 
-    Rings with a bore come first, since the servo turns them without a belt, and of those the ones whose speed is known.
+    Rings that are rated for the lidar's data come first, then those with a bore, which need no belt, and of those the
+    ones whose speed is known.
 
     Raises:
         TaskError: none can be laid out with these two.
@@ -135,7 +137,15 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
         return None
     rings = [product for product in products if isinstance(product, SlipRing)]
     why = "the catalogue has no slip ring"
-    for ring in sorted(rings, key=lambda ring: (ring.bore_mm == 0, ring.max_rpm is None, ring.name)):
+
+    def order(ring: SlipRing) -> tuple[bool, bool, bool, str]:
+        return bool(data_fault(ring, lidar)), ring.bore_mm == 0, ring.max_rpm is None, ring.name
+
+    for ring in sorted(rings, key=order):
+        if ring.friction_nm is not None and ring.friction_nm[1] > servo.continuous_torque_nm:
+            gives = f"{servo.name} gives {servo.continuous_torque_nm:g}"
+            why = f"the friction of {ring.name} is up to {ring.friction_nm[1]:g} N m, {gives}"
+            continue
         angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=ring.name)
         scanner = scanner_of(angles, "fdm-0.4", products)
         try:

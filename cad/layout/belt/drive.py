@@ -6,7 +6,15 @@ import numpy as np
 
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.sizing import belt_stack
-from scanwright.cad.layout.belt.stack import FOOT_HALF, FOOT_HOLE, FOOT_SCREW, BeltStack, case_corners, drive_corners
+from scanwright.cad.layout.belt.stack import (
+    FOOT,
+    FOOT_HALF,
+    FOOT_HOLE,
+    FOOT_SCREW,
+    BeltStack,
+    case_corners,
+    drive_corners,
+)
 from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
@@ -91,6 +99,8 @@ def _mounted(stack: BeltStack) -> Mounted:
         ears=stack.tower_bottom,
         screw=FOOT_SCREW,
         holes=tuple((a * FOOT_HOLE, b * FOOT_HOLE) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
+        fixing="nut",
+        ear_mm=FOOT,
         corners=np.concatenate([drive_corners(stack), np.array(foot)]),
         discs=((stack.wide_radius, stack.tower_bottom), (stack.wide_radius, stack.tower_top)),
         stands_alone=False,

@@ -32,8 +32,8 @@ from scanwright.cad.layout.belt.tower import (
     tower_of,
 )
 from scanwright.cad.layout.joints import (
-    CASE_EAR,
     Joint,
+    fixing_of,
     held_in,
     horn_joint,
     inward_axes,
@@ -106,7 +106,15 @@ def _of_servo(scanner: Scanner, stack: BeltStack) -> Iterator[Joint]:
     R, t = stack.turn(), stack.beside() * [1.0, 1.0, 0.0]
     heads = stack.tower_top + of_plate.UNDER_HEAD
     axes, grip = placed_axes(upright_axes(plate.holes, heads, -1.0), R, t), heads - plate.ears
-    yield Joint(names.DRIVE_PLATE, names.SERVO_CASE, "nut", plate.screw, axes, grip_mm=grip, thread_mm=CASE_EAR)
+    yield Joint(
+        names.DRIVE_PLATE,
+        names.SERVO_CASE,
+        fixing_of(scanner.servo.front),
+        plate.screw,
+        axes,
+        grip_mm=grip,
+        thread_mm=scanner.servo.front.depth_mm,
+    )
     grip = stack.pulley_seat - stack.horn
     horn = horn_joint(scanner.servo, names.DRIVE_PULLEY, names.SERVO_OUTPUT, stack.pulley_seat, grip)
     yield replace(horn, axes=placed_axes(horn.axes, R, t))

@@ -25,6 +25,7 @@ from scanwright.cad.layout.deck import (
 )
 from scanwright.cad.layout.direct import adapter
 from scanwright.cad.layout.direct.cage import SEAT_GAP, plate_half_x
+from scanwright.cad.layout.direct.frame import frame_of, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.layout import Layout
@@ -84,12 +85,14 @@ def _direct(layout: Layout, stack: DirectStack) -> Iterator[Array]:
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
     front = stack.horn + z1 + SEAT_GAP
     yield box_corners(((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1)))
+    if needs_frame(servo):
+        yield from (box_corners(leg) for leg in frame_of(layout.scanner, stack).legs())
     if stack.bearing is not None:
         yield around_axis(stack.cage_outer, front, stack.cage_top)
-        wide = plate_half_x(servo, SCREWS[servo.case_screw])
+        wide = plate_half_x(servo, SCREWS[servo.front.screw])
         yield box_corners(((-wide, y0, front), (wide, 0.0, stack.ring_bottom)))
     elif stack.ring_length > 0:
-        outer = max(stack.ring_radius + adapter.PLAY + adapter.ARM, plate_half_x(servo, SCREWS[servo.case_screw]))
+        outer = max(stack.ring_radius + adapter.PLAY + adapter.ARM, plate_half_x(servo, SCREWS[servo.front.screw]))
         yield around_axis(stack.ring_radius, stack.ring_bottom, stack.ring_top)
         yield box_corners(((-outer, -adapter.ARM_HALF_WIDTH, front), (outer, adapter.ARM_HALF_WIDTH, stack.ring_top)))
         yield box_corners(((-outer, y0, front), (outer, adapter.ARM_HALF_WIDTH, front + adapter.PLATE)))

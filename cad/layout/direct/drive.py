@@ -7,17 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from scanwright.cad.layout import names
+from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, frame_of, needs_frame, no_rear_holes
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
+from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.screws import SCREWS
-from scanwright.design.catalogue.products import Servo
-from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 # The order that always works: what comes over the shaft follows what carries it.
 BUILT = (
+    names.SERVO_FRAME,
     names.BASE_MOUNT,
     names.TRIPOD_FOOT,
     names.DECK,
@@ -38,6 +39,7 @@ BUILT = (
 STACKED = (
     names.BASE_MOUNT,
     names.SERVO,
+    names.SERVO_FRAME,
     names.SERVO_SHAFT,
     names.HORN_CUP,
     names.CAGE_BASE,
@@ -74,7 +76,7 @@ def direct_drive(scanner: Scanner) -> DriveLayout:
         stack=stack,
         shaft=stack.shaft,
         products=() if stack.bearing is None else (stack.bearing,),
-        mounted=_mounted(scanner.servo, stack),
+        mounted=_mounted(scanner, stack),
         masses=tuple(masses),
         shapes=(case, *rods),
         built=BUILT,
@@ -94,31 +96,45 @@ def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[tuple[str, str]]:
         yield "two-component epoxy, slow", "bearing in its printed seat"
 
 
-def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
-    """The servo's case.
+def _mounted(scanner: Scanner, stack: DirectStack) -> Mounted:
+    """The servo's case, or the frame that holds it.
 
     Raises:
-        BuildError: it has no holes on its back.
+        BuildError: it has no holes that may carry it.
     """
-    holes = servo.case_rear_holes_mm
-    if len(holes) < 4:
-        doubt = servo.doubt("case_rear_holes_mm")
-        raise BuildError(
-            f"{names.BASE_MOUNT}: deck: case_rear_holes_mm = {list(holes)}{doubt}: {servo.name} has no "
-            "four holes on its back to stand on; take a capsule ring, whose plate holds its front, or another servo"
-        )
+    servo = scanner.servo
+    if len(servo.rear.places) < 4 and not needs_frame(servo):
+        raise no_rear_holes(servo)
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
         around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
+    discs = ((around, stack.horn), (around, top))
+    if needs_frame(servo):
+        p = frame_of(scanner, stack)
+        frame = [(x, y, z) for x in (-p.reach_x, p.reach_x) for y in p.ends_y for z in (p.low, p.high)]
+        return Mounted(
+            onto=names.SERVO_FRAME,
+            rear=p.low,
+            ears=p.low,
+            screw=FOOT_SCREW,
+            holes=p.feet,
+            fixing="nut",
+            ear_mm=FOOT,
+            corners=np.array(frame),
+            discs=discs,
+            stands_alone=True,
+        )
     return Mounted(
         onto=names.SERVO_CASE,
         rear=stack.horn + servo.case_min_mm[2],
-        ears=stack.horn + servo.case_rear_holes_z_mm,
-        screw=SCREWS[servo.case_screw],
-        holes=_corner_holes(holes),
+        ears=stack.horn + servo.rear.z_mm,
+        screw=SCREWS[servo.rear.screw],
+        holes=_corner_holes(servo.rear.places),
+        fixing=fixing_of(servo.rear),
+        ear_mm=servo.rear.depth_mm,
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
-        discs=((around, stack.horn), (around, top)),
+        discs=discs,
         stands_alone=True,
     )
 
@@ -126,6 +142,8 @@ def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
 def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
     if scanner.slip_ring is None:
         yield LeftOut(names.SLIP_RING_ADAPTER, "this scanner has no slip ring", 1, "parts")
+    if not needs_frame(scanner.servo):
+        yield LeftOut(names.SERVO_FRAME, f"{scanner.servo.name} is held by the holes in its rear", 1, "parts")
     if stack.bearing is None:
         servo = scanner.servo
         why = f"the horn of {servo.name} carries an axis this upright alone"

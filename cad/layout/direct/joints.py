@@ -8,8 +8,9 @@ from scanwright.cad.layout import names
 from scanwright.cad.layout.direct import cage as of_cage
 from scanwright.cad.layout.direct.adapter import adapter_of
 from scanwright.cad.layout.direct.cage import BearingCage, cage_of
+from scanwright.cad.layout.direct.frame import GRIP, frame_of, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.joints import CASE_EAR, Joint, held_in, horn_joint, inward_axes, round_wall_mm, upright_axes
+from scanwright.cad.layout.joints import Joint, fixing_of, held_in, horn_joint, inward_axes, round_wall_mm, upright_axes
 from scanwright.design.scanner import Scanner
 
 
@@ -19,15 +20,36 @@ def direct_joints(scanner: Scanner, stack: DirectStack) -> Iterator[Joint]:
     Raises:
         BuildError: the case has no holes beside the turning flange.
     """
-    flange = stack.horn + stack.flange_thickness
-    yield horn_joint(scanner.servo, stack.shaft, names.SERVO_HORN, flange, stack.flange_thickness)
+    heads = stack.horn + stack.horn_grip
+    yield horn_joint(scanner.servo, stack.shaft, names.SERVO_HORN, heads, stack.horn_grip)
+    if needs_frame(scanner.servo):
+        p, front = frame_of(scanner, stack), scanner.servo.front
+        axes = upright_axes(p.holes, p.high, -1.0)
+        yield Joint(
+            names.SERVO_FRAME,
+            names.SERVO_CASE,
+            fixing_of(front),
+            p.screw,
+            axes,
+            grip_mm=GRIP,
+            thread_mm=front.depth_mm,
+            heel_mm=p.heel_mm if len(p.holes) == 2 else None,
+        )
     has_ring, cage = scanner.slip_ring is not None, cage_of(scanner, stack)
     base = names.SLIP_RING_ADAPTER if has_ring else names.CAGE_BASE
     on_case = adapter_of(scanner, stack) if has_ring and cage is None else cage
     if on_case is not None:
         heads = on_case.front + of_cage.SEAT_GAP + of_cage.UNDER_HEAD
         axes, grip = upright_axes(on_case.holes, heads, -1.0), heads - on_case.ears
-        yield Joint(base, names.SERVO_CASE, "nut", on_case.screw, axes, grip_mm=grip, thread_mm=CASE_EAR)
+        yield Joint(
+            base,
+            names.SERVO_CASE,
+            fixing_of(scanner.servo.front),
+            on_case.screw,
+            axes,
+            grip_mm=grip,
+            thread_mm=scanner.servo.front.depth_mm,
+        )
     if cage is not None:
         yield _bell(stack, cage, base)
 

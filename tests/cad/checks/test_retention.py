@@ -117,7 +117,7 @@ def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
         pull = max(pull, np.abs(axial).max())
         push = max(push, np.linalg.norm(shares - axial[:, None] * along, axis=1).max())
     assert worst_shares(joint, centre) == pytest.approx((pull, push), rel=5e-3)
-    assert scanner.lidar.mount_screw == joint.screw.name
+    assert scanner.lidar.base.screw == joint.screw.name
 
 
 def test_torque_and_strength_against_hand_calculation():

@@ -145,10 +145,10 @@ def test_screws_are_those_of_the_catalogue_and_none_bottoms(rows, made):
     lidar, servo = made.scanner.lidar, made.scanner.servo
     assert counts["servo_shaft", "servo_horn"] == (servo.horn_holes, "ISO 4762 M2.5 x 6")
     count, number = counts["alignment_linkage", "lidar_body"]
-    assert count == len(lidar.mount_holes_mm)
-    length = int(number.removeprefix(f"ISO 4762 {lidar.mount_screw} x "))
+    assert count == len(lidar.base.places)
+    length = int(number.removeprefix(f"ISO 4762 {lidar.base.screw} x "))
     plate = 8.0
-    assert 2 * 3.0 <= length - plate < lidar.mount_thread_depth_mm
+    assert 2 * 3.0 <= length - plate < lidar.base.depth_mm
     assert counts["base_mount", "servo_case"][0] == 4 and counts["base_mount", "deck"] == (4, "ISO 4762 M4 x 16")
     assert counts["alignment_linkage", "servo_shaft"] == (2, "ISO 4762 M3 x 12")
     assert not [row for row in rows if row["number"].startswith("ISO 4026")]  # nothing holds by friction

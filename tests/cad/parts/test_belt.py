@@ -40,6 +40,7 @@ from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import prism, upright
 from scanwright.cad.statics.shaft import belt_shaft_bend
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Servo, SlipRing
 from scanwright.design.errors import BuildError
 
@@ -439,8 +440,9 @@ def test_what_else_cannot_be_built_is_refused():
     with pytest.raises(BuildError, match=r"drive_pulley: heads: horn_circle_mm = 46: .*teeth of a pulley of 80"):
         parts_of(layout_of(replace(scanner, servo=wide)))
     holes = ((9.0, 0.0), (-9.0, 0.0), (9.0, -3.0), (-9.0, -3.0))
-    bare = Servo.model_validate(scanner.servo.model_dump() | {"case_holes_mm": holes})
-    with pytest.raises(BuildError, match=r"drive_plate: ears: case_holes_mm"):
+    ears = tuple(Hole(at_mm=(x, y, -6.5), axis="+z", kind="through", size="M2.5", depth_mm=2.0) for x, y in holes)
+    bare = scanner.servo.model_copy(update={"holes": ears})
+    with pytest.raises(BuildError, match=r"drive_plate: ears: holes"):
         parts_of(layout_of(replace(scanner, servo=bare)))
 
 

@@ -1,0 +1,59 @@
+"""Servo frame: holds a servo by the threads in its front, where its rear has none that may carry it.
+
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/frame.py`), mm. A plate with an opening around the horn, sides
+beside the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import cadquery as cq
+
+from scanwright.cad import solids
+from scanwright.cad.layout.direct.frame import FOOT, HEADER, LEAST_BRIDGE, LEG, ServoFrame, frame_of, needs_frame
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.names import SERVO, SERVO_CASE, SERVO_FRAME
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
+from scanwright.cad.solids import building
+from scanwright.design.scanner import Scanner
+
+
+def frame_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
+    """Return the frame of one scanner; None if the servo's rear holds it."""
+    if not needs_frame(scanner.servo):
+        return None
+    words = (
+        "Push the servo into the frame from below, its horn through the opening. "
+        f"{screws(SERVO_CASE)} Do not loosen the screws that close its case."
+    )
+    return PartSpec(
+        name=SERVO_FRAME,
+        turns=False,
+        make=partial(servo_frame, frame_of(scanner, stack)),
+        step=Step("Servo into its frame", words, "the horn turns freely in the opening", (SERVO,)),
+        shaped_by=("servo.case_min_mm", *ON_CASE),
+    )
+
+
+def servo_frame(p: ServoFrame) -> cq.Solid:
+    """Make the frame.
+
+    Raises:
+        BuildError: a step did not give one valid solid.
+    """
+    (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + LEG
+    with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
+        body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))
+        feet = [solids.box((-p.reach_x, a, p.low), (p.reach_x, b, p.low + FOOT)) for a, b in ((y0, w0), (w1, y1))]
+        room = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
+        window = solids.box((-p.reach_x - 1.0, w0, p.low - 1.0), (p.reach_x + 1.0, w1, p.plate - HEADER))
+        body = checked(body.fuse(*feet).cut(room, window).clean())
+    with building(SERVO_FRAME, "opening and holes", "holes", p.holes) as checked:
+        cuts: list[cq.Shape] = [solids.upright(p.opening, p.plate - 1.0, p.high + 1.0)]
+        if y1 - p.opening < LEAST_BRIDGE:  # a plate that ends so close to the horn is open there
+            cuts.append(solids.box((-p.opening, 0.0, p.plate - 1.0), (p.opening, y1 + 1.0, p.high + 1.0)))
+        cuts += [solids.upright(p.hole / 2, p.plate - 1.0, p.high + 1.0, x, y) for x, y in p.holes]
+        cuts += [solids.upright(p.foot_hole / 2, p.low - 1.0, p.low + FOOT + 1.0, x, y) for x, y in p.feet]
+        return checked(body.cut(*cuts).clean())
