@@ -7,8 +7,8 @@ frames (`docs/conventions.md`, Frames):
     T_world_rot(gamma)   = [Rx(alpha_rot) Ry(beta_rot) Rz(gamma + gamma_rot) | t_world_rot]
     T_rot_laser          = [exp(delta) Rz(gamma_laser) Ry(beta_laser) Rx(alpha_laser) | t_rot_laser]
 
-where gamma is the joint position. `delta` and `t_rot_laser` are zero by design; their x and y are what a
-calibration can see. Rotation about the axis and translation along it are gauges.
+where gamma is the joint position. `delta` and `t_rot_laser` are zero by design; a calibration can observe their
+x and y. Rotation about the axis and translation along it are gauges.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from pydantic import Field, ValidationError
 from scanwright.design import frames
 from scanwright.design.arrays import Pose, Rotation, Setting, Vector
 from scanwright.design.errors import TaskError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
-from scanwright.design.files.text_files import A_FILE_FOR_A_FOLDER, read_text
+from scanwright.design.files.text_files import read_text_of
 from scanwright.design.motion import Motion
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
@@ -37,7 +37,7 @@ STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.
 
 
 def standard_settings() -> dict[str, Setting]:
-    """The standard alignments in radians: what an optimum is compared with."""
+    """Return the standard alignments in radians, which optima are compared with."""
     return {name: np.radians(angles) for name, angles in STANDARD_DEG.items()}
 
 
@@ -46,7 +46,7 @@ Millimetres = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 CALIBRATED: Final = "angles.calibrated.json"
-"""The calibrated angle set of a build folder, beside its `angles.json`."""
+"""The calibrated angle set of a build folder, next to its `angles.json`."""
 
 
 class Angles(Record):
@@ -111,31 +111,24 @@ class AngleSet(Record):
 
 
 def load_angles(path: str | Path) -> AngleSet:
-    """Read `angles.json`, as strictly as a task: text and true are no numbers, and the schema is named.
+    """Read `angles.json`: text and booleans are not accepted as numbers, and the key `schema` is required.
 
     Raises:
-        TaskError: the file is missing, is not JSON, or is not an angle set.
+        MissingFileError: there is no such file.
+        TaskError: the file cannot be read, is not JSON, or is not an angle set.
     """
     path = Path(path)
-    try:
-        text = read_text(path)
-    except IsADirectoryError as error:
+    if path.is_dir():
         within = path / "angles.json"
         advice = f": name {within}" if within.is_file() else " without an angles.json, not an angle set"
-        raise TaskError(f"{path}: this is a folder{advice}") from error
-    except NotADirectoryError as error:
-        raise TaskError(f"{path.parent}: {A_FILE_FOR_A_FOLDER} {path.name}") from error
-    except OSError as error:
-        raise TaskError(f"{path}: cannot read the angle set: {error.strerror}") from error
-    except ValueError as error:
-        raise TaskError(f"{path}: cannot read the angle set: {error}") from error
+        raise TaskError(f"{path}: this is a folder{advice}")
     try:
-        found = AngleSet.model_validate_json(text, strict=True)
+        angles = AngleSet.model_validate_json(read_text_of(path, "the angle set"), strict=True)
     except ValidationError as error:
-        raise TaskError(explain(error, path, AngleSet)) from error
-    if "schema_id" not in found.model_fields_set:
+        raise TaskError(format_validation_error(error, path, AngleSet)) from error
+    if "schema_id" not in angles.model_fields_set:
         raise TaskError(f'{path}: schema: this key is required: "scanwright/angles/1"')
-    return found
+    return angles
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,27 +137,27 @@ class AnglesInUse:
 
     Attributes:
         path: its file.
-        angles: what is in it.
-        said: which one it is and why, in words.
+        angles: its contents.
+        description: which one it is, and why.
     """
 
     path: Path
     angles: AngleSet
-    said: str
+    description: str
 
 
 def angles_in_use(folder: Path) -> AnglesInUse:
-    """`angles.calibrated.json` of a build folder where it is of the folder's own mount, else `angles.json`.
+    """Return `angles.calibrated.json` of a build folder if it is of the folder's own mount, else `angles.json`.
 
     Raises:
-        TaskError: there is no angle set, or one of the two is none.
+        TaskError: there is no angle set, or one of the two files is not an angle set.
     """
     path, calibrated = folder / "angles.json", folder / CALIBRATED
     designed = load_angles(path)
     if not calibrated.is_file():
         return AnglesInUse(path, designed, f"frames as designed, {path}")
-    found = load_angles(calibrated)
-    mounts = [(one.angles_deg, one.t_world_rot_mm, one.sensor) for one in (designed, found)]
+    angles = load_angles(calibrated)
+    mounts = [(one.angles_deg, one.t_world_rot_mm, one.sensor) for one in (designed, angles)]
     if mounts[0] != mounts[1]:
         return AnglesInUse(path, designed, f"frames as designed: {calibrated} is of another mount than {path.name}")
-    return AnglesInUse(calibrated, found, f"frames as calibrated, {calibrated}")
+    return AnglesInUse(calibrated, angles, f"frames as calibrated, {calibrated}")

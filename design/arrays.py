@@ -1,8 +1,8 @@
-"""Types of arrays: what they hold, and their shape. Tests check them wherever they are called; runs pay nothing.
+"""Types of arrays: element type and shape. Tests check them at every call; other runs do not.
 
-A shape names its axes: in one call every `n` is the same number, `...` is any number of axes, `*k` axes that are
-alike throughout the call. A single axis is written with a space before it, as `Float[ndarray, " n"]`: without it a
-linter takes it for the name of a type.
+A shape names its axes: in one call every `n` is the same number, `...` is any number of axes, `*k` axes that are equal
+throughout the call. A single axis is written with a leading space, `Float[ndarray, " n"]`, since linters read it as
+the name of a type without.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Times = Int64[ndarray, "..."]
 """Nanoseconds."""
 
 Counts = Num[ndarray, "..."]
-"""Of beams: whole numbers, or means of them."""
+"""Numbers of beams: integers, or means of them."""
 
 Vector = Float[ndarray, " 3"]
 Rotation = Float[ndarray, "3 3"]

@@ -1,12 +1,12 @@
-"""A camera beside the lidar: what its lens does, and where it sits. OpenCV's conventions, so its calibrations fit.
+"""A camera next to the lidar: lens model and pose, in the conventions of OpenCV and its calibrations.
 
-Camera frame: x right, y down, z forward. Pixel (0, 0) is the middle of the first one, above and left.
+Camera frame: x right, y down, z forward. (0, 0) is the centre of the top left pixel.
 
-With x = X/Z, y = Y/Z, r2 = x2 + y2 the pinhole camera sees (Brown, "Decentering distortion of lenses", 1966)
+With x = X/Z, y = Y/Z, r2 = x2 + y2 the image of the pinhole camera is (Brown, "Decentering distortion of lenses", 1966)
 
-    x' = x (1 + k1 r2 + k2 r4 + k3 r6) + 2 p1 x y + p2 (r2 + 2 x2),  y' alike with p1 and p2 exchanged
+    x' = x (1 + k1 r2 + k2 r4 + k3 r6) + 2 p1 x y + p2 (r2 + 2 x2),  y' accordingly with p1 and p2 exchanged
 
-and the fisheye, with t the angle off the optical axis (Kannala and Brandt, 2006),
+and of the fisheye, with t the angle from the optical axis (Kannala and Brandt, 2006),
 
     (x', y') = t (1 + k1 t2 + k2 t4 + k3 t6 + k4 t8) (x, y) / r
 """
@@ -28,13 +28,13 @@ Pixels = Annotated[int, Field(strict=True, ge=1, le=100_000)]
 Focal = Annotated[float, Field(gt=0)]
 
 _DISTORTIONS = {"pinhole": (0, 4, 5), "fisheye": (0, 4)}
-_STEPS = 2000  # of the search for where a lens folds back
+_STEPS = 2000  # of the radius, to find where the distortion stops increasing
 
 
 class Camera(Record):
-    """One camera and the images it took.
+    """One camera and its images.
 
-    `frame` is what the camera is fixed to: `world` is the robot, `rot` turns with the servo, `laser` is the lidar.
+    The camera is fixed to `frame`: `world` is the robot, `rot` turns with the servo, `laser` is the lidar.
     `rotvec_deg` turns that frame's axes into the camera's (axis times angle); 0 looks along z with x to the right.
     """
 
@@ -57,11 +57,11 @@ class Camera(Record):
         return self
 
     def T_frame_camera(self) -> Pose:
-        """Pose of the camera in its frame [m], shape (4, 4)."""
+        """Return the pose of the camera in its frame [m], shape (4, 4)."""
         return frames.rigid(frames.rotvec_to_matrix(np.radians(self.rotvec_deg)), np.array(self.position_mm) / 1000)
 
     def pixels(self, points_m: Float[ndarray, "n 3"]) -> Float[ndarray, "n 2"]:
-        """Where points of the camera frame, shape (n, 3), are seen, (n, 2); NaN outside of the image."""
+        """Return the pixels of points of the camera frame, shapes (n, 2) and (n, 3); NaN outside of the image."""
         x, y = self._pinhole(points_m) if self.model == "pinhole" else self._fisheye(points_m)
         uv = np.stack([x, y], axis=1) * self.focal_px + self.centre_px
         inside = np.all((uv >= -0.5) & (uv < np.array(self.size_px) - 0.5), axis=1)
@@ -72,7 +72,7 @@ class Camera(Record):
         ahead = points_m[:, 2] > 0
         x, y = np.divide(points_m[:, :2].T, points_m[:, 2], where=ahead, out=np.full((2, len(points_m)), np.nan))
         r2 = x * x + y * y
-        r2[r2 > _fold((k1, k2, k3)) ** 2] = np.nan  # beyond it a lens would show two directions in one place
+        r2[r2 > _fold((k1, k2, k3)) ** 2] = np.nan  # beyond it two directions would have the same pixel
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
         return (
             x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
@@ -92,7 +92,7 @@ class Camera(Record):
 
 
 def _fold(radial: tuple[float, ...]) -> float:
-    """The radius (or angle) up to pi beyond which r (1 + k1 r^2 + k2 r^4 + ...) grows no more."""
+    """Return the radius (or angle) up to pi at which r (1 + k1 r^2 + k2 r^4 + ...) stops increasing."""
     r = np.linspace(0, np.pi, _STEPS)
     slope = 1 + sum((2 * power + 1) * k * r ** (2 * power) for power, k in enumerate(radial, 1)) * np.ones_like(r)
     falls = np.flatnonzero(slope <= 0)

@@ -1,4 +1,4 @@
-"""The holes of the robot's deck that the base mount is screwed to, as a task gives them; mm, about the mount's centre.
+"""The holes of the robot's deck for the base mount, from the task [mm], about the centre of the mount.
 
 x and y are those of the world frame, whose origin is the centre of the pattern on the face of the deck.
 """
@@ -24,7 +24,7 @@ class Rectangle(Record):
     screw: DeckScrew = Field(default="M4", description="that goes through the holes")
 
     def holes(self) -> tuple[tuple[float, float], ...]:
-        """Centres."""
+        """Return the centres [mm]."""
         x, y = self.size_mm[0] / 2, self.size_mm[1] / 2
         return (x, y), (-x, y), (-x, -y), (x, -y)
 
@@ -39,7 +39,7 @@ class Circle(Record):
     screw: DeckScrew = Field(default="M4", description="that goes through the holes")
 
     def holes(self) -> tuple[tuple[float, float], ...]:
-        """Centres."""
+        """Return the centres [mm]."""
         turns = [math.radians(self.first_deg + 360 * i / self.count) for i in range(self.count)]
         r = self.diameter_mm / 2
         return tuple((round(r * math.cos(a), 6), round(r * math.sin(a), 6)) for a in turns)

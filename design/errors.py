@@ -1,21 +1,26 @@
 """Every error that Scanwright raises on purpose.
 
-    ScanwrightError            wrong input: a line for each fault, exit 2
-     +-- TaskError             a task file or a catalogue file is missing, malformed or inconsistent
-     +-- NumericalError        a result fails the program's own check: a fault of Scanwright, not of the input; exit 1
-     +-- BuildError            a part, a drawing or a build folder cannot be made as asked
-     +-- RecordingError        a recording is unreadable, or lacks what the command needs
-     +-- SceneError            a mesh is unreadable, or holds nothing that a beam can hit
-     +-- InstallError          an extra of the package, or a library of the system, is not installed
-     +-- DeviceError           a device is absent, or did not do what it was asked
-          +-- DeviceTimeoutError  ... because nothing came in time
-          +-- ProtocolError    ... because what came is no valid packet
-          +-- DeviceFaultError ... because it is overloaded, too hot, blocked, or its supply failed
-          +-- ServoSetupError  ... because its settings must change first (`firmware_io.servo.fitness`, with the list)
-          +-- UnsafeError      ... and may still turn or shine: it did not confirm that it stopped
+    ScanwrightError            wrong input
+     +-- TaskError             task or catalogue file: missing, malformed or inconsistent       (ValueError)
+     |    +-- MissingFileError there is no such file                                            (FileNotFoundError)
+     +-- NumericalError        a result fails the program's own check: a bug; exit code 1       (ArithmeticError)
+     +-- BuildError            a part, a drawing or a build folder cannot be made as requested  (ValueError)
+     +-- RecordingError        recording: unreadable, or without the data that is required      (ValueError)
+     +-- SceneError            mesh: unreadable, or without a surface that a beam can hit       (ValueError)
+     +-- InstallError          an extra of the package or a system library is not installed     (ImportError)
+     +-- DeviceError           a device is absent or did not do what was requested
+          +-- DeviceTimeoutError  it did not answer in time                                     (TimeoutError)
+          +-- ProtocolError    its answer is not a valid packet
+          +-- DeviceFaultError it is overloaded, too hot, blocked, or its supply failed
+          +-- ServoSetupError  its settings must change first (`firmware_io.servo.fitness`, with the list)
+          +-- UnsafeError      it did not confirm that it stopped: it may still turn or emit light
 
-A command prints the message and exits with 2; anything else is a bug and gets its traceback. The message is one line,
-or one for each fault of a file; each names file, line, field, value, bound and a suggestion, as far as they apply.
+A command prints the message and exits with 2; any other exception is a bug and prints its traceback. The message is
+one line, or one line for each fault of a file: file, line, field, value, bound and a suggestion, as far as they apply.
+
+Messages name fields in Python form, `min_range_m = 9: at most 5`. The command line prints fields that are options of
+the running command as options, `--min-range-m`. It recognises a field by an underscore, at the start of the message
+before ":" or " = ", or in backquotes: "pole = 'x': three numbers", "name `angles` or `poses`".
 """
 
 from __future__ import annotations
@@ -40,50 +45,54 @@ REMOVED: dict[str, str] = {  # names in files and commands of version 0.1, and w
 
 
 class ScanwrightError(Exception):
-    """Base of every error that a person can mend."""
+    """Base of every error that the user can fix."""
 
 
-class TaskError(ScanwrightError):
+class TaskError(ScanwrightError, ValueError):
     """A task file or a catalogue file is missing, malformed or inconsistent."""
 
 
+class MissingFileError(TaskError, FileNotFoundError):
+    """A task file, a catalogue file or an angle set does not exist."""
+
+
 class NumericalError(ScanwrightError, ArithmeticError):
-    """A result fails the program's own check: a fault of Scanwright that its users can only report."""
+    """A result fails the program's own check: a bug of Scanwright that users can only report."""
 
-    def __init__(self, message: str) -> None:
-        super().__init__(f"{message}; this is a fault of Scanwright: please report it with the task file")
-
-
-class BuildError(ScanwrightError):
-    """A part or a build folder cannot be made as asked. The message names part, feature, parameter and value."""
+    def __str__(self) -> str:
+        return f"{super().__str__()}; this is a fault of Scanwright: please report it with the task file"
 
 
-class RecordingError(ScanwrightError):
-    """A recording is unreadable, or lacks what the command needs."""
+class BuildError(ScanwrightError, ValueError):
+    """A part or a build folder cannot be made as requested. The message names part, feature, parameter and value."""
 
 
-class SceneError(ScanwrightError):
-    """A mesh is unreadable, or holds nothing that a beam can hit."""
+class RecordingError(ScanwrightError, ValueError):
+    """A recording is unreadable, or lacks data that is required."""
 
 
-class InstallError(ScanwrightError):
-    """An extra of the package, or a library of the system, is not installed. The message names the command."""
+class SceneError(ScanwrightError, ValueError):
+    """A mesh is unreadable, or has no surface that a beam can hit."""
+
+
+class InstallError(ScanwrightError, ImportError):
+    """An extra of the package, or a system library, is not installed. The message names the command."""
 
 
 class DeviceError(ScanwrightError):
-    """A device is absent, or did not do what it was asked. The message names port, device and what to do."""
+    """A device is absent, or did not do what was requested. The message names port, device and what to do."""
 
 
-class DeviceTimeoutError(DeviceError):
-    """Nothing came from a device in time: unplugged, without power, or at another speed."""
+class DeviceTimeoutError(DeviceError, TimeoutError):
+    """A device did not answer in time: unplugged, without power, or at another baud rate."""
 
 
 class ProtocolError(DeviceError):
-    """What came from a device is no valid packet: a bad checksum, a wrong length, another command's answer."""
+    """A device's answer is not a valid packet: a bad checksum, a wrong length, the answer to another command."""
 
 
 class DeviceFaultError(DeviceError):
-    """A device reports a fault of its own: overload, heat, voltage, stall. It was told to stop."""
+    """A device reports a fault: overload, heat, voltage, stall. It was commanded to stop."""
 
 
 class UnsafeError(DeviceError):
@@ -91,13 +100,13 @@ class UnsafeError(DeviceError):
 
 
 class UnsafeNote(str):
-    """A note on an error that came first: a device did not confirm that it stopped."""
+    """A note on an earlier error: a device did not confirm that it stopped."""
 
     __slots__ = ()
 
 
 def notes_of(error: BaseException) -> list[str]:
-    """Return what else went wrong while an error was handled, such as a servo that could not be stopped."""
+    """Return the notes of an error: further faults during its handling, such as a servo that did not stop."""
     return list(getattr(error, "__notes__", ()))
 
 
@@ -119,7 +128,7 @@ def suggest(word: str, known: Iterable[str]) -> str:
 
 
 def require(extra: str, need: str, *modules: str) -> None:
-    """Refuse work whose packages are not installed. None of them is imported.
+    """Require packages to be installed, without importing them.
 
     Args:
         extra: the extra of the package that brings them, such as "clouds".

@@ -1,7 +1,7 @@
 """Rotations and rigid transforms.
 
 `T_a_b` maps coordinates in frame b to coordinates in frame a: `p_a = T_a_b @ p_b`. Neighbouring subscripts
-cancel, so `T_world_laser = T_world_rot @ T_rot_laser` can be checked by eye. All frames are right-handed; metres
+cancel, so `T_world_laser = T_world_rot @ T_rot_laser` is easy to check. All frames are right-handed; metres
 and radians. Frames: `world` (the robot), `rot` (the servo axis is z), `laser` (x forward, z the normal of the
 scan plane).
 """
@@ -55,7 +55,7 @@ def rotvec_to_matrix(rotvec_rad: ArrayLike) -> Rotation:
 
 
 def cross_matrix(v: Float[ndarray, " 3"]) -> Float[ndarray, "3 3"]:
-    """Matrix of v x, shape (3, 3)."""
+    """Return the matrix of v x, shape (3, 3)."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
@@ -70,12 +70,12 @@ def rigid(R_a_b: Float[ndarray, "... 3 3"], t_a_b: ArrayLike) -> Float[ndarray, 
 
 
 def apply(T_a_b: Pose, points_b: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
-    """Points of frame b, shape (n, 3), in frame a."""
+    """Return points of frame b, shape (n, 3), in frame a."""
     return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
 
 
 def roll_pitch_yaw(R: Rotation) -> tuple[float, float, float]:
-    """URDF's fixed-axis angles [rad]: R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 where the pitch is +-90 deg."""
+    """URDF's fixed-axis angles [rad]: R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 if the pitch is +-90 deg."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
     if level < 1e-9:

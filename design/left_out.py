@@ -1,4 +1,4 @@
-"""What a stage skipped because the task does not need it."""
+"""Work that a stage skipped because the task does not need it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """One thing that was skipped, the reason, and the count it saved (never seconds: builds are reproducible)."""
+    """One skipped item, the reason, and the count that it saved (not seconds, since builds are reproducible)."""
 
     what: str
     why: str

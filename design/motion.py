@@ -1,6 +1,6 @@
-"""How the servo moves during one full scan: it spins, sweeps to and fro, or stops and goes.
+"""Motion of the servo during one full scan: spin, sweep back and forth, or stop and go.
 
-The task names one of these records, the angle set carries it, and the program that drives the servo obeys it.
+A task contains one of these records, the angle set repeats it, and the program that drives the servo uses it.
 Joint angles are those of `spin_joint`, 0 where the index marks meet.
 """
 
@@ -15,14 +15,14 @@ from pydantic import Field, Strict, model_validator
 from scanwright.design.arrays import Array
 from scanwright.design.files.record import Record
 
-SHORTEST_S, LONGEST_S = 1e-3, 600.0
+SHORTEST_S, LONGEST_S = 1e-3, 600.0  # of a turn, far outside of what servos do
 NARROWEST_SWEEP_DEG = 0.1  # about one step of a servo's encoder
 
 
 class Spin(Record):
     """Continuous rotation at constant speed."""
 
-    mode: Literal["spin"] = Field(default="spin", description="turn on and on")
+    mode: Literal["spin"] = Field(default="spin", description="turn continuously")
     period_s: float = Field(strict=True, ge=SHORTEST_S, le=LONGEST_S, description="time of one full turn of the servo")
 
     @property
@@ -32,7 +32,7 @@ class Spin(Record):
 
 
 class Shortest(Record):
-    """Spin as fast as the limits of the task allow, `period_s = "shortest"` in its file: the search finds how fast."""
+    """Spin as fast as the limits of the task allow, `period_s = "shortest"` in its file."""
 
     mode: Literal["shortest"] = Field(default="shortest", description="spin, as fast as the limits allow")
     longest_s: float = Field(
@@ -41,14 +41,14 @@ class Shortest(Record):
 
     @property
     def duration_s(self) -> float:
-        """Time of the slowest full scan there may be."""
+        """Longest time of one full scan."""
         return self.longest_s
 
 
 class Sweep(Record):
-    """From one limit to the other and back: accelerate, cruise, brake; both ways alike."""
+    """From one limit to the other and back: accelerate, cruise, brake, equally in both directions."""
 
-    mode: Literal["sweep"] = Field(default="sweep", description="to and fro between two angles")
+    mode: Literal["sweep"] = Field(default="sweep", description="back and forth between two angles")
     limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]] = Field(
         description="the two ends, from where the index marks meet"
     )
@@ -78,7 +78,7 @@ class Sweep(Record):
 
     @property
     def cruise_deg_s(self) -> float:
-        """Speed between speeding up and braking: `v (T / 2 - v / a) = range`."""
+        """Speed between acceleration and braking: `v (T / 2 - v / a) = range`."""
         half, a = self.period_s / 2, self.accel_deg_s2
         span = self.limits_deg[1] - self.limits_deg[0]
         # the smaller root, written so that a short range in a long time does not cancel
@@ -86,11 +86,11 @@ class Sweep(Record):
 
     @property
     def ramp_s(self) -> float:
-        """Time to speed up, and to brake."""
+        """Time of acceleration, and of braking."""
         return self.cruise_deg_s / self.accel_deg_s2
 
     def angle_rad(self, time_s: ArrayLike) -> Array:
-        """Joint angle at times since the start at the lower limit; it repeats after `period_s`."""
+        """Return the joint angle [rad] at times since the start at the lower limit; it repeats after `period_s`."""
         half = self.period_s / 2
         phase = np.mod(np.asarray(time_s, dtype=float), self.period_s)
         t = np.where(phase <= half, phase, self.period_s - phase)
@@ -101,7 +101,7 @@ class Sweep(Record):
         return np.asarray(np.radians(np.where(t > half - ramp, upper - a * (half - t) ** 2 / 2, degrees)))
 
     def time_s(self, angle_rad: ArrayLike) -> Array:
-        """Time at which the way out passes joint angles; those outside the limits count as the nearer limit."""
+        """Return the time [s] at which the first half of the sweep passes joint angles, clipped to the limits."""
         half = self.period_s / 2
         v, a, ramp = self.cruise_deg_s, self.accel_deg_s2, self.ramp_s
         lower, upper = self.limits_deg
@@ -114,7 +114,7 @@ class Sweep(Record):
 
 
 class StopAndGo(Record):
-    """Stop at evenly spread angles of a full turn, measure for a while, go on: no de-skew needed."""
+    """Stop at evenly spaced angles of a full turn to measure: no de-skew needed."""
 
     mode: Literal["stop_and_go"] = Field(default="stop_and_go", description="stand still while the lidar measures")
     stops: int = Field(strict=True, ge=1, le=100_000, description="in one full turn")

@@ -1,4 +1,4 @@
-"""One scanner: an angle set and the products it is made of. What `cad` builds and the report describes."""
+"""One scanner: an angle set and its products. `cad` builds it and the report describes it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from scanwright.design.files.record import Record
 
 
 class Modules(Record):
-    """Parts that a scanner works without, and that a task may ask for."""
+    """Optional parts that a task can require."""
 
     tripod_foot: bool = Field(
         default=False, strict=True, description="a plate under the mount with a nut 1/4-20 for a tripod"
@@ -25,7 +25,7 @@ class Modules(Record):
     @model_validator(mode="before")
     @classmethod
     def _without_removed(cls, table: Any) -> Any:
-        """The resolved tasks of version 0.1 say `false` for modules that are no longer there."""
+        """Accept `false` for modules of version 0.1 that version 0.2 does not have."""
         if not isinstance(table, dict):
             return table
         return {key: value for key, value in table.items() if value is not False or removal(key) is None}
@@ -36,13 +36,13 @@ NO_MODULES = Modules()
 
 @dataclass(frozen=True, slots=True)
 class Scanner:
-    """Angles with their products; `slip_ring` is None where the motion needs none.
+    """Angles with their products; `slip_ring` is None if the motion needs none.
 
     Attributes:
-        bearings: those that a tilted axis may choose from, smallest bore first.
-        belts: those that a capsule ring's scanner may choose from, the narrowest first.
-        deck: holes that the base mount is screwed to; None where the mount may choose them.
-        modules: what else was asked for.
+        bearings: candidates for a tilted axis, smallest bore first.
+        belts: candidates for a scanner with a capsule ring, the narrowest first.
+        deck: holes for the base mount; None if the mount can choose them.
+        modules: optional parts.
     """
 
     angles: AngleSet
@@ -63,7 +63,7 @@ def scanner_of(
     deck: Rectangle | Circle | None = None,
     modules: Modules = NO_MODULES,
 ) -> Scanner:
-    """Look up the products that an angle set names.
+    """Look up the products of an angle set.
 
     Raises:
         TaskError: a product is not in the catalogue.

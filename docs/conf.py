@@ -8,6 +8,7 @@ page) and there is no such thing, the build fails.
 from __future__ import annotations
 
 import re
+import sys
 from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
@@ -16,6 +17,9 @@ from typing import Any
 from scanwright import __version__
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(Path(__file__).parent))
+from schema_pages import write_schema_pages  # noqa: E402  beside this file, which is no package
+
 FOLDERS = ("scanwright", "design", "cad", "firmware_io")
 OURS = re.compile(r"scanwright(\.[A-Za-z_]\w*)+")
 SHORT = re.compile(r"(?<=`)(?=(design|cad|firmware_io)\.[a-z_])")  # docstrings leave the name of the package out
@@ -84,6 +88,11 @@ def describe_commands(app: Any) -> None:
     (folder / "commands.md").write_text("\n".join(page))
 
 
+def describe_files(app: Any) -> None:
+    """Write the pages of task and product files from their schemas."""
+    write_schema_pages(Path(app.srcdir) / "reference/files")
+
+
 def name_rooms(_app: Any, page: str, source: list[str]) -> None:
     """A room is called by its name, not "package"; its modules follow without a heading over them."""
     if page.startswith("reference/"):
@@ -133,6 +142,7 @@ def setup(app: Any) -> None:
         import_module(heavy)  # once: Sphinx forks its readers
     app.connect("source-read", name_rooms)
     app.connect("builder-inited", describe_commands)
+    app.connect("builder-inited", describe_files)
     app.connect("autodoc-process-docstring", named_in_full)
     app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500
     app.connect("missing-reference", points_nowhere)

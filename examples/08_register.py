@@ -42,7 +42,7 @@ def main() -> None:
 
     found = sw.register([folder / f"{name}.ply" for name in STANDS], folder / "map.ply")
     print("\n".join(found.lines()))
-    error = np.linalg.inv(STANDS["second"]) @ found.found.T_world[1]
+    error = np.linalg.inv(STANDS["second"]) @ found.registration.T_world[1]
     print(f"off by {1000 * np.linalg.norm(error[:3, 3]):.2f} mm and {np.degrees(abs(error[1, 0])):.4f} deg")
 
 

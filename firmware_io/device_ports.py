@@ -1,4 +1,4 @@
-"""Where the devices are: the ports of an emulated scanner, or of the hardware that is plugged in."""
+"""Ports of the devices: of an emulated scanner, or of the hardware that is plugged in."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from serial.tools import list_ports
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.errors import DeviceError
-from scanwright.design.files.atomic_file import place_in, whole_file
+from scanwright.design.files.atomic_file import atomic_write, place_in
 
 _FILE = "emulated.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """Addresses of the two devices, as `open_lidar` and `open_servo` take them; `pid` is who emulates them, or 0."""
+    """Addresses of the two devices; `pid` is the process that emulates them, or 0."""
 
     lidar: str
     servo: str
@@ -30,7 +30,7 @@ class Ports:
 
 @contextmanager
 def announced(out: Path, ports: Ports) -> Iterator[None]:
-    """Leave the ports of an emulated scanner in its build folder, so that `scan` finds them; take them away after.
+    """Write the ports of an emulated scanner to its build folder while the body runs, so that `scan` finds them.
 
     Raises:
         DeviceError: the folder cannot be written, or this scanner is being emulated already.
@@ -39,7 +39,7 @@ def announced(out: Path, ports: Ports) -> Iterator[None]:
     if running is not None:
         raise DeviceError(f"{out}: process {running.pid} emulates this scanner already: stop it first")
     file = place_in(out, _FILE, DeviceError)
-    with whole_file(file, DeviceError) as part:
+    with atomic_write(file, DeviceError) as part:
         part.write_text(json.dumps(asdict(ports), indent=2) + "\n", encoding="utf-8")
     try:
         yield
@@ -48,39 +48,45 @@ def announced(out: Path, ports: Ports) -> Iterator[None]:
 
 
 def emulated(out: Path) -> Ports | None:
-    """Ports of the emulated scanner of this folder; None where nobody emulates it now."""
+    """Return the ports of the emulated scanner of this folder; None if it is not emulated now."""
     try:
-        found = Ports(**json.loads((out / _FILE).read_text(encoding="utf-8")))
-        if not (isinstance(found.lidar, str) and isinstance(found.servo, str)):
+        ports = Ports(**json.loads((out / _FILE).read_text(encoding="utf-8")))
+        if not (isinstance(ports.lidar, str) and isinstance(ports.servo, str)):
             return None
-        os.kill(found.pid, 0)
-    except (OSError, ValueError, TypeError, OverflowError, RecursionError):  # none, another program's, or its is gone
+        os.kill(ports.pid, 0)
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        OverflowError,
+        RecursionError,
+    ):  # no file, or of another program or an ended one
         return None
-    return found
+    return ports
 
 
 def lidar_ports() -> list[str]:
-    """Serial ports that are plugged in and, by their USB ids, those of a lidar of the catalogue."""
+    """Return the serial ports with the USB id of a lidar of the catalogue."""
     return _plugged(Lidar)
 
 
 def servo_ports() -> list[str]:
-    """Serial ports that are plugged in and, by their USB ids, adapters of a servo of the catalogue."""
+    """Return the serial ports with the USB id of an adapter of a servo of the catalogue."""
     return _plugged(Servo)
 
 
 def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
-    """The ports that were named, else those of the emulated scanner, else the only ones that are plugged in.
+    """Return the ports that are given, else those of the emulated scanner, else the only ones that are plugged in.
 
     Raises:
-        DeviceError: a port is not named, and not one but none or several could be meant.
+        DeviceError: a port is not given, and none or several could be meant.
     """
-    twins = emulated(out)
-    if twins is not None and lidar is None and servo is None:
-        return twins
+    emulators = emulated(out)
+    if emulators is not None and lidar is None and servo is None:
+        return emulators
     return Ports(
-        lidar=lidar or _only("--lidar", "lidar", lidar_ports()),
-        servo=servo or _only("--servo", "serial adapter of a servo", servo_ports()),
+        lidar=lidar or _only("lidar", lidar_ports()),
+        servo=servo or _only("servo", servo_ports()),
     )
 
 
@@ -90,8 +96,8 @@ def _plugged(kind: type[Lidar] | type[Servo]) -> list[str]:
     return sorted(port.device for port in plugged if f"{port.vid:04x}:{port.pid:04x}" in known)
 
 
-def _only(option: str, what: str, found: list[str]) -> str:
-    if len(found) == 1:
-        return found[0]
-    seen = f"found {', '.join(found)}" if found else "found none"
-    raise DeviceError(f"{option}: which {what}? {seen}; name it, or run `scanwright emulate` for one without hardware")
+def _only(field: str, ports: list[str]) -> str:
+    if len(ports) == 1:
+        return ports[0]
+    number = f"{len(ports)} ports could be meant: {', '.join(ports)}" if ports else "no port with a known USB id"
+    raise DeviceError(f"{field}: {number}; name the port, or run `scanwright emulate` to work without hardware")

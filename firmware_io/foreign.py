@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.text_files import first_line
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -24,9 +25,9 @@ def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) 
     except RecordingError:
         raise
     except OSError as error:
-        raise RecordingError(f"{what}: {error.strerror or _first_line(error)}") from error
+        raise RecordingError(f"{what}: {error.strerror or first_line(error)}") from error
     except Exception as error:
-        raise RecordingError(f"{what}: {_first_line(error)}") from error
+        raise RecordingError(f"{what}: {first_line(error)}") from error
 
 
 @contextmanager
@@ -47,8 +48,8 @@ def of_file(path: Path) -> Iterator[None]:
 def foreign_items(what: str, items: Iterable[T]) -> Iterator[T]:
     """Pass on what a foreign reader yields; only the reader's own failures become RecordingError, not the caller's."""
     iterator = foreign(what, iter, items)
-    while found := foreign(what, _next, iterator):
-        yield from found
+    while item := foreign(what, _next, iterator):
+        yield from item
 
 
 def _next(iterator: Iterator[T]) -> tuple[T] | tuple[()]:
@@ -56,8 +57,3 @@ def _next(iterator: Iterator[T]) -> tuple[T] | tuple[()]:
     for item in iterator:
         return (item,)
     return ()
-
-
-def _first_line(error: Exception) -> str:
-    text = str(error).strip() or type(error).__name__
-    return text.splitlines()[0]

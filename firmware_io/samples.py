@@ -206,8 +206,8 @@ class JointLog:
         # Epoch nanoseconds do not fit a float64 (they lose 256 ns), differences do.
         origin_ns = self.time_ns[near][0]
         known_ns = (self.time_ns[near] - origin_ns).astype(float)
-        asked_ns = (time_ns - origin_ns).astype(float)
-        return np.interp(asked_ns, known_ns, self.position_rad[near], left=np.nan, right=np.nan)
+        since_ns = (time_ns - origin_ns).astype(float)
+        return np.interp(since_ns, known_ns, self.position_rad[near], left=np.nan, right=np.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

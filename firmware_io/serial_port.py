@@ -53,7 +53,7 @@ def latency_timer(port: str) -> Path | None:
 def _why_not_opened(port: str, error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:
-        there = ", ".join(sorted(found.device for found in comports())) or "none"
+        there = ", ".join(sorted(other.device for other in comports())) or "none"
         return f"{port}: no such port; serial ports here: {there}"
     if number in (errno.EACCES, errno.EPERM):
         return f"{port}: you may not open it; become a member of its group (often 'dialout'), then log in again"

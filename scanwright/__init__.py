@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from scanwright.design.errors import DeviceFaultError as DeviceFaultError
     from scanwright.design.errors import DeviceTimeoutError as DeviceTimeoutError
     from scanwright.design.errors import InstallError as InstallError
+    from scanwright.design.errors import MissingFileError as MissingFileError
     from scanwright.design.errors import NumericalError as NumericalError
     from scanwright.design.errors import ProtocolError as ProtocolError
     from scanwright.design.errors import RecordingError as RecordingError
@@ -81,6 +82,7 @@ _TYPES = {
     "DeviceFaultError": "scanwright.design.errors",
     "DeviceTimeoutError": "scanwright.design.errors",
     "InstallError": "scanwright.design.errors",
+    "MissingFileError": "scanwright.design.errors",
     "NumericalError": "scanwright.design.errors",
     "ProtocolError": "scanwright.design.errors",
     "RecordingError": "scanwright.design.errors",
@@ -127,6 +129,7 @@ __all__ = [
     "LidarDriver",
     "LoadedTask",
     "MapSummary",
+    "MissingFileError",
     "NumericalError",
     "Optimum",
     "ProtocolError",

@@ -33,7 +33,7 @@ from scanwright.design.objective.counted import Counted, counted_J
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.self_check import require_counted
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import load_task, shipped_tasks
 
 SMALL_ERROR = 1e-3  # what most scores state at the default
@@ -117,7 +117,7 @@ def random_claim(
     checked = perf_counter()
     if found is not None:
         try:
-            shadow = None if drawn.beams.all() else Shadow(~drawn.beams, None)
+            shadow = None if drawn.beams.all() else SelfOcclusion(~drawn.beams, None)
             require_counted(drawn.loaded, drawn.angles_rad, found, shadow)
         except ScanwrightError as error:
             alarm = str(error)

@@ -36,7 +36,7 @@ from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.density_sphere import density_sphere
@@ -95,13 +95,13 @@ def shown_task(rng: np.random.Generator, folder: Path) -> RandomTask:
     return replace(drawn, loaded=replace(drawn.loaded, task=task))
 
 
-def _shadow(drawn: RandomTask) -> Shadow | None:
+def _shadow(drawn: RandomTask) -> SelfOcclusion | None:
     """Beams that are missing as parts that turn with the laser, and a part that stands still before some others."""
     if drawn.beams.all():
         return None
     stator = np.zeros((len(drawn.beams), AXIS_STEPS), dtype=bool)
     stator[: len(drawn.beams) // 4, : AXIS_STEPS // 8] = True
-    return Shadow(~drawn.beams, stator)
+    return SelfOcclusion(~drawn.beams, stator)
 
 
 def _evaluate(drawn: RandomTask, _: Path) -> None:

@@ -123,7 +123,7 @@ def time_offset(beams: int, speeds_deg_s: tuple[float, ...]) -> None:
         k = [p.name for p in PARAMETERS].index(name)
         one = PARAMETERS[k]
         if k not in found.choice.free:
-            print(f"  {one.words:16} held: {next(held.why for held in found.choice.held if name in held.names)}")
+            print(f"  {one.words:16} held: {next(fixed.why for fixed in found.choice.fixed if name in fixed.names)}")
             continue
         at = found.choice.free.tolist().index(k)
         off = (found.x[k] - getattr(truth, name)) * one.shown

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from scanwright.design import frames
 from scanwright.design.arrays import Floats
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.ply import read_ply
 
 _WIDTH_IN = 11.0
@@ -71,7 +71,7 @@ def cloud_picture(ply: Path, png: Path) -> None:
     panels[0, 1].set(title="the middle, from behind and above", xticks=[], yticks=[])
     panels[0, 1].set_frame_on(False)
     figure.suptitle(f"{ply.name}: {total:,} points, the cross is the world's origin, colour is height", fontsize=11)
-    with whole_file(png, RecordingError) as part:
+    with atomic_write(png, RecordingError) as part:
         figure.savefig(part, format="png", metadata={"Software": None})
 
 

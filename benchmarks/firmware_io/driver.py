@@ -63,16 +63,17 @@ def _drive(out: Path, seconds: float) -> None:
     plan = replace(plan_scan(out, turns=turns), intensity=True)
     readings: list[_Reading] = []
 
-    def say(line: str) -> None:
-        if line[:4].strip().endswith("%"):  # once a second, while it records
+    def progress(_step: str, fraction: float | None = None) -> None:
+        if fraction is not None:  # once a second, while it records
             readings.append(_Reading.now())
 
-    summary = acquire.acquire(plan, say)
+    summary = acquire.acquire(plan, progress)
     settled = [one for one in readings if one.wall_s - readings[0].wall_s >= min(_SETTLED_S, seconds / 2)]
     first, last = settled[0], settled[-1]
     share = (last.processor_s - first.processor_s) / (last.wall_s - first.wall_s)
     rate_hz = summary.scans / summary.duration_s
-    asked_hz = (summary.joint_samples + summary.left_out.get("servo angles of uncertain time", 0)) / summary.duration_s
+    uncertain = summary.left_out.get("servo angles with uncertain timestamp", 0)
+    asked_hz = (summary.joint_samples + uncertain) / summary.duration_s
     print(f"{summary.duration_s:.0f} s of {rate_hz:.1f} scans/s with intensities and {asked_hz:.0f} servo reads/s:")
     print(f"  {share:.1%} of one core over the last {last.wall_s - first.wall_s:.0f} s")
     print(f"  memory {first.memory_bytes / 1e6:.1f} MB, then {last.memory_bytes / 1e6:.1f} MB at the end")

@@ -136,13 +136,13 @@ def inside(out: Path, twins: EmulatedScanner, fault: Fault) -> Outcome:
 
     timer = Timer(AFTER_S, strike)
 
-    def say(line: str) -> None:
-        if line.startswith("recording"):
+    def progress(step: str, fraction: float | None = None) -> None:
+        if step.startswith("recording") and fraction is None:
             timer.start()
 
     plan = plan_scan(out, turns=3, lidar=twins.ports.lidar, servo=twins.ports.servo)
     try:
-        acquire.acquire(plan, say)
+        acquire.acquire(plan, progress)
         ended = "goes on"
         scanned.set()
     except ScanwrightError as error:

@@ -18,6 +18,7 @@ from numba import njit
 
 from scanwright.design import frames
 from scanwright.design.arrays import Floats
+from scanwright.design.progress import no_progress
 from scanwright.firmware_io.registration.pairwise import align
 from scanwright.firmware_io.registration.register import register
 from scanwright.firmware_io.registration.sensor_view import THREADS, make_view
@@ -132,7 +133,7 @@ def main() -> None:
     boxes, stands = building()
     views = [make_view(f"{k}", scan(boxes, T, 180, 361, k), 0.15) for k, T in enumerate(stands)]
     start = time.perf_counter(), time.process_time()
-    found = register(views, [], lambda _: None)
+    found = register(views, [], no_progress)
     wall, cpu = time.perf_counter() - start[0], time.process_time() - start[1]
     drift = [distances(np.linalg.inv(stands[0]) @ T, pose) for T, pose in zip(stands, found.T_world, strict=True)]
     mm, deg = np.max(drift, axis=0)

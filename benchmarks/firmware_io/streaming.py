@@ -129,7 +129,7 @@ def _errors(seconds: float) -> None:
             stated = _rms_mdeg(np.array([line.axis_error_rad for line in lines]))
             row += f"{f'{_rms_mdeg(off):.2f} ({stated:.2f})':>18}"
         print(row)
-    for name, curve_of in (("straight", straight), ("all of it", lambda log: axis_curve(log, held=False)[0])):
+    for name, curve_of in (("straight", straight), ("all of it", lambda log: axis_curve(log, at_rest=False)[0])):
         row = f"{name:>12}"
         for scanner in scanners:
             curve = curve_of(scanner.log)

@@ -31,7 +31,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.scene.ray_caster import build_scene
-from scanwright.design.shadow import load_own_body
+from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.firmware_io.emulators.simulated import simulated_recording
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
@@ -274,7 +274,7 @@ def section(entry: Entry, folder: Path) -> str:
     """Its part of the page."""
     loaded, angles = load_task(folder / "task.toml"), sw.load_angles(folder / "angles.json")
     problem = problem_as_built(loaded, angles)
-    shadow = load_own_body(folder / "own_body.npz")[0]
+    shadow = load_self_occlusion(folder / "own_body.npz")[0]
     planes = on_planes(loaded, problem, mounting_rad(angles), shadow)
     said = sentences(angles, answer(loaded, angles, shadow), 2 * float(np.tan(problem.ball_rad)), planes)
     found = angles.angles_deg

@@ -20,7 +20,7 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 from scanwright.design.scene import ray_caster
 from scanwright.design.search.with_parts import Refused
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
@@ -37,16 +37,16 @@ class PartsWorkshop:
     scanner: Scanner
     _made: dict[str, Assembly] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def bound(self, setting_rad: Array) -> Shadow | Refused:
+    def bound(self, setting_rad: Array) -> SelfOcclusion | Refused:
         """The cone that ring, bearing and cage fill in any case."""
         try:
             stack = drive_of(at_setting(self.scanner, setting_rad)).stack
         except BuildError as error:
             return Refused(str(error))
         bearings = self.scanner.lidar.bearings_rad()
-        return Shadow(beams_in_cone(stack, bearings), None)
+        return SelfOcclusion(beams_in_cone(stack, bearings), None)
 
-    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+    def shadow(self, setting_rad: Array) -> SelfOcclusion | Refused:
         """From the solids of that setting."""
         scanner = at_setting(self.scanner, setting_rad)
         try:
@@ -75,7 +75,7 @@ def triangles_of(assembly: Assembly) -> dict[str, Array]:
     return {name: mesh.vertices[mesh.faces] / 1000 for name, mesh in assembly.outlines().items() if name not in clear}
 
 
-def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Container[str]) -> Shadow:
+def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Container[str]) -> SelfOcclusion:
     """What the parts of one scanner hide.
 
     Args:
@@ -88,7 +88,7 @@ def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Conta
         by_motion[name in turning].append(triangles)
     origins, directions = bundles(scanner)
     rotor = _hidden(ray_caster.build_scene(np.concatenate(by_motion[True])), origins, directions)
-    return Shadow(rotor, _stator(np.concatenate(by_motion[False]), origins, directions))
+    return SelfOcclusion(rotor, _stator(np.concatenate(by_motion[False]), origins, directions))
 
 
 def bundles(scanner: Scanner) -> tuple[Array, Array]:

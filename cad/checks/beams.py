@@ -13,13 +13,13 @@ from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.scanner import Scanner
 from scanwright.design.scene import ray_caster
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 
 OWN_LIMIT_DEG = 2.0  # of the fan that the linkage may hide beyond servo, ring and shaft
 
 
 def beam_checks(
-    scanner: Scanner, shadow: Shadow, triangles_m: Mapping[str, Array], carriers: Collection[str]
+    scanner: Scanner, shadow: SelfOcclusion, triangles_m: Mapping[str, Array], carriers: Collection[str]
 ) -> list[Check]:
     """Which beams are hidden, and by whom.
 

@@ -24,11 +24,11 @@ from scanwright.cad.checks.rotor_leads import lead_checks, standing_checks
 from scanwright.cad.layout.names import RING
 from scanwright.design.catalogue.products import Product
 from scanwright.design.electrics.cautions import data_fault
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
-from scanwright.design.shadow import Shadow, own_body_bytes
+from scanwright.design.self_occlusion import SelfOcclusion, self_occlusion_bytes
 
 Say = Callable[[str], None]
 
@@ -42,7 +42,7 @@ def check_files(scanner: Scanner, assembly: Assembly, progress: Say) -> dict[str
         progress: called with a line of text before each step.
     """
     checks, shadow = run_checks(scanner, assembly, progress)
-    own_body = own_body_bytes(shadow, scanner.lidar.bearings_rad())
+    own_body = self_occlusion_bytes(shadow, scanner.lidar.bearings_rad())
     return {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body}
 
 
@@ -56,7 +56,7 @@ def check_scanner(scanner: Scanner, progress: Say) -> list[Check]:
     return run_checks(scanner, make_parts(scanner), progress)[0]
 
 
-def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Check], Shadow]:
+def run_checks(scanner: Scanner, assembly: Assembly, progress: Say) -> tuple[list[Check], SelfOcclusion]:
     """Checks and shadow."""
     progress("casting the beams")
     layout, meshes = assembly.layout, assembly.meshes()
@@ -131,8 +131,8 @@ def electric_checks(scanner: Scanner) -> list[Check]:
     """Every broken rule of the wiring, or one word that it keeps them; and what the catalogue does not know of it."""
     network = network_of(scanner)
     faults = [
-        Check("wiring", "error", None, None, "", fault.where, f"{fault.where}: {fault.message}")
-        for fault in broken_rules(network)
+        Check("wiring", "error", None, None, "", fault.subject, f"{fault.subject}: {fault.message}")
+        for fault in check_network(network)
     ]
     kept = (
         f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "

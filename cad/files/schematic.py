@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 from scanwright.design.electrics.network import Box, Network, Wire
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 
 ROW = 22.0  # from pin to pin
 LINE = 15.0  # from line to line of text in a box
@@ -118,7 +118,7 @@ def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int
 
 def _warnings(network: Network, width: float) -> list[str]:
     """Lines of the cautions, and of broken rules before them, as wide as the sheet."""
-    broken = [f"DO NOT BUILD THIS: {fault.where}: {fault.message}." for fault in broken_rules(network)]
+    broken = [f"DO NOT BUILD THIS: {fault.subject}: {fault.message}." for fault in check_network(network)]
     cautions = [f"CAUTION: {caution}" for caution in network.cautions]
     return [
         line

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from scanwright.cad.files.schematic import schematic_svg
 from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
 from scanwright.design.electrics.network import Network
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.sizing import OVER_PEAK
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
@@ -42,7 +42,7 @@ def wiring_text(network: Network, title: str) -> str:
     """The words: paragraphs and lists, no tables, so that the report shows the same."""
     blocks = [f"# {title}"]
     for heading, lines in (
-        ("Do not build this wiring", [f"- {fault.where}: {fault.message}" for fault in broken_rules(network)]),
+        ("Do not build this wiring", [f"- {fault.subject}: {fault.message}" for fault in check_network(network)]),
         ("Caution", [*(f"- {caution}" for caution in network.cautions), GROUND]),
         ("Power", list(_power(network))),
         ("Slip ring", list(_ring(network))),
@@ -60,10 +60,10 @@ def wiring_text(network: Network, title: str) -> str:
 def _power(network: Network) -> Iterator[str]:
     for branch in network.branches:
         yield (
-            f"- {branch.name}, {branch.feeds}: {branch.lasting_a:.2g} A lasting, {branch.peak_a:.2g} A at most, fuse "
-            f"{branch.fuse_a:g} A, wires {branch.mm2:g} mm²"
+            f"- {branch.name}, {branch.feeds}: {branch.continuous_a:.2g} A lasting, {branch.peak_a:.2g} A at most, "
+            f"fuse {branch.fuse_a:g} A, wires {branch.mm2:g} mm²"
         )
-    lasting, peak = (sum(getattr(branch, name) for branch in network.branches) for name in ("lasting_a", "peak_a"))
+    lasting, peak = (sum(getattr(branch, name) for branch in network.branches) for name in ("continuous_a", "peak_a"))
     yield (
         f"- all at 12 V: {lasting:.2g} A lasting ({12 * lasting:.0f} W), {peak:.2g} A at most ({12 * peak:.0f} W); "
         f"supply {network.supply_a:g} A"

@@ -1,1 +1,1 @@
-"""Error against run time of every way to compute J, and stiff and extreme cases."""
+"""Error against run time of every method to compute J, and stiff and extreme cases."""

@@ -1,4 +1,4 @@
-"""Who is beaten by whom: a row is dominated where another one is nowhere worse and somewhere better."""
+"""Pareto dominance: a row is dominated if another one is worse in no column and better in at least one."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from numpy import ndarray
 
 
 def dominators(costs: Num[ndarray, "n columns"], cost: Num[ndarray, " columns"]) -> Bool[ndarray, " n"]:
-    """Which rows (n, columns) dominate one of shape (columns,), lower being better: bool (n,)."""
+    """Return which rows (n, columns) dominate one of shape (columns,); lower is better. Shape (n,)."""
     return np.asarray((costs <= cost).all(axis=1) & (costs < cost).any(axis=1))
 
 
 def undominated(costs: Num[ndarray, "n columns"]) -> Bool[ndarray, " n"]:
-    """Which of the rows (n, columns) are dominated by none: bool (n,)."""
+    """Return which of the rows (n, columns) no other row dominates, shape (n,)."""
     return np.array([not dominators(costs, cost).any() for cost in costs], dtype=bool)

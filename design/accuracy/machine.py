@@ -1,19 +1,19 @@
-"""What run times were measured on, in one line: a time without its machine says nothing."""
+"""The machine of a run time, in one line."""
 
 from __future__ import annotations
 
-import os
 import platform
 from pathlib import Path
+
+from scanwright.design.concurrency.processes import cores
 
 CPUINFO = Path("/proc/cpuinfo")
 
 
 def this_machine() -> str:
-    """Processor, cores that may be used, system and Python."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    """Return processor, usable cores, system and Python."""
     system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
-    return f"{_processor()}, {cores} cores, {system}"
+    return f"{_processor()}, {cores()} cores, {system}"
 
 
 def _processor() -> str:

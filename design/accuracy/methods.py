@@ -1,7 +1,7 @@
-"""Every way to compute J, for any objective: contestants of the work-precision diagram, each with the knob it has.
+"""Every method to compute J, for any objective, for the work-precision diagram; each has one parameter.
 
-Each is a function (problem, angles, knob) -> J. Those of a scanner that turns all around take circles about its axis;
-those of one that sweeps take directions.
+Each is a function (problem, angles, parameter) -> J. Methods for full turns use circles about the axis; methods for
+sweeps use directions.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ Method = Callable[[Problem, Setting, int], float]
 
 
 def by_segments(problem: Problem, angles_rad: Setting, nodes: int) -> float:
-    """What the program uses: exact counts on nodes that gather at the ends of segments (`design.objective.score`)."""
+    """Exact counts on nodes that are dense at the ends of segments: the program's method (`design.objective.score`)."""
     return quick_J(problem, angles_rad, nodes)
 
 
 def by_mean_count(problem: Problem, angles_rad: Setting, nodes: int) -> float:
-    """As `by_segments`, with g of the mean count: the bound, which cannot see the gaps of a fast scan."""
+    """As `by_segments`, with g of the mean count: the lower bound, which ignores the gaps of a fast scan."""
 
     def moment_of(moment: Moment) -> float:
         rule, polar, _ = polar_rule(problem, angles_rad, nodes, moment.field)
@@ -46,19 +46,19 @@ def by_mean_count(problem: Problem, angles_rad: Setting, nodes: int) -> float:
 
 
 def by_rings(problem: Problem, angles_rad: Setting, rings: int) -> float:
-    """Exact counts on evenly spaced rings about the axis, no thought of edges."""
+    """Exact counts on evenly spaced rings about the axis, without regard to edges."""
     t = (np.arange(rings) + 0.5) * np.pi / rings
     return _from_rings(problem, angles_rad, t, np.sin(t))
 
 
 def by_rings_single(problem: Problem, angles_rad: Setting, rings: int) -> float:
-    """As `by_rings`, product and sum in single precision, as the search makes it."""
+    """As `by_rings`, with product and sum in single precision, as in the search."""
     t = (np.arange(rings) + 0.5) * np.pi / rings
     return _from_rings(problem, angles_rad, t, np.sin(t), np.float32)
 
 
 def by_gauss(problem: Problem, angles_rad: Setting, nodes: int) -> float:
-    """Exact counts on Gauss-Legendre nodes of the whole polar axis: best for smooth densities, which these are not."""
+    """Exact counts on Gauss-Legendre nodes of the entire polar axis: best for smooth densities, unlike these."""
     z, w = roots_legendre(nodes)
     return _from_rings(problem, angles_rad, np.arccos(z), w)
 
@@ -67,7 +67,7 @@ def by_harmonics(problem: Problem, angles_rad: Setting, band: int) -> float:
     """Zonal harmonics of density and weight up to a degree (Funk-Hecke), their coefficients from Gauss nodes.
 
     Raises:
-        TaskError: the objective asks for a lowest count, which harmonics do not have.
+        TaskError: the objective uses a lowest count, which is not a sum of harmonics.
     """
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     z, w = roots_legendre(2 * band + 2)
@@ -77,7 +77,7 @@ def by_harmonics(problem: Problem, angles_rad: Setting, band: int) -> float:
 
     def moment_of(moment: Moment) -> float:
         if moment.gathered == "highest":
-            raise TaskError("a lowest count is no sum of harmonics")
+            raise TaskError("a lowest count is not a sum of harmonics")
         of_g = basis.T @ (w * _zonal(problem, angles_rad, t, moment))
         of_weight = basis.T @ (w * moment.field.on_circles(axis, t)[0])
         return float((degrees * of_g * of_weight).sum() / (2 * of_weight[0]))
@@ -86,7 +86,7 @@ def by_harmonics(problem: Problem, angles_rad: Setting, band: int) -> float:
 
 
 def by_ball_search(problem: Problem, angles_rad: Setting, rows: int) -> float:
-    """The paper's way: a simulated scan, a KD-tree, an equal-angle grid; solid angles put right, one start phase."""
+    """The paper's method: a simulated scan, a KD-tree, an equal-angle grid; with solid angles, one start phase."""
     return _on_a_grid(problem, angles_rad, rows, ball_search)
 
 
@@ -96,7 +96,7 @@ def by_ball_count(problem: Problem, angles_rad: Setting, rows: int) -> float:
 
 
 def by_mean_count_swept(problem: Problem, angles_rad: Setting, directions: int) -> float:
-    """Directions spread over the region, with g of the mean count: the bound."""
+    """Directions spread over the region, with g of the mean count: the lower bound."""
     assert problem.sweep is not None
     lines, beams = problem.sweep, problem.beams_rot(angles_rad[2:])
 
@@ -127,12 +127,12 @@ SWEPT: dict[str, tuple[Method, str, tuple[int, ...]]] = {
 
 
 def methods_for(problem: Problem) -> dict[str, tuple[Method, str, tuple[int, ...]]]:
-    """Name -> method, what its knob turns, and the values to try."""
+    """Return by name: method, name of its parameter, and the values to try."""
     return METHODS if problem.sweep is None else SWEPT
 
 
 def _joined(problem: Problem, moment_of: Callable[[Moment], float]) -> float:
-    """J from its moments."""
+    """Return J from its moments."""
     return float(problem.objective.join(np.array([moment_of(moment) for moment in problem.objective.moments])))
 
 
@@ -142,10 +142,10 @@ def _gathered(moment: Moment, g: Float[ndarray, " n"], weight: Float[ndarray, " 
 
 
 def _zonal(problem: Problem, angles_rad: Setting, t: Float[ndarray, " n"], moment: Moment) -> Float[ndarray, " n"]:
-    """What a moment gathers at polar angles: the mean of g over the phases, or g of the least count."""
+    """Return at polar angles the mean of g over the phases, or g of the lowest count."""
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
-    found = zones(t, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
-    return moment.g(found.least) if moment.gathered == "highest" else found.mean_g
+    rings = zones(t, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
+    return moment.g(rings.least) if moment.gathered == "highest" else rings.mean_g
 
 
 def _from_rings(

@@ -1,10 +1,10 @@
-"""J to hold the ways to compute it against: by code of its own, two digits nearer than what the program uses.
+"""Reference values of J: by separate code, two digits more exact than the program.
 
-Where the axis turns all around in a whole number of lines, the polar angle is cut at every place where a beam enters
-or leaves the ball, and the smooth pieces between are integrated by Gauss-Legendre; the counts come from the law of
-cosines and an ordered list of the start phases at which a line enters or leaves, and the difference of two orders is
-the error. Only where the region's weight lies on a circle is asked of the program, and that is held to the other
-reference in the tests. Everything else (sweeps, turns with a seam, lowest counts) is drawn: `counted`.
+If the axis makes full turns with an integer number of lines, the polar angle is cut where a beam enters or leaves the
+ball, and the smooth pieces between are integrated by Gauss-Legendre. The counts come from the law of cosines and an
+ordered list of the start phases at which a line enters or leaves; the difference of two orders is the error. Only the
+weight on a circle comes from the program; tests compare it with the other reference. All other cases (sweeps, turns
+with a seam, lowest counts) are drawn at random: `design.objective.counted`.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.sphere.polar_rule import breaks_of
 from scanwright.design.task.task import LoadedTask
 
-ORDERS = 12, 20, 40, 80, 160  # of the Gauss-Legendre pieces, as many as it takes
-ENOUGH = 1e-8  # difference of two orders
-DRAWN = 2**18  # directions, of each of eight scramblings
-EVEN = 1e-9  # of a line: nearer to a whole number of them there is no seam
+ORDERS = 12, 20, 40, 80, 160  # Gauss-Legendre nodes of each piece, raised until J converges
+ENOUGH = 1e-8  # difference of J between two orders: two digits below the error of the program
+DRAWN = 2**18  # directions of each of eight shifts of the net
+EVEN = 1e-9  # lines: closer to an integer number of lines, a turn has no seam
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """J to compare with, and what it may be off by itself: the difference of two orders, or three standard errors."""
+    """Reference J and its own error: the difference of two orders, or three standard errors."""
 
     J: float
     J_error: float
 
 
 def reference(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> Reference:
-    """J of a setting; see the head of this file.
+    """Return the reference J of a setting; see the top of this file.
 
     Raises:
         TaskError: no direction has a weight.
@@ -51,7 +51,7 @@ def reference(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> Refe
 
 
 def is_smooth(problem: Problem) -> bool:
-    """Whether J is a sum of integrals over smooth pieces: whole turns without a seam, and means."""
+    """Return whether J is a sum of integrals over smooth pieces: full turns without a seam, and means."""
     lines = problem.lines
     even = abs(2 * np.pi / lines.step_rad - lines.count) < EVEN * lines.count
     means = all(moment.gathered == "mean" for moment in problem.objective.moments)
@@ -59,7 +59,7 @@ def is_smooth(problem: Problem) -> bool:
 
 
 def smooth_reference(problem: Problem, angles_rad: Setting) -> Reference:
-    """J from smooth pieces, for a problem that `is_smooth`."""
+    """Return J from smooth pieces, for a problem that `is_smooth`."""
     axis = Rotation.from_euler("XY", angles_rad[:2]).as_matrix()[:, 2]
     bearings = problem.bearings_rad
     in_laser = np.stack([np.cos(bearings), np.sin(bearings), 0 * bearings], axis=1)
@@ -83,7 +83,7 @@ def smooth_reference(problem: Problem, angles_rad: Setting) -> Reference:
 
 
 def smooth_pieces(breaks: Float[ndarray, " n"], order: int) -> tuple[Array, Array]:
-    """Gauss-Legendre nodes between each two breaks, with their widths, for pieces that end in square roots."""
+    """Return Gauss-Legendre nodes between each two breaks and their widths, for pieces that end in square roots."""
     x, w = roots_legendre(order)
     s = (x + 1) * np.pi / 2  # t = a + (b - a) sin^2(s / 2): square roots at both ends become smooth
     a, b = breaks[:-1, None], breaks[1:, None]
@@ -93,10 +93,10 @@ def smooth_pieces(breaks: Float[ndarray, " n"], order: int) -> tuple[Array, Arra
 
 @njit(cache=True)
 def mean_over_phases(t: Array, polar: Array, azimuth: Array, lines: int, ball: float, g: Array) -> Array:
-    """Mean over the start phase of g of the count at polar angles (n,), for lines that share a turn evenly.
+    """Return the mean over the start phase of g of the count at polar angles (n,), for evenly spaced lines of a turn.
 
-    From one line to the next every phase comes once: within it the count rises by one where the foremost line of a
-    beam enters its window, and falls by one where the hindmost leaves.
+    Every phase occurs once between one line and the next: the count rises by one where the foremost line of a beam
+    enters its window, and falls by one where the last one leaves.
     """
     means = np.zeros(len(t))
     step = 2 * np.pi / lines

@@ -1,8 +1,8 @@
-"""The accuracy report on disk: work-precision diagram, its table, and the stress table."""
+"""The files of the accuracy report: work-precision diagram, its table, and the stress table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,12 +18,13 @@ from scanwright.design.evaluation.picture_files import save_picture
 from scanwright.design.motion import Shortest
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.stated_error import error_words
+from scanwright.design.progress import Progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import LoadedTask
 
 
 def write_method_points(path: Path, measured: MethodsMeasured) -> None:
-    """One row per method and setting; empty cells where there is no answer, and why in `failed`."""
+    """Write one row per method and parameter; cells are empty if it failed, with the reason in `failed`."""
     header = "method setting J J_error J_error_median argmin_error_deg seconds_median seconds_min seconds_max peak_MB"
     rows = []
     for point, front in zip(measured.points, best_points(measured.points, measured.floor), strict=True):
@@ -37,13 +38,13 @@ def write_method_points(path: Path, measured: MethodsMeasured) -> None:
 
 
 def write_rows(path: Path, rows: list[StressRow]) -> None:
-    """The stress table."""
+    """Write the stress table."""
     header = ["case", "quantity", "expected", "got", "error", "allowed", "passed"]
     write_table(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
 
 
 def work_precision_picture(path: Path, measured: MethodsMeasured, title: str) -> None:
-    """Worst error against median seconds, both logarithmic, one curve per method; a thin line down to the median."""
+    """Draw the worst error against median seconds, one curve per method; a thin line goes down to the median."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     axis = figure.subplots()
     floor, points = max(measured.floor, 1e-16), measured.points
@@ -62,36 +63,32 @@ def work_precision_picture(path: Path, measured: MethodsMeasured, title: str) ->
     for method in methods:
         if failed := next((p.failed for p in points if p.method == method and p.failed), ""):
             axis.plot([], [], " ", label=f"{method}: {failed}")
+    count = len(measured.truths)
+    label = "error of J" if count == 1 else f"error of J, the worst of {count} settings (thin: to the median)"
     axis.axhline(floor, color="#888888", linestyle=":", linewidth=1)
     axis.annotate("error of the reference", (1, floor), xycoords=("axes fraction", "data"), ha="right", va="bottom")
-    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=_whose_error(len(measured.truths)))
+    axis.set(xscale="log", yscale="log", xlabel="run time, median [s]", ylabel=label)
     axis.grid(which="major", color="#dddddd", linewidth=0.6)
     axis.legend(fontsize=8)
     axis.set_title(f"{title}\n{this_machine()}", fontsize=10)
     save_picture(figure, path)
 
 
-def _whose_error(settings: int) -> str:
-    return "error of J" if settings == 1 else f"error of J, the worst of {settings} settings (thin: to the median)"
-
-
 @dataclass(frozen=True, slots=True)
 class StressReport:
-    """What became of the stiff and extreme cases, in words, and whether all are within what is allowed."""
+    """Results of the stiff and extreme cases as lines, and whether all passed."""
 
     lines: tuple[str, ...]
     passed: bool
 
 
-def report_stress(
-    loaded: LoadedTask, folder: Path, say: Callable[[str], None], more: Iterable[StressRow] = ()
-) -> StressReport:
-    """Run the stiff and extreme cases on a task, `more` of other rooms beside them, and write `stress.csv`.
+def report_stress(loaded: LoadedTask, folder: Path, progress: Progress, more: Iterable[StressRow] = ()) -> StressReport:
+    """Run the stiff and extreme cases on a task, add the rows `more`, and write `stress.csv`.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    say("stiff and extreme cases")
+    progress("stiff and extreme cases")
     loaded = as_turning(loaded)
     rows = [*stress_rows(loaded, problem_of(loaded)), *more]
     folder.mkdir(parents=True, exist_ok=True)
@@ -102,18 +99,18 @@ def report_stress(
         f"off by {row.error:.1e}"
         for row in rows
     ]
-    end = f"{len(rows) - failed} of {len(rows)} within what is allowed; wrote {folder / 'stress.csv'}"
+    end = f"{len(rows) - failed} of {len(rows)} passed; wrote {folder / 'stress.csv'}"
     return StressReport((*lines, end), failed == 0)
 
 
-def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> list[str]:
-    """Measure every way to compute J at the optimum of a task, write `work_precision.csv` and `.png`; in words.
+def report_precision(loaded: LoadedTask, folder: Path, progress: Progress) -> list[str]:
+    """Measure every method to compute J at the optimum of a task; write `work_precision.csv` and `.png`; return lines.
 
     Raises:
-        TaskError: no direction has a weight, or no setting keeps the limits.
+        TaskError: no direction has a weight, or no setting meets the limits.
     """
-    optimum = find_optimum(loaded, say)
-    measured = measure_methods(loaded, optimum.problem, optimum.search.best[0].angles_rad, say)
+    optimum = find_optimum(loaded, progress)
+    measured = measure_methods(loaded, optimum.problem, optimum.search.best[0].angles_rad, progress)
     points, truth = measured.points, measured.truths[0]
     folder.mkdir(parents=True, exist_ok=True)
     write_method_points(folder / "work_precision.csv", measured)
@@ -131,11 +128,11 @@ def report_precision(loaded: LoadedTask, folder: Path, say: Callable[[str], None
     return [*lines, f"= chosen, * nothing is both faster and nearer; wrote work_precision.csv and .png to {folder}"]
 
 
-def report_search(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> list[str]:
-    """Measure what a search spends and gains, write `search.csv` and `search.png`; in words.
+def report_search(loaded: LoadedTask, folder: Path, progress: Progress) -> list[str]:
+    """Measure cost and result of a search; write `search.csv` and `search.png`; return lines.
 
     Raises:
-        TaskError: no setting keeps the limits, of which a period is to be found.
+        TaskError: the period is to be found, and no setting meets the limits.
     """
-    asked = find_optimum(loaded, say).loaded if isinstance(loaded.task.motion, Shortest) else loaded
-    return report_trials(list(search_trials(asked, say)), folder, "search")
+    fixed = find_optimum(loaded, progress).loaded if isinstance(loaded.task.motion, Shortest) else loaded
+    return report_trials(list(search_trials(fixed, progress)), folder, "search")

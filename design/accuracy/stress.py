@@ -1,7 +1,7 @@
-"""Stiff and extreme cases with an answer known beforehand: what was expected, what came out, how far apart.
+"""Stiff and extreme cases with a known result: expected value, computed value, error.
 
-Most expectations are one law: however the beams lie, the mean count integrates over the sphere to beams times lines
-times the share of the sphere that a ball covers.
+Most cases test one law: for any beams, the integral of the mean count over the sphere is beams times lines times the
+area of a ball on the sphere.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from scanwright.design.sphere.regions import field_of
 from scanwright.design.task.shapes import AllRegion
 from scanwright.design.task.task import LoadedTask, Task
 
-PIECE_NODES = 8
-HALF_TURN = np.pi
+PIECE_NODES = 8  # Gauss-Legendre nodes of a smooth piece
+HALF_TURN_RAD = np.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +42,12 @@ class StressRow:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within what is allowed; NaN never is."""
+        """Whether the error is at most `allowed`; never for NaN."""
         return bool(self.error <= self.allowed)
 
 
 def as_turning(loaded: LoadedTask) -> LoadedTask:
-    """The task with the objective `log` and an axis that turns all around: the laws below are those of its beams."""
+    """Return the task with the objective `log` and full turns of the axis, which the laws below assume."""
     task = loaded.task
     density = task.density.model_copy(update={"objective": "log"})
     motion = Spin(period_s=task.motion.period_s) if isinstance(task.motion, Sweep) else task.motion
@@ -55,7 +55,7 @@ def as_turning(loaded: LoadedTask) -> LoadedTask:
 
 
 def stress_rows(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """All cases, with the beams of a task."""
+    """Return all cases, with the beams of a task."""
     cases: list[Callable[[LoadedTask, Problem], list[StressRow]]] = [
         _planes,
         _focus,
@@ -70,13 +70,13 @@ def stress_rows(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
 
 
 def row(case: str, quantity: str, expected: float, got: float, allowed: float) -> StressRow:
-    """A case with its error: relative, unless 0 is expected."""
+    """Return a case with its error: relative, unless 0 is expected."""
     error = abs(got - expected) / (abs(expected) if expected else 1.0)
     return StressRow(case, quantity, expected, got, error, allowed)
 
 
 def _integral(bearings: Array, plane: tuple[float, float], turns: float, ball: float) -> float:
-    """Integral of the mean count over the sphere: smooth between the polar angles where a beam comes or goes."""
+    """Return the integral of the mean count over the sphere, which is smooth between the ends of beams."""
     polar, _ = polar_and_azimuth(beam_directions_rot(bearings, *plane))
     marks = np.concatenate([[0, np.pi], polar - ball, polar + ball])
     breaks = np.unique(np.clip(np.abs(marks), 0, np.pi))
@@ -93,7 +93,7 @@ def _law(
 
 
 def _planes(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """Scan planes at and next to the perpendicular one, and with the fan's end on the axis."""
+    """Scan planes at and near the perpendicular one, and with the end of the field of view on the axis."""
     b, ball = problem.bearings_rad, problem.ball_rad
     rows = []
     for tilt in (0.0, 1e-12, 1e-9, 1e-6):
@@ -106,7 +106,7 @@ def _planes(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
         plane = (float(np.radians(tilt_deg)), 0.0)
         rows.append(_law(f"caustics at 90 +- {tilt_deg:g} deg", b, plane, 720, ball, 1e-5))
     end = float(b.max())
-    plane = (HALF_TURN / 2, float(np.arcsin(-np.cos(end))))  # q = (cos end, sin end): the last beam is the axis
+    plane = (HALF_TURN_RAD / 2, float(np.arcsin(-np.cos(end))))  # q = (cos end, sin end): the last beam is the axis
     plane = (float(np.arcsin(np.sin(end) / np.cos(plane[1]))), plane[1])
     rows.append(_law("end of the field of view exactly on the axis", b, plane, 720, ball, 1e-5))
     return rows
@@ -115,7 +115,7 @@ def _planes(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
 def _focus(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     """At a focus point every line of the beams within a ball counts, at every phase."""
     b, ball = problem.bearings_rad, problem.ball_rad
-    polar, _ = polar_and_azimuth(beam_directions_rot(b, 0.0, -HALF_TURN / 2))
+    polar, _ = polar_and_azimuth(beam_directions_rot(b, 0.0, -HALF_TURN_RAD / 2))
     expected = 720.0 * int((np.abs(b) <= ball * (1 + 1e-12)).sum())
     at = np.array([0.0, 1e-15, 1e-9])
     got = mean_count(at, polar, scan_lines(720, 1.0), ball)
@@ -136,7 +136,7 @@ def _balls(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
 
 
 def _lines(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """From one line to ten million beams, one beam, and turns that are no whole number of lines."""
+    """From one line to ten million beams, one beam, and turns with a non-integer number of lines."""
     b, ball = problem.bearings_rad, problem.ball_rad
     plane = (float(np.radians(-50.0)), float(np.radians(35.0)))
     million = round(1e7 / len(b))
@@ -144,15 +144,15 @@ def _lines(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     rows.append(_law("one beam", b[:1], plane, 720, ball, 1e-5))
     rows += [_law(f"T f = {turns}", b, plane, turns, ball, 1e-5) for turns in (0.5, 80.5, 719.999999, 720.000001)]
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
-    whole = quick_J(_with_turns(problem, 720), angles, 2187)
-    for turns in (720 - 1e-7, 720 + 1e-12):  # beating with the turn: the last gap is nearly full, or nothing is left
+    expected = quick_J(_with_turns(problem, 720), angles, 2187)
+    for turns in (720 - 1e-7, 720 + 1e-12):  # the last gap is nearly full, or empty
         got = quick_J(_with_turns(problem, turns), angles, 2187)
-        rows.append(row(f"T f = 720 {turns - 720:+.0e}: the rate beats with the turn", "J", whole, got, 1e-6))
+        rows.append(row(f"T f = 720 {turns - 720:+.0e}: the rate beats with the turn", "J", expected, got, 1e-6))
     return rows
 
 
 def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """Angles that name the same machine give the same J."""
+    """Different angles of the same machine give the same J."""
     pairs = [
         ("beta_rot = 90: alpha_rot only rolls the case", (0, 90, 20, -40), (77, 90, 20, -40)),
         ("beta_rot = -90", (0, -90, 20, -40), (-33, -90, 20, -40)),
@@ -167,7 +167,7 @@ def _gimbals(_loaded: LoadedTask, problem: Problem) -> list[StressRow]:
 
 
 def _weights(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """J does not know the unit of the weights."""
+    """J does not depend on the unit of the weights."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     cone = {"shape": "cone", "axis": [1, 0, -1], "half_angle_deg": 40}
     plain = quick_J(_with(loaded, problem, [cone]), angles, 2187)
@@ -178,7 +178,7 @@ def _weights(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
 
 
 def _regions(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """A region that is nearly a point sees the density of that point."""
+    """A region that is nearly a point has the density of that point."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles[2], angles[3]))
     at = np.radians([60.0])
@@ -193,10 +193,18 @@ def _regions(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
 
 
 def _refusals(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
-    """What has no answer is refused, and no number comes instead: 1 for a refusal."""
+    """Cases without a result are rejected: 1 for a rejection."""
     angles = np.radians([0.0, 0.0, -50.0, 35.0])
     hidden = replace(loaded, task=_task(loaded, [{"shape": "all"}], [{"shape": "all"}]))
-    rows = [row("all weights zero", "refused", 1, _refused(lambda: _with(loaded, problem, [_all(0.0)]), angles), 0)]
+    rows = [
+        row(
+            "all weights zero",
+            "refused",
+            1,
+            _refused(lambda: _with(loaded, problem, [{"shape": "all", "value": 0.0}]), angles),
+            0,
+        )
+    ]
     masked = _refused(lambda: problem.with_objective(log(field_of(hidden))), angles)
     rows.append(row("everything masked", "refused", 1, masked, 0))
     try:
@@ -214,10 +222,6 @@ def _refused(make: Callable[[], Problem], angles_rad: Array) -> int:
     except TaskError as error:
         return int(str(error) == EMPTY)
     return 0
-
-
-def _all(value: float) -> dict[str, object]:
-    return {"shape": "all", "value": value}
 
 
 def _task(loaded: LoadedTask, weight: list[dict[str, object]], mask: list[dict[str, object]]) -> Task:

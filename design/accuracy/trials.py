@@ -1,7 +1,7 @@
-"""Error against run time of the numerical choices beside J: one record, its table and its picture.
+"""Error against run time of other numerical choices than those of J: one record, its table and its picture.
 
-The rooms that make a choice measure it (`cad.geometry.mesh_trials`, `scanwright.trials.solver`,
-`scanwright.trials.axis`); the front door brings the trials here.
+The packages that make a choice measure it (`cad.geometry.mesh_trials`, `scanwright.trials.solver`,
+`scanwright.trials.axis`).
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from scanwright.design.accuracy.front import dominators
 from scanwright.design.accuracy.machine import this_machine
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.picture_files import save_picture
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 
 T = TypeVar("T")
-REPEATS = 3
-ROW = 3  # diagrams in one row; more stand in a square
+REPEATS = 3  # timed runs after a warm-up
+ROW = 3  # diagrams in one row; more form a square
 MARKS = "osD^vP*X"
 RING: dict[str, Any] = {"markersize": 15, "markerfacecolor": "none", "markeredgecolor": "black"}
 GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a6761d", "#e7298a")
@@ -33,17 +33,17 @@ GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a67
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One method at one setting of its knob.
+    """One method with one value of its parameter.
 
     Attributes:
-        choice: what is chosen, such as "mesh of a part".
+        choice: the choice, such as "mesh of a part".
         method: its name.
-        setting: the knob and its value.
-        error: against a reference that is none of the trials; 0 where it cannot be told from that.
+        setting: the parameter and its value.
+        error: against a separate reference; 0 if below the error of that.
         unit: of the error.
         seconds: of the repeats, shortest to longest.
-        size: what else it costs, in words.
-        chosen: whether it is what the program uses.
+        size: other costs, as text.
+        chosen: whether the program uses it.
     """
 
     choice: str
@@ -62,25 +62,25 @@ class Trial:
 
 
 def timed(work: Callable[[], T]) -> tuple[T, tuple[float, ...]]:
-    """What `work` gives, and the seconds of its repeats, shortest first; one more run before them warms up."""
-    found = work()
+    """Return the result of `work` and the seconds of its repeats, shortest first, after a warm-up."""
+    result = work()
     seconds = []
     for _ in range(REPEATS):
         start = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - start)
-    return found, tuple(sorted(seconds))
+    return result, tuple(sorted(seconds))
 
 
 def best_trials(trials: Sequence[Trial]) -> list[bool]:
-    """Whether no other trial of the same choice is as fast and nearer, or as near and faster."""
+    """Return whether no other trial of the same choice dominates it in time and error."""
     costs = np.array([(trial.median_s, trial.error) for trial in trials])
     choices = np.array([trial.choice for trial in trials])
     return [not dominators(costs[choices == choice], cost).any() for choice, cost in zip(choices, costs, strict=True)]
 
 
 def write_trials(path: Path, trials: Sequence[Trial]) -> None:
-    """One row per trial."""
+    """Write one row per trial."""
     header = "choice method setting error unit seconds_median seconds_min seconds_max size on_front chosen"
     rows = []
     for t, best in zip(trials, best_trials(trials), strict=True):
@@ -92,14 +92,14 @@ def write_trials(path: Path, trials: Sequence[Trial]) -> None:
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a CSV file."""
-    with whole_file(path, BuildError) as part, part.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path, BuildError) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)
 
 
 def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
-    """A diagram for each choice: error against median seconds, both logarithmic, the chosen setting ringed."""
+    """Draw a diagram for each choice: error against median seconds, with a ring about the chosen one."""
     choices = list(dict.fromkeys(trial.choice for trial in trials))
     columns = len(choices) if len(choices) <= ROW else math.ceil(math.sqrt(len(choices)))
     rows = -(-len(choices) // columns)
@@ -129,7 +129,7 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
 
 
 def report_trials(trials: Sequence[Trial], folder: Path, name: str) -> list[str]:
-    """Write their table and picture under a name; in words."""
+    """Write their table and picture under a name; return lines."""
     folder.mkdir(parents=True, exist_ok=True)
     write_trials(folder / f"{name}.csv", trials)
     trials_picture(folder / f"{name}.png", trials)

@@ -1,13 +1,14 @@
-"""Error against run time of every way to compute J: what the numerical defaults are chosen from.
+"""Error against run time of every method to compute J, from which the numerical defaults are chosen.
 
-The time is that of the first setting. The error is the worst of several: at one setting a few nodes are often lucky.
+The time is that of the first setting. The error is the worst of several settings, since at one setting few nodes can
+be exact by chance.
 """
 
 from __future__ import annotations
 
 import time
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,34 +19,33 @@ from scanwright.design.accuracy.reference import Reference, is_smooth, reference
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.objective.problem import Problem
+from scanwright.design.progress import Progress
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
-REPEATS = 5
-SLOW_S = 2.0  # a point slower than this is timed once
-LOOK_DEG = 2.0  # how far around the setting a method's own minimum is looked for
-LOOKS = 9
-OTHERS, OTHERS_DRAWN = 7, 2  # settings beside the first; fewer where each reference is drawn at random
+REPEATS = 5  # timed runs
+SLOW_S = 2.0  # slower methods are timed once
+NEARBY_DEG = 2.0  # range about the setting in which the minimum of a method is searched
+NEARBY_POINTS = 9  # samples of that range
+OTHERS, OTHERS_DRAWN = 7, 2  # further settings; fewer if each reference is drawn at random
 SEED = 0
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One method at one setting of its knob; NaN and a word in `failed` where it gave no answer.
+    """One method with one value of its parameter; NaN and a reason in `failed` if it gave no result.
 
     Attributes:
         method: its name.
-        setting: the knob and its value.
-        J: its answer at the first setting.
+        setting: the parameter and its value.
+        J: at the first setting.
         J_error: distance from the reference, the worst of all settings.
         J_error_median: the median of all settings.
-        argmin_error_deg: distance of its minimum over beta_laser from that of the reference; NaN where not looked for.
+        argmin_error_deg: distance of its minimum over beta_laser from that of the reference; NaN if not searched.
         seconds: of the repeats, shortest to longest.
-        peak_mb: highest memory that Python and NumPy asked for.
-        chosen: whether the program begins with it.
-        failed: why there is no answer.
+        peak_mb: peak memory of Python and NumPy.
+        chosen: whether the program starts with it.
+        failed: why there is no result.
     """
 
     method: str
@@ -61,25 +61,17 @@ class Point:
 
     @property
     def median_s(self) -> float:
-        """Median of the repeats [s]; infinite where there is no answer."""
+        """Median of the repeats [s]; infinite without a result."""
         return float(np.median(self.seconds)) if self.seconds else np.inf
 
 
 @dataclass(frozen=True, slots=True)
-class _Nearby:
-    """Where the minimum over beta_laser is looked for, and where the reference has it [deg from the setting]."""
-
-    steps_deg: Array
-    minimum_deg: float
-
-
-@dataclass(frozen=True, slots=True)
 class MethodsMeasured:
-    """What all methods gave.
+    """Results of all methods.
 
     Attributes:
-        truths: the reference at each setting, the first one's first.
-        points: one of each method and value of its knob.
+        truths: the reference at each setting, in order.
+        points: one for each method and value of its parameter.
     """
 
     truths: tuple[Reference, ...]
@@ -87,33 +79,35 @@ class MethodsMeasured:
 
     @property
     def floor(self) -> float:
-        """What the references may be off by, the worst of them: errors below it are not told apart."""
+        """Largest error of the references: smaller errors of methods cannot be distinguished."""
         return max(truth.J_error for truth in self.truths)
 
 
 def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress) -> MethodsMeasured:
-    """All methods at all their knobs on one setting, and their errors on some others of the task as well.
+    """Measure all methods with all values at one setting, and their errors at some others of the task.
 
-    The minima of methods are compared where the reference is smooth: a drawn one jumps more than they are apart.
+    Minima are compared only if the reference is smooth: the noise of a drawn one exceeds their distance.
     """
     settings, truths = _settings(loaded, problem, first_rad, progress)
     nearby = None
     if is_smooth(problem):
-        steps = LOOK_DEG * np.linspace(-1, 1, LOOKS)
+        steps = NEARBY_DEG * np.linspace(-1, 1, NEARBY_POINTS)
         J = [reference(loaded, problem, _turned(first_rad, d)).J for d in steps]
-        nearby = _Nearby(steps, _minimum(steps, J))
-    points = []
-    for name, (method, knob, values) in methods_for(problem).items():
+        nearby = steps, _minimum(steps, J)
+    points: list[Point] = []
+    methods = methods_for(problem)
+    total = sum(len(values) for _, _, values in methods.values())
+    for name, (method, parameter, values) in methods.items():
         for value in values:
-            progress(f"{name}, {value} {knob}")
-            points.append(_point(problem, settings, truths, nearby, name, method, knob, value))
+            progress(f"{name}, {value} {parameter}", len(points) / total)
+            points.append(_point(problem, settings, truths, nearby, name, method, parameter, value))
     return MethodsMeasured(tuple(truths), tuple(points))
 
 
 def _settings(
     loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress
 ) -> tuple[list[Setting], list[Reference]]:
-    """The first setting and some drawn from the ranges of the task, with their references; blind ones have none."""
+    """Return the first setting and some drawn from the ranges of the task, with their references; omit blind ones."""
     low, high = np.radians([loaded.task.angles.limits(name) for name in NAMES]).T
     others = OTHERS if is_smooth(problem) else OTHERS_DRAWN
     drawn = np.random.default_rng(SEED).uniform(low, high, (others if (high > low).any() else 0, len(NAMES)))
@@ -129,7 +123,7 @@ def _settings(
 
 
 def best_points(points: Sequence[Point], reference_error: float) -> list[bool]:
-    """Whether no other point is both faster and nearer; errors below the reference's own count as equal."""
+    """Return whether no other point dominates it; errors below that of the reference count as equal."""
     costs = np.array([[p.median_s, max(p.J_error, reference_error)] for p in points])
     answered = np.isfinite(costs[:, 1])
     return (undominated(np.where(answered[:, None], costs, np.inf)) & answered).tolist()
@@ -139,13 +133,13 @@ def _point(
     problem: Problem,
     settings: list[Setting],
     truths: list[Reference],
-    nearby: _Nearby | None,
+    nearby: tuple[Array, float] | None,  # steps of beta_laser, and the minimum of the reference, from the setting [deg]
     name: str,
     method: Method,
-    knob: str,
+    parameter: str,
     value: int,
 ) -> Point:
-    setting, first_rad = f"{value} {knob}", settings[0]
+    setting, first_rad = f"{value} {parameter}", settings[0]
     chosen = name in ("segments", "directions") and value == problem.nodes
     try:
         J = [method(problem, angles, value) for angles in settings]  # and warms up
@@ -162,8 +156,10 @@ def _point(
         seconds.append(time.perf_counter() - start)
     moved = np.nan
     if nearby is not None and seconds[0] < SLOW_S:
-        around = [method(problem, _turned(first_rad, d), value) for d in nearby.steps_deg]
-        moved = abs(_minimum(nearby.steps_deg, around) - nearby.minimum_deg)
+        steps_deg, minimum_deg = nearby
+        moved = abs(
+            _minimum(steps_deg, [method(problem, _turned(first_rad, d), value) for d in steps_deg]) - minimum_deg
+        )
     off = np.abs(np.array(J) - [truth.J for truth in truths])
     times = tuple(sorted(seconds))
     return Point(name, setting, J[0], float(off.max()), float(np.median(off)), moved, times, peak, chosen)
@@ -174,7 +170,7 @@ def _turned(angles_rad: Setting, degrees: float) -> Setting:
 
 
 def _minimum(x: Array, y: list[float]) -> float:
-    """Where the parabola through the lowest sample and its neighbours is lowest."""
+    """Return the minimum of the parabola through the lowest sample and its neighbours."""
     i = int(np.clip(np.argmin(y), 1, len(y) - 2))
     a, b, c = y[i - 1], y[i], y[i + 1]
     bend = a - 2 * b + c

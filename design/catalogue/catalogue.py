@@ -34,7 +34,7 @@ from scanwright.design.catalogue.products import (
     SlipRing,
 )
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.files.faults import Fault, faults_of, tell
+from scanwright.design.files.faults import Fault, faults_in, format_faults
 from scanwright.design.files.text_files import read_toml
 
 SHIPPED = Path(__file__).parent
@@ -146,9 +146,9 @@ def load_product(path: Path) -> Product:
     try:
         product = KINDS[kind].model_validate(values)
     except ValidationError as error:
-        faults += [fault for fault in faults_of(error, KINDS[kind]) if fault.path not in badly_written]
+        faults += [fault for fault in faults_in(error, KINDS[kind]) if fault.path not in badly_written]
     if faults:
-        raise TaskError(tell(faults, path))
+        raise TaskError(format_faults(faults, path))
     product._provenance.update(provenance)
     return product
 

@@ -1,1 +1,1 @@
-"""More than one core: threads for compiled kernels, a second process for work that nobody waits for."""
+"""More than one core: threads for compiled kernels, worker processes for work in the background."""

@@ -1,4 +1,4 @@
-"""Work that is done in another thread while its earlier results are used: unpacking, writing."""
+"""Work in another thread while its earlier results are used, such as unpacking and writing."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ T = TypeVar("T")
 
 
 def ahead(work: Callable[[S], T], items: Iterable[S]) -> Generator[T, None, None]:
-    """Results of `work` on each item, in order; an error of the work is raised where its result would stand.
+    """Yield the results of `work` on each item in order; an error is raised in place of its result.
 
-    The items are taken in the thread that asks, each before the result of the one in front of it is. Whoever stops
-    asking stops the work: what has not begun never does.
+    Items are taken in the calling thread, each before the result of the previous one. Closing the generator cancels
+    work that has not started.
     """
     waiting: Future[T] | None = None
     with ThreadPoolExecutor(1) as pool:

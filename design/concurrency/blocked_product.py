@@ -1,4 +1,4 @@
-"""Matrix products in the thread that asks: tiles of them are too small to be worth waking others for."""
+"""Matrix products in the calling thread: products of tiles are too small to share between threads."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from scanwright.design.arrays import Array
 
-ROWS = 16
-ALONE = 1 << 18  # multiplications: OpenBLAS shares larger products out among threads of its own
+ROWS = 16  # of a block
+ALONE = 1 << 18  # multiplications: OpenBLAS distributes larger products over its threads
 
 
 def blocked_product(a: Array, b: Array, out: Array) -> None:
-    """`np.matmul(a, b, out=out)` of shapes (n, k), (k, m) as a stack of products so small that none is shared out.
+    """`np.matmul(a, b, out=out)` of shapes (n, k), (k, m) as a stack of products too small for OpenBLAS threads.
 
-    Other processes and our own threads ask for the cores too: then OpenBLAS waits for its threads, 15 ms a product,
-    where a tile of the search takes one. Stacked, blocks are as fast as one large product in one thread.
+    If other processes and our own threads use the cores, OpenBLAS waits for its threads, 15 ms a product, while a tile
+    of the search takes 1 ms. Stacked, blocks are as fast as one large product in one thread.
     """
     columns = max(ROWS, 1 << int(np.log2(max(1, ALONE / (ROWS * max(1, len(b)))))))
     rows_end, columns_end = len(a) // ROWS * ROWS, b.shape[1] // columns * columns
@@ -24,14 +24,14 @@ def blocked_product(a: Array, b: Array, out: Array) -> None:
 
 
 def product(a: Array, b: Array) -> Array:
-    """`a @ b`, as `blocked_product` makes it."""
+    """Return `a @ b`, computed by `blocked_product`."""
     out = np.empty((len(a), b.shape[1]), np.result_type(a, b))
     blocked_product(a, b, out)
     return out
 
 
 def _stacked(a: Array, b: Array, out: Array, columns: int) -> None:
-    """The same of blocks of `ROWS` rows and so many columns, or of fewer that are one block."""
+    """Multiply blocks of `ROWS` rows and `columns` columns, or one smaller block."""
     n, m = min(ROWS, len(a)), min(columns, b.shape[1])
     if n and m:
         blocks = out.reshape(-1, n, out.shape[1] // m, m).swapaxes(1, 2)  # a view: axes are split only

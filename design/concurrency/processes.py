@@ -1,6 +1,6 @@
-"""Processes beside this one, for work that does not wait for it. On one core all is done in this one.
+"""Worker processes for work in the background. On one core the work runs in this process.
 
-The result is the same either way: what is called must depend on its arguments alone, and these are copied.
+The result is the same in both cases: functions must depend on their arguments alone, which are copied.
 """
 
 from __future__ import annotations
@@ -27,49 +27,49 @@ T = TypeVar("T")
 
 
 class Begin(Protocol):
-    """Begin some work, and get what waits for its result; an error of the work is raised there."""
+    """Start work and return a function that waits for its result; errors of the work are raised there."""
 
     def __call__(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
-        """`work` and what it is called with."""
+        """Start `work` with these arguments."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Packed(Generic[T]):
-    """What this process passes on from one to another, and cannot open without loading what that takes."""
+    """A pickled value that this process passes between workers without importing its modules."""
 
     content: bytes
 
     @staticmethod
     def of(value: T) -> Packed[T]:
-        """Pack it."""
+        """Pack a value."""
         return Packed(pickle.dumps(value))
 
     def open(self) -> T:
-        """A copy of what was packed."""
+        """Return a copy of the value."""
         value: T = pickle.loads(self.content)
         return value
 
 
 @contextmanager
-def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Begin]:
-    """What begins work in so many processes beside this one; they end with the block, their work done or not.
+def worker_processes(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Begin]:
+    """Yield a function that starts work in `count` worker processes; they end with the block, finished or not.
 
-    Functions, arguments and results are pickled: functions of modules only. A process that has loaded `modules`, which
-    it begins to do at once, is their mould; it stays for the next block unless this one fails, and loads nothing more.
+    Functions, arguments and results are pickled: functions of modules only. Workers are forked from a server process
+    that imports `modules` at once. It remains for the next block unless this one fails, and imports nothing more.
     """
-    can_mould = "forkserver" in multiprocessing.get_all_start_methods()  # Windows cannot
-    if cores() < 2 or not can_mould or multiprocessing.current_process().daemon:
+    can_fork = "forkserver" in multiprocessing.get_all_start_methods()  # Windows cannot
+    if cores() < 2 or not can_fork or multiprocessing.current_process().daemon:
         yield in_turn
         return
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(list(modules))
-    resource_tracker.ensure_running()  # first, for to start it lets Ctrl-C through
-    with ctrl_c_held_back(), one_thread_each():
+    resource_tracker.ensure_running()  # first: starting it unblocks Ctrl-C
+    with sigint_deferred(), one_thread_each():
         forkserver.ensure_running()
-    pool = ProcessPoolExecutor(count, context, _attend)
+    pool = ProcessPoolExecutor(count, context, _initialise_worker)
 
-    def beside(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
+    def submit(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
         future = pool.submit(work, *args, **kwargs)
 
         def result() -> T:
@@ -82,61 +82,61 @@ def processes_beside(count: int = 1, modules: Sequence[str] = ()) -> Iterator[Be
 
     try:
         try:
-            yield beside
+            yield submit
         finally:
             kill(pool)
-    except BaseException:  # the mould may still load, and whoever reads what this prints would wait for it
-        _kill_mould()
+    except BaseException:  # the server may still import, and readers of our output would wait for its end
+        _kill_server()
         raise
 
 
 def in_turn(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Callable[[], T]:
-    """Begin nothing: the work is done when its result is asked for, on a copy of what it is given.
+    """Do the work when its result is requested, on a copy of its arguments.
 
-    The copy is what a second process would get: a solid that was pickled differs in the last bit of a direction, and a
-    drawing may round that up or down.
+    A worker process gets such a copy: a pickled solid differs in the last bit of a direction, which a drawing can round
+    up or down.
     """
     packed = pickle.dumps((args, kwargs))
 
     def result() -> T:
-        given, named = pickle.loads(packed)
-        return work(*given, **named)
+        args, kwargs = pickle.loads(packed)
+        return work(*args, **kwargs)
 
     return result
 
 
 def spawn_pool() -> ProcessPoolExecutor:
-    """One process that stays, for calls of functions of modules; it is deaf to Ctrl-C, and ends with its owner."""
+    """Return a pool of one persistent process for functions of modules; it ignores Ctrl-C and ends with its owner."""
     # spawned and not forked: a fork of a process with threads may lock up
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _attend)
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _initialise_worker)
 
 
 @contextmanager
-def ctrl_c_held_back() -> Iterator[None]:
-    """Ctrl-C waits for the end of the block, and what is born in it cannot hear it before it turns a deaf ear.
+def sigint_deferred() -> Iterator[None]:
+    """Defer Ctrl-C to the end of the block, also in processes that start in it, until they ignore it.
 
-    Blocked in this thread it would still come by another one, and Python would raise it here: in the middle of what a
-    new process is to be told.
+    Blocked in this thread only, it would arrive through another thread, and Python would raise KeyboardInterrupt here,
+    while a new process is being set up.
     """
-    came: list[tuple[int, FrameType | None]] = []
+    received: list[tuple[int, FrameType | None]] = []
     main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, lambda *told: came.append(told)) if main else None
+    before = signal.signal(signal.SIGINT, lambda *call: received.append(call)) if main else None
     masks = hasattr(signal, "pthread_sigmask")  # Windows has none
-    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
     try:
         yield
     finally:
         if main:
             signal.signal(signal.SIGINT, before)
         if masks:
-            signal.pthread_sigmask(signal.SIG_SETMASK, held)
-        if came and callable(before):
-            before(*came[0])
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        if received and callable(before):
+            before(*received[0])
 
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Processes that are born in the block compute in one thread each: there is one of them for every core."""
+    """Limit processes that start in the block to one thread each, since there is one process for each core."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
@@ -149,29 +149,29 @@ def one_thread_each() -> Iterator[None]:
 
 
 def kill(pool: ProcessPoolExecutor) -> None:
-    """End the process at once, its work done or not."""
+    """End the process at once, finished or not."""
     for process in list((getattr(pool, "_processes", None) or {}).values()):
         process.kill()
     pool.shutdown(cancel_futures=True)
 
 
-def _kill_mould() -> None:
-    """At once; the next block begins another one. The library offers no public way to end it before its owner."""
-    mould: Any = forkserver._forkserver
-    if mould._forkserver_pid is not None:
-        os.kill(mould._forkserver_pid, signal.SIGKILL)
-        mould._stop()  # waits for its death
+def _kill_server() -> None:
+    """Kill the server at once; the next block starts another one. The library has no public function for that."""
+    server: Any = forkserver._forkserver
+    if server._forkserver_pid is not None:
+        os.kill(server._forkserver_pid, signal.SIGKILL)
+        server._stop()  # waits for its death
 
 
 def cores() -> int:
-    """That this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):  # Linux
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def _attend() -> None:
-    """Ctrl-C reaches both, and the owner ends this one; one that was killed tells nobody, so this one watches it."""
+def _initialise_worker() -> None:
+    """Ignore Ctrl-C, which the owner handles, and exit if the owner ends, since a killed owner cannot stop workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     owner = multiprocessing.parent_process()
     assert owner is not None

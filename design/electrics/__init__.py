@@ -1,1 +1,1 @@
-"""The wiring of a scanner as data: devices, wires and ring circuits, what they carry, and what is wrong with them."""
+"""The wiring of a scanner as data: devices, wires, ring circuits, their currents, and the faults of it."""

@@ -1,4 +1,4 @@
-"""What a person must know before wiring: what can destroy a device, and what a ring does to data."""
+"""Cautions before wiring: what can destroy a device, and how a slip ring affects data."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from scanwright.design.electrics.loads import SUPPLY_V, ElectricLoad
 from scanwright.design.electrics.network import Wire
 from scanwright.design.scanner import Scanner
 
-MEASURE = "measure first"  # marks a wire whose colour no verified source names, and that carries power
-NARROW_V = 0.5  # of room above 12 V: a supply that is trimmed higher than this can destroy the device
+MEASURE = "measure first"  # marks a power wire whose colour has no verified source
+NARROW_V = 0.5  # margin above 12 V: supplies can be trimmed by more than this
 HOW = (
     "switch all power off, unplug the lidar, set a multimeter to continuity, and find the pin of the plug that each "
     "lead beeps to (its data sheet names the pins)"
@@ -18,14 +18,14 @@ HOW = (
 RISKS = {
     "usb": (
         "USB through a ring: full speed (12 Mbit/s) passes good contacts, high speed (480 Mbit/s) only rings made for "
-        "it. Keep D- and D+ on neighbouring circuits, twisted on both sides, the shield on a circuit of its own, the "
-        "way between the plugs under 2 m; power the lidar by its own lead, not by VBUS. A contact that bounces for "
+        "it. Keep D- and D+ on neighbouring circuits, twisted on both sides, the shield on its own circuit, the "
+        "cable between the plugs under 2 m; power the lidar by its own lead, not by VBUS. A contact that bounces for "
         "microseconds loses the device: `scan` takes the turn again; a powered hub at the lidar or a ring with gold "
         "contacts ends it."
     ),
     "ethernet": (
         "Ethernet through a ring: 100BASE-TX needs two pairs, each twisted up to the ring on neighbouring circuits, "
-        "and asks for a data-rated ring; a cheap capsule loses frames while it turns. Watch the counters of the port "
+        "and requires a data-rated ring; a cheap capsule loses frames while it turns. Watch the counters of the port "
         "during a turn; 10BASE-T by a switch that forces it is the way out."
     ),
     "serial": "A serial line passes any ring: at 500 kBaud and more use RS-422 and twist the pairs.",
@@ -51,7 +51,7 @@ def data_fault(ring: SlipRing, lidar: Lidar) -> str:
 
 
 def cautions_of(scanner: Scanner, loads: list[ElectricLoad], wires: list[Wire]) -> Iterator[str]:
-    """One sentence or two for each danger."""
+    """Yield one or two sentences for each danger."""
     for load in loads:
         yield from _voltage(load)
     yield from _revisions(scanner.lidar)

@@ -1,4 +1,4 @@
-"""What a wiring is made of: boxes with pins, wires between pins, circuits of the slip ring, branches with a fuse."""
+"""Records of a wiring: boxes with pins, wires between pins, circuits of the slip ring, branches with a fuse."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class Box:
 
     Attributes:
         name: unique.
-        title: in words.
-        lines: what else stands in it.
+        title: its heading.
+        lines: further text in it.
         left: pins towards the supply, from the top.
         right: pins away from it.
         column: its place from left to right.
@@ -42,7 +42,7 @@ class Wire:
         mm2: cross-section; 0 if it is part of a ready-made cable.
         colour: of its insulation; empty if no verified source names one.
         source: of the colour; empty if there is no colour.
-        note: what stands on the sheet in place of a colour.
+        note: text on the sheet in place of a colour.
     """
 
     start: Pin
@@ -66,9 +66,9 @@ class Circuit:
     """One circuit of the slip ring.
 
     Attributes:
-        number: from 1; ours, since no maker of the catalogue numbers them.
-        rated_a: what it carries for ever.
-        net: what it is used for; empty for a spare one.
+        number: from 1; our own, since no maker in the catalogue numbers them.
+        rated_a: continuous current.
+        net: its use; empty for a spare one.
         amps: largest current.
     """
 
@@ -80,20 +80,20 @@ class Circuit:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """What one fuse protects.
+    """The wires and the device that one fuse protects.
 
     Attributes:
         name: of the fuse.
-        feeds: in words.
-        lasting_a: at 12 V, as it runs.
-        peak_a: at 12 V, at its worst.
+        feeds: title of the device.
+        continuous_a: at 12 V, in operation.
+        peak_a: at 12 V, the largest.
         fuse_a: its rating.
         mm2: of its wires.
     """
 
     name: str
     feeds: str
-    lasting_a: float
+    continuous_a: float
     peak_a: float
     fuse_a: float
     mm2: float
@@ -101,12 +101,12 @@ class Branch:
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """What arrives at a device.
+    """The voltage at a device.
 
     Attributes:
         device: its name.
-        volts: while it draws its largest lasting current.
-        idle_v: while it draws none.
+        volts: at its largest continuous current.
+        idle_v: without current.
         least: lowest voltage that its maker allows.
         most: highest voltage that its maker allows.
     """
@@ -120,7 +120,7 @@ class Drop:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """All of it; `cautions` are for a person before wiring, `unknown` facts that the catalogue lacks, in words."""
+    """The entire wiring; `cautions` to read before wiring, and `unknown`, values that the catalogue lacks."""
 
     boxes: tuple[Box, ...]
     wires: tuple[Wire, ...]

@@ -20,8 +20,8 @@ from scanwright.design.electrics.network import Box, Branch, Circuit, Network, P
 from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_for
 from scanwright.design.scanner import Scanner
 
-USB_A = 0.5  # that a port gives
-LINE_CHARS = 36  # of a line of text in a box
+USB_A = 0.5  # of a port: USB 2.0 specification, 7.2.1
+LINE_CHARS = 36  # width of the text in a box
 DATA = {
     "usb": ("VBUS", "D-", "D+", "GND"),
     "usb-powered": ("VBUS", "D-", "D+", "GND"),
@@ -30,7 +30,7 @@ DATA = {
 }
 PLUG = {"usb": "USB", "usb-powered": "USB", "ethernet": "Ethernet", "serial": "serial port"}
 SIGNALS = {"rs485": ("D+", "D-"), "ttl": ("DATA",)}
-OWN = {"+": "red", "-": "black"}  # of the wires that a person cuts between the boxes of the supply
+OWN = {"+": "red", "-": "black"}  # wires that the user cuts between the boxes of the supply
 OWN_SOURCE = "your own wires: red is +, black is -"
 USB = {"VBUS": "red", "D-": "white", "D+": "green", "GND": "black"}
 ETHERNET = {"TX+": "white-orange", "TX-": "orange", "RX+": "white-green", "RX-": "green"}
@@ -39,12 +39,12 @@ CUT_CABLES = {
     "usb-powered": (USB, "USB 2.0 specification, chapter 6: cut cable of the computer"),
     "ethernet": (ETHERNET, "TIA-568-B: cut cable of the computer"),
 }
-CUT, WHOLE = "a cut cable", "its cable"
-CROSSED = {"TX": "RX", "RX": "TX"}  # what one side sends the other receives
+CUT, UNCUT = "a cut cable", "its cable"
+CROSSED = {"TX": "RX", "RX": "TX"}  # one side sends what the other receives
 
 
 def network_of(scanner: Scanner) -> Network:
-    """The wiring of one scanner.
+    """Return the wiring of one scanner.
 
     Raises:
         ValueError: a device draws more than any fuse of the table carries.
@@ -68,23 +68,23 @@ def network_of(scanner: Scanner) -> Network:
 
 
 def _data(lidar: Lidar) -> tuple[str, ...]:
-    """Nets of its data cable, named from the lidar's side; none if the catalogue has no `link`."""
+    """Return the nets of its data cable, named from the lidar's side; none if the catalogue has no `link`."""
     nets = () if lidar.link is None else DATA[lidar.link]
     return tuple(net for net in nets if not (lidar.sends_only and net == "RX"))
 
 
 def _shield(lidar: Lidar) -> tuple[str, ...]:
-    """The shield of its data cable; a plug with a single line has none."""
+    """Return the shield of its data cable; a plug with a single line has none."""
     return () if lidar.sends_only else ("shield",)
 
 
 def _plug_pin(net: str) -> str:
-    """The computer's pin for a net."""
+    """Return the computer's pin for a net."""
     return CROSSED.get(net, net)
 
 
 def _nets(lidar: Lidar) -> list[tuple[str, float]]:
-    """What the lidar needs of a ring: its power first, then its data; the shield last, which it can do without."""
+    """Return the nets that the lidar needs in a ring: power, data, and last the shield, which is optional."""
     most = most_a(lidar)
     power = [] if lidar.link == "usb-powered" else [("+", most), ("-", most)]
     amps = most if lidar.link == "usb-powered" else USB_A
@@ -93,18 +93,18 @@ def _nets(lidar: Lidar) -> list[tuple[str, float]]:
 
 
 def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
-    """For each net the first circuit that carries its current, of its own use if there is one; the others are spare."""
-    nobody_tells = (Circuits(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
-    ways = [(group.amps, group.use) for group in ring.ways or nobody_tells for _ in range(group.count)]
-    left, taken = list(range(len(ways))), dict[int, tuple[str, float]]()
+    """Return for each net the first circuit that carries its current, of its use if possible; the others are spare."""
+    assumed = (Circuits(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
+    rated = [(group.amps, group.use) for group in ring.ways or assumed for _ in range(group.count)]
+    left, used = list(range(len(rated))), dict[int, tuple[str, float]]()
     for net, amps in _nets(lidar):
         uses = ("power" if net in ("+", "-") else "signal", "any")
-        fit = [i for i in left if net != "shield" or ways[i][1] in uses]
+        fit = [i for i in left if net != "shield" or rated[i][1] in uses]
         if fit:
-            best = min(fit, key=lambda i: (ways[i][0] < amps, ways[i][1] not in uses, i))
-            taken[best] = net, amps
+            best = min(fit, key=lambda i: (rated[i][0] < amps, rated[i][1] not in uses, i))
+            used[best] = net, amps
             left.remove(best)
-    return tuple(Circuit(i + 1, amps, *taken.get(i, ("", 0.0))) for i, (amps, _) in enumerate(ways))
+    return tuple(Circuit(i + 1, amps, *used.get(i, ("", 0.0))) for i, (amps, _) in enumerate(rated))
 
 
 def _feed(load: ElectricLoad) -> str:
@@ -205,8 +205,8 @@ def _wires(
                 wires.append(Wire(("ring", pin), ("lidar", end), net, load.peak_a, 0.0, **_lead(lidar, sign)))
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
     wires += [
-        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=WHOLE),
-        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=WHOLE),
+        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=UNCUT),
+        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=UNCUT),
     ]
     signals = SIGNALS[servo.bus or "ttl"]
     joined = {**{pin: pin for pin in signals}, "GND": "GND data"}
@@ -215,7 +215,7 @@ def _wires(
     for net in (*_data(lidar), *_shield(lidar)):
         start = ("plug", _plug_pin(net))
         if not circuits:
-            note = _data_note(net) if _cable(lidar, circuits) == CUT else WHOLE
+            note = _data_note(net) if _cable(lidar, circuits) == CUT else UNCUT
             wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=note))
         elif net in inside:
             wires.append(Wire(start, ("ring", inside[net]), net, peaks[net], 0.0, **_cut(lidar, net)))
@@ -228,13 +228,13 @@ def _wires(
 
 
 def _own(start: Pin, end: Pin, amps: float, mm2: float) -> Wire:
-    """A 12 V wire between boxes of the supply; its sign is that of the pin where it ends."""
+    """Return a 12 V wire between boxes of the supply; its sign is that of the pin at its end."""
     sign = "+" if "+" in end[1] else "-"
     return Wire(start, end, "12 V" if sign == "+" else "0 V", amps, mm2, OWN[sign], OWN_SOURCE)
 
 
 def _lead(lidar: Lidar, sign: str) -> dict[str, str]:
-    """Colour and source of a power lead of the lidar, if its cables have but one, else the word to measure it."""
+    """Return colour and source of a power lead of the lidar if its cables have only one, else the note to measure."""
     colours = lidar.lead_colours().get(sign, ())
     if len(colours) != 1:
         return {"note": MEASURE}
@@ -242,18 +242,18 @@ def _lead(lidar: Lidar, sign: str) -> dict[str, str]:
 
 
 def _cut(lidar: Lidar, net: str) -> dict[str, str]:
-    """Colour and source of a wire in the computer's cut cable."""
+    """Return colour and source of a wire in the computer's cut cable."""
     colours, source = CUT_CABLES.get(lidar.link or "", ({}, ""))
     return {"colour": colours[net], "source": source} if net in colours else {"note": _data_note(net)}
 
 
 def _cable(lidar: Lidar, circuits: tuple[Circuit, ...]) -> str:
-    """How the data leave the computer: a plug passes neither a ring nor a bare serial port."""
-    return CUT if circuits or lidar.link in (None, "serial") else WHOLE
+    """Return the cable at the computer: a plug fits neither a ring nor a bare serial port."""
+    return CUT if circuits or lidar.link in (None, "serial") else UNCUT
 
 
 def _data_note(net: str) -> str:
-    """What stands on a data wire that has no colour: those that carry power are measured."""
+    """Return the note on a data wire without a colour: wires that carry power are measured."""
     return {"shield": "braid", "VBUS": MEASURE, "GND": MEASURE}.get(net, "")
 
 

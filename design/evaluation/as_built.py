@@ -20,7 +20,7 @@ from scanwright.design.objective.stated_error import rounded_to_error
 from scanwright.design.search.mounts.gain import Gain, gains, verdict
 from scanwright.design.search.mounts.reference import TunedMount, reference_mounts
 from scanwright.design.search.with_parts import score_with
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import Task
 
 
@@ -121,7 +121,7 @@ def as_built(
     problem: Problem,
     task: Task,
     angles_rad: Setting,
-    shadow: Shadow | None,
+    shadow: SelfOcclusion | None,
     own: Score | None = None,
     mounts: tuple[TunedMount, ...] | None = None,
 ) -> AsBuilt:
@@ -151,7 +151,7 @@ def as_built(
     )
 
 
-def seen_of(problem: Problem, angles_rad: Setting, found: Score, shadow: Shadow | None = None) -> Seen:
+def seen_of(problem: Problem, angles_rad: Setting, found: Score, shadow: SelfOcclusion | None = None) -> Seen:
     """Return what a setting of a known score sees, without the beams that `shadow` blocks.
 
     Raises:

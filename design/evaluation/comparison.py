@@ -41,7 +41,7 @@ from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.search.search import search
 from scanwright.design.search.with_parts import score_with
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import sample_set, spiral
 from scanwright.design.task.task import LoadedTask, load_task
 
@@ -102,7 +102,7 @@ def compare(
     best: Family,
     mounts: tuple[TunedMount, ...],
     progress: Progress = lambda _: None,
-    built: tuple[Setting, Shadow] | None = None,
+    built: tuple[Setting, SelfOcclusion] | None = None,
 ) -> list[ComparisonRow]:
     """Rows of the answer, the reference mounts, other scanners, and every multibeam of the catalogue.
 
@@ -223,7 +223,12 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
 
 
 def _rotating(
-    name: str, loaded: LoadedTask, problem: Problem, angles_rad: Setting, judged: Score, shadow: Shadow | None = None
+    name: str,
+    loaded: LoadedTask,
+    problem: Problem,
+    angles_rad: Setting,
+    judged: Score,
+    shadow: SelfOcclusion | None = None,
 ) -> ComparisonRow:
     seen = seen_of(problem, angles_rad, judged, shadow)
     prices = [product.price_usd for product in bought(loaded)]

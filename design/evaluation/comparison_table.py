@@ -9,7 +9,7 @@ from pathlib import Path
 from scanwright.design.catalogue.products import Multibeam, Product
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.comparison import AS_BUILT, SCANNERS, ComparisonRow, bought
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.stated_error import error_words
 from scanwright.design.task.task import LoadedTask, load_task
@@ -66,7 +66,7 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
 
 def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
     """The rows under the names of their fields; what is not known is empty."""
-    with whole_file(path, BuildError) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with atomic_write(path, BuildError) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)

@@ -16,7 +16,7 @@ from scanwright.design.density.visible import free_lines, mean_count_free
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.scene.surface import Surface
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import spiral
 
 CIRCLES = 10_000
@@ -37,7 +37,7 @@ class Coverage:
     masked_fraction: float
 
 
-def coverage(problem: Problem, angles_rad: Setting, shadow: Shadow | None = None) -> Coverage:
+def coverage(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None = None) -> Coverage:
     """Blind and masked share of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], behind its parts.
 
     Raises:
@@ -57,7 +57,7 @@ def coverage(problem: Problem, angles_rad: Setting, shadow: Shadow | None = None
     )
 
 
-def _on_directions(problem: Problem, angles_rad: Setting, shadow: Shadow | None) -> Coverage:
+def _on_directions(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Coverage:
     """Coverage over directions of equal solid angle, for a blind region that is no zone about the axis."""
     directions = spiral(CIRCLES)
     masked = problem.field.masked_at(directions)
@@ -66,7 +66,7 @@ def _on_directions(problem: Problem, angles_rad: Setting, shadow: Shadow | None)
 
 
 def mean_density_at(
-    problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: Shadow | None = None
+    problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: SelfOcclusion | None = None
 ) -> Float[ndarray, " n"]:
     """Return the mean number of beams per ball at unit vectors (n, 3), without the beams that `shadow` blocks.
 
@@ -88,7 +88,7 @@ def mean_density_at(
 
 
 def _density_behind(
-    problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: Shadow
+    problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: SelfOcclusion
 ) -> Float[ndarray, " n"]:
     """Mean beams per ball behind parts: beams that are free at every axis angle, and those that are free at some."""
     seen, partly = problem.behind(shadow), shadow.partly()

@@ -16,7 +16,7 @@ from scanwright.design.arrays import Array, Setting
 from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.evaluation.picture_files import save_picture
 from scanwright.design.objective.problem import Problem
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 
 STEP_DEG = 0.5
 INK = "#111111"
@@ -27,14 +27,14 @@ ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 
 def density_picture(
-    path: Path, problem: Problem, settings: Mapping[str, Setting], title: str, shadow: Shadow | None = None
+    path: Path, problem: Problem, settings: Mapping[str, Setting], title: str, shadow: SelfOcclusion | None = None
 ) -> None:
     """Write `density_figure` to a PNG, and to an SVG beside it."""
     save_picture(density_figure(problem, settings, title, shadow), path)
 
 
 def density_figure(
-    problem: Problem, settings: Mapping[str, Setting], title: str, shadow: Shadow | None = None
+    problem: Problem, settings: Mapping[str, Setting], title: str, shadow: SelfOcclusion | None = None
 ) -> Figure:
     """Density maps one above the other on one colour scale; of two or more, the first one over the second below them.
 

@@ -25,7 +25,7 @@ from scanwright.design.objective.score import Score
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
 from scanwright.design.objective.tolerance import rise_words, sensitivity
 from scanwright.design.search.with_parts import checked_score
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
@@ -184,7 +184,7 @@ def evaluate(
     pole: str | None,
     lever: str | None,
     progress: Callable[[str], None],
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
 ) -> Evaluation:
     """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
@@ -243,13 +243,11 @@ def angles_in(text: str) -> tuple[float, float, float, float]:
     try:
         alpha_rot, beta_rot, alpha_laser, beta_laser = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise TaskError(
-            f"--angles = '{text}': four numbers in degrees, such as --angles=0,90,0,-90 for rolling"
-        ) from error
+        raise TaskError(f"angles = '{text}': four numbers in degrees, such as 0,90,0,-90 for rolling") from error
     try:
         setting_rad((alpha_rot, beta_rot, alpha_laser, beta_laser))
     except TaskError as error:
-        raise TaskError(f"--angles = '{text}': {error}") from error
+        raise TaskError(f"angles = '{text}': {error}") from error
     return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
@@ -284,7 +282,5 @@ def _parse_lever(text: str) -> Lever:
     except ValueError:
         x_mm = y_mm = range_m = 0.0
     if not 0 < range_m < 1e6 or not max(abs(x_mm), abs(y_mm)) < 500 * range_m:
-        raise TaskError(
-            f"--lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as --lever=5,-3,1.0"
-        )
+        raise TaskError(f"lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as 5,-3,1.0")
     return Lever(x_mm, y_mm, range_m)

@@ -67,7 +67,7 @@ def landscape_picture(path: Path, result: SearchResult, title: str) -> Path:
     ]
     open_panels = [panel for panel in panels if len(panel[1]) > 1]
     if not open_panels:
-        raise TaskError("--picture: the task fixes all four angles, so there is nothing to map: free some of them")
+        raise TaskError("picture: the task fixes all four angles, so there is nothing to map: free some of them")
     figure = Figure(figsize=(0.6 + 6.2 * len(open_panels), 5.4), layout="constrained")
     axes = np.atleast_1d(figure.subplots(1, len(open_panels)))
     label = "lowest coarse J over all {}" if len(result.planes) > 1 < len(result.axes) else "coarse J"

@@ -18,7 +18,7 @@ from scanwright.design.arrays import Array, Ints, Setting, Vector
 from scanwright.design.density.beams import polar_and_azimuth, scan_at
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.rectangle import edge_normals
 from scanwright.design.sphere.regions import Field
 from scanwright.design.task.shapes import LITTLE, PlaneRegion, beyond_words
@@ -92,7 +92,7 @@ def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
 
 
 def on_planes(
-    loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: Shadow | None = None
+    loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None = None
 ) -> tuple[PlaneFigures, ...]:
     """What a full scan of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] leaves on each plane.
 

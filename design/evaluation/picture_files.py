@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from scanwright.design.errors import BuildError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 
 DPI = 110  # of the PNG, and of what the SVG holds as pixels: maps and dense meshes
 NO_DATE = {"Date": None, "Creator": None}
@@ -21,9 +21,9 @@ def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
     Raises:
         BuildError: a file cannot be written.
     """
-    with whole_file(path, BuildError) as part:
+    with atomic_write(path, BuildError) as part:
         figure.savefig(part, format="png", dpi=dpi, metadata={"Software": None})
-    with whole_file(path.with_suffix(".svg"), BuildError) as part:
+    with atomic_write(path.with_suffix(".svg"), BuildError) as part:
         part.write_bytes(svg_bytes(figure, dpi))
 
 

@@ -84,12 +84,12 @@ def parse_pole(text: str, lidar: Lidar) -> Pole:
     except ValueError:
         width_mm = height_mm = range_m = np.nan
     if not (0 < width_mm < np.inf and 0 < height_mm < np.inf and 0 < range_m < np.inf):
-        raise TaskError(f"--pole = '{text}': WIDTH_MM,HEIGHT_MM,RANGE_M, all above 0, such as --pole=20,1000,5")
+        raise TaskError(f"pole = '{text}': WIDTH_MM,HEIGHT_MM,RANGE_M, all above 0, such as 20,1000,5")
     low, high = lidar.range_min_mm / 1000, lidar.practical_range_m
     if not low <= range_m <= high:
-        raise TaskError(f"--pole = '{text}': range_m = {range_m:g}: the {lidar.name} sees from {low:g} to {high:g} m")
+        raise TaskError(f"pole = '{text}': range_m = {range_m:g}: the {lidar.name} sees from {low:g} to {high:g} m")
     if width_mm / 1000 >= 2 * range_m:
-        raise TaskError(f"--pole = '{text}': width_mm = {width_mm:g}: the scanner would stand in the pole")
+        raise TaskError(f"pole = '{text}': width_mm = {width_mm:g}: the scanner would stand in the pole")
     return Pole(width_mm / 1000, height_mm / 1000, range_m)
 
 
@@ -102,7 +102,7 @@ def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChanc
     weights, stands = _standing(problem, pole)
     total = float(weights.sum())
     if not total > 0:
-        raise TaskError("--pole: the robot hides every azimuth at that height: make the pole higher, or move it away")
+        raise TaskError("pole: the robot hides every azimuth at that height: make the pole higher, or move it away")
     below = np.concatenate([[0.0], np.cumsum(weights)]) / total
     rng = np.random.default_rng(SEED)
     per_phase = []

@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and that stay in the folder they are meant for."""
+"""Files that are written completely or not at all, and only inside their folder."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from scanwright.design.errors import ScanwrightError
 
 
 def check_place(path: Path, refusal: type[ScanwrightError]) -> None:
-    """Refuse a place where no file can be, for those who would know it before their work and not after it.
+    """Check that a file can be written at a path, before the work that makes it.
 
     Raises:
-        ScanwrightError: a `refusal`: this is a folder, or there is no such folder.
+        ScanwrightError: `refusal`: the path is a folder, or its folder does not exist.
     """
     try:
         if path.is_dir():
@@ -26,10 +26,10 @@ def check_place(path: Path, refusal: type[ScanwrightError]) -> None:
 
 
 def place_in(folder: Path, name: str, refusal: type[ScanwrightError]) -> Path:
-    """Return `folder / name` for writing or removing, if no link below the folder leads elsewhere.
+    """Return `folder / name` for writing or removing, if no part of `name` is a symbolic link.
 
-    The folder itself may be a link, which is the choice of whoever named it. A link below it may come with a folder
-    that somebody else made, and a write or a removal through it would change files that are none of ours.
+    The folder itself can be a link, which the user chose. A link below it can come with a folder of another author;
+    a write or a removal through it would change files outside of the folder.
 
     Args:
         folder: the folder of a build, a study, or another result.
@@ -37,7 +37,7 @@ def place_in(folder: Path, name: str, refusal: type[ScanwrightError]) -> Path:
         refusal: the error to raise.
 
     Raises:
-        ScanwrightError: a `refusal`: the name itself or a folder on the way to it is a symbolic link.
+        ScanwrightError: `refusal`: the file or a folder above it is a symbolic link.
     """
     path = folder
     for part in Path(name).parts:
@@ -48,11 +48,11 @@ def place_in(folder: Path, name: str, refusal: type[ScanwrightError]) -> Path:
 
 
 @contextmanager
-def whole_file(path: Path, refusal: type[ScanwrightError]) -> Iterator[Path]:
-    """Give a temporary name beside `path`; rename it to `path` when the body ends well, delete it when not.
+def atomic_write(path: Path, refusal: type[ScanwrightError]) -> Iterator[Path]:
+    """Yield a temporary path next to `path`; rename it to `path` if the body succeeds, delete it otherwise.
 
     Raises:
-        ScanwrightError: a `refusal`: the file cannot be written there.
+        ScanwrightError: `refusal`: the file cannot be written there.
     """
     check_place(path, refusal)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
@@ -60,6 +60,8 @@ def whole_file(path: Path, refusal: type[ScanwrightError]) -> Iterator[Path]:
         part.unlink(missing_ok=True)  # a link of that name would be followed
         yield part
         part.replace(path)
+    except ScanwrightError:
+        raise
     except OSError as error:
         raise refusal(f"{path}: cannot write: {error.strerror or error}") from error
     finally:

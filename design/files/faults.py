@@ -1,4 +1,4 @@
-"""Faults of a record read from a file: which key, on which line, and a suggestion."""
+"""Faults of a record read from a file: key, line, value, bound and a suggestion."""
 
 from __future__ import annotations
 
@@ -13,55 +13,54 @@ from pydantic import BaseModel, ValidationError
 from scanwright.design.errors import suggest
 from scanwright.design.files.text_files import read_text
 
-MOST_TOLD = 20  # faults of one file
-_LONGEST_STATEMENT = 1000  # lines
+MOST_REPORTED = 20  # faults of one file: about one screen
+_LONGEST_STATEMENT = 1000  # lines: bounds the time that a file without an end of its statement takes
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong in a file.
+    """One fault of a file. Unlike a `Finding` it has the path of its key, which gives the line, and no severity.
 
     Attributes:
-        path: keys and numbers from the top of the file to it; empty where it is the whole file.
-        says: value, bound and suggestion, as they follow the path in a line.
+        path: keys and array indices from the top of the file; empty for the entire file.
+        message: value, bound and suggestion, with the punctuation that follows the path.
     """
 
     path: tuple[str, ...]
-    says: str
+    message: str
 
     def __str__(self) -> str:
-        return f"{'.'.join(self.path) or '(whole file)'}{self.says}"
+        return f"{'.'.join(self.path) or '(whole file)'}{self.message}"
 
 
-def explain(error: ValidationError, source: Path | str, model: type[BaseModel]) -> str:
-    """All faults for a person, one line each: file, line, field, value, what is wrong, a suggestion if one is near."""
-    return tell(faults_of(error, model), source)
+def format_validation_error(error: ValidationError, source: Path | str, model: type[BaseModel]) -> str:
+    """Return one line for each fault: file, line, field, value, bound, and a suggestion if a known key is close."""
+    return format_faults(faults_in(error, model), source)
 
 
-def tell(faults: Sequence[Fault], source: Path | str) -> str:
-    """One line for each fault, in the order of the file; the first `MOST_TOLD` of them, where there are more.
+def format_faults(faults: Sequence[Fault], source: Path | str) -> str:
+    """Return one line for each fault in the order of the file, at most `MOST_REPORTED` and the number of the others.
 
     Args:
-        faults: what is wrong.
-        source: the file, whose lines are named where it is TOML; or what the file is called.
+        faults: the faults.
+        source: a file, whose line numbers are added if it is TOML; or its name.
     """
     lines = _key_lines(source) if isinstance(source, Path) and source.suffix == ".toml" else {}
     first = min(lines.values(), default=0)
     at = [next((lines[p] for p in _upwards(fault.path) if p in lines), first) for fault in faults]
     placed = sorted(zip(at, faults, strict=True), key=lambda pair: pair[0])
-    told = [f"{source}:{line}: {fault}" if line else f"{source}: {fault}" for line, fault in placed[:MOST_TOLD]]
-    more = len(faults) - len(told)
-    return "\n".join([*told, f"{source}: and {more} more like these"] if more else told)
+    shown = [f"{source}:{line}: {fault}" if line else f"{source}: {fault}" for line, fault in placed[:MOST_REPORTED]]
+    more = len(faults) - len(shown)
+    return "\n".join([*shown, f"{source}: and {more} more like these"] if more else shown)
 
 
-def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
-    """What a check of a record has found, in the words of the file.
+def faults_in(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
+    """Return the faults of a validation, with the keys of the file.
 
-    What only follows from another fault is left out: a key that is missing because it is misspelt, and a type of a
-    union that nobody meant.
+    Faults that follow from another one are omitted: a key that is missing because it is misspelt, and the other types
+    of a union.
     """
-    found = error.errors(include_url=False)
-    walked = [(*_walk(model, fault["loc"]), fault) for fault in found]
+    walked = [(*_walk(model, fault["loc"]), fault) for fault in error.errors(include_url=False)]
     faults: dict[tuple[str, ...], list[str]] = {}
     meant: set[tuple[str, ...]] = set()
     for record, path, fault in sorted(walked, key=lambda each: each[2]["type"] != "extra_forbidden"):
@@ -72,14 +71,14 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
             meant |= {(*path[:-1], key) for key in _keys(record) if near == f"; did you mean '{key}'?"}
             faults.setdefault(path, []).append(f": unknown key{near}")
         elif fault["type"] == "union_tag_invalid":
-            faults.setdefault((*path, fault["ctx"]["discriminator"].strip("'")), []).append(_says(fault))
+            faults.setdefault((*path, fault["ctx"]["discriminator"].strip("'")), []).append(_message(fault))
         else:
-            faults.setdefault(path, []).append(_says(fault))
+            faults.setdefault(path, []).append(_message(fault))
     deepest = [path for path in faults if not any(_inside(other, path) for other in faults)]
     return [Fault(path, _either(faults[path])) for path in deepest]
 
 
-def _says(fault: Any) -> str:
+def _message(fault: Any) -> str:
     if fault["type"] == "missing":
         return ": this key is required"
     if fault["type"] == "json_invalid":
@@ -94,10 +93,10 @@ def _says(fault: Any) -> str:
     return f"{value}: {fault['msg'].removeprefix('Value error, ')}"
 
 
-def _either(says: list[str]) -> str:
-    """What the types of a union say of one value: the value once, then what each of them wants."""
-    values, wants = zip(*(each.rpartition(": ")[::2] for each in says), strict=True)
-    return says[0] if len(says) == 1 else f"{values[0]}: {', or '.join(dict.fromkeys(wants))}"
+def _either(messages: list[str]) -> str:
+    """Join the messages of the types of a union: the value once, then what each type requires."""
+    values, required = zip(*(message.rpartition(": ")[::2] for message in messages), strict=True)
+    return messages[0] if len(messages) == 1 else f"{values[0]}: {', or '.join(dict.fromkeys(required))}"
 
 
 def _inside(path: tuple[str, ...], other: tuple[str, ...]) -> bool:
@@ -109,14 +108,14 @@ def _upwards(path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
 
 
 def _key_lines(path: Path) -> dict[tuple[str, ...], int]:
-    """Line, from 1, on which each key of a TOML file begins, by its path; entries of arrays have their number.
+    """Return the line, from 1, on which each key of a TOML file begins, by its path; array entries by their index.
 
-    A statement of TOML ends where a line does, and can be read by itself: lines are gathered until they can.
+    A statement of TOML ends at the end of a line and can be parsed alone: lines are joined until that works.
     """
     lines: dict[tuple[str, ...], int] = {}
     last: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
-    statement, begun = "", 1
+    statement, first = "", 1
     try:
         text = read_text(path)
     except (OSError, ValueError):
@@ -126,7 +125,7 @@ def _key_lines(path: Path) -> dict[tuple[str, ...], int]:
         try:
             parsed = tomllib.loads(statement)
         except ValueError:
-            if number - begun > _LONGEST_STATEMENT:
+            if number - first > _LONGEST_STATEMENT:
                 break
             continue
         if statement.lstrip().startswith("["):
@@ -136,13 +135,13 @@ def _key_lines(path: Path) -> dict[tuple[str, ...], int]:
             paths = [(*table, *inner) for inner in _paths(parsed)]
         for each in paths:
             for known in _upwards(each):
-                lines.setdefault(known, begun)
-        statement, begun = "", number + 1
+                lines.setdefault(known, first)
+        statement, first = "", number + 1
     return lines
 
 
 def _numbered(header: dict[str, Any], last: dict[tuple[str, ...], int]) -> tuple[str, ...]:
-    """Where the table of a header stands; `last` counts the entries of each array of tables so far."""
+    """Return the path of the table of a header; `last` has the last index of each array of tables so far."""
     path: tuple[str, ...] = ()
     inside: Any = header
     while inside:
@@ -157,16 +156,16 @@ def _numbered(header: dict[str, Any], last: dict[tuple[str, ...], int]) -> tuple
 
 
 def _paths(value: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    """Paths to all that a value holds and that holds no more."""
+    """Yield the paths to the leaves of a value."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    deeper = [path for key, held in inner for path in _paths(held, (*above, str(key)))]
+    deeper = [path for key, item in inner for path in _paths(item, (*above, str(key)))]
     yield from deeper or [above]
 
 
 def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[BaseModel], tuple[str, ...]]:
-    """The record that holds the last part of `loc`, and the path as the file's author wrote it.
+    """Return the record that contains the last part of `loc`, and the path in the file.
 
-    pydantic puts the tag of a union or the name of a tried type into `loc`: those parts are no keys of the file.
+    pydantic puts the tag of a union or the name of a tried type into `loc`: those parts are not keys of the file.
     """
     record: type[BaseModel] = model
     inside: Any = model
@@ -190,7 +189,7 @@ def _walk(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[type[Base
 
 
 def _records_in(annotation: Any) -> list[type[BaseModel]]:
-    """Record classes inside an annotation such as `tuple[Region, ...]` or `Spin | Sweep`."""
+    """Return the record classes inside an annotation such as `tuple[Region, ...]` or `Spin | Sweep`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [record for argument in get_args(annotation) for record in _records_in(argument)]

@@ -1,4 +1,4 @@
-"""Arrays of NumPy from `.npy` and `.npz` files: numbers only, of the size that the file can hold."""
+"""NumPy arrays from `.npy` and `.npz` files: numbers only, no larger than the file can contain."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from scanwright.design.errors import ScanwrightError
+from scanwright.design.files.text_files import first_line
 
-_NUMBERS = "biuf"
-_MOST_BYTES = 1 << 30  # an archive can be packed a thousandfold: a larger one is hardly packed, or refused
+_NUMBERS = "biuf"  # kinds of dtype
+_MOST_BYTES = 1 << 30  # unpacked, or 4 times the archive if that is more: zip compresses up to a thousandfold
 
 
 def read_npy(path: Path, refusal: type[ScanwrightError]) -> NDArray[Any]:
-    """The array of an `.npy` file: numbers, no objects.
+    """Return the array of an `.npy` file: numbers, no objects.
 
     Raises:
-        ScanwrightError: a `refusal`: the file cannot be read, or is no such array.
+        ScanwrightError: `refusal`: the file cannot be read, or is not such an array.
     """
     try:
         with path.open("rb") as stream:
@@ -28,14 +29,14 @@ def read_npy(path: Path, refusal: type[ScanwrightError]) -> NDArray[Any]:
     except OSError as error:
         raise refusal(f"{path}: cannot read: {error.strerror}") from error
     except Exception as error:
-        raise refusal(f"{path}: not an array of NumPy: {_first_line(error)}") from error
+        raise refusal(f"{path}: not an array of NumPy: {first_line(error)}") from error
 
 
 def read_npz(path: Path, refusal: type[ScanwrightError]) -> dict[str, NDArray[Any]]:
-    """The arrays of an `.npz` archive by name: numbers, no objects.
+    """Return the arrays of an `.npz` archive by name: numbers, no objects.
 
     Raises:
-        ScanwrightError: a `refusal`: the file cannot be read, or is no such archive.
+        ScanwrightError: `refusal`: the file cannot be read, or is not such an archive.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -43,15 +44,15 @@ def read_npz(path: Path, refusal: type[ScanwrightError]) -> dict[str, NDArray[An
             most = max(_MOST_BYTES, 4 * path.stat().st_size)
             if (size := sum(member.file_size for member in members)) > most:
                 raise ValueError(f"{size:,} bytes unpacked: at most {most:,}")
-            held = {}
+            arrays = {}
             for member in members:
                 with archive.open(member) as stream:
-                    held[member.filename.removesuffix(".npy")] = _array(stream, member.file_size)
-            return held
+                    arrays[member.filename.removesuffix(".npy")] = _array(stream, member.file_size)
+            return arrays
     except OSError as error:
-        raise refusal(f"{path}: cannot read: {error.strerror or _first_line(error)}") from error
+        raise refusal(f"{path}: cannot read: {error.strerror or first_line(error)}") from error
     except Exception as error:
-        raise refusal(f"{path}: not an archive of NumPy, or damaged: {_first_line(error)}") from error
+        raise refusal(f"{path}: not an archive of NumPy, or damaged: {first_line(error)}") from error
 
 
 def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
@@ -66,9 +67,5 @@ def _array(stream: IO[bytes], size: int) -> NDArray[Any]:
     if min(shape, default=0) < 0 or count * kind.itemsize > size:
         raise ValueError(f"an array of shape {shape}, {kind}, in {size:,} bytes")
     data = stream.read(count * kind.itemsize)
-    found = np.frombuffer(data, kind, count).reshape(shape, order="F" if fortran else "C")
-    return found.astype(kind.newbyteorder("="))
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]
+    array = np.frombuffer(data, kind, count).reshape(shape, order="F" if fortran else "C")
+    return array.astype(kind.newbyteorder("="))

@@ -1,4 +1,4 @@
-"""The base of all records that are read from a file."""
+"""The base class of all records that are read from files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ from pydantic import BaseModel, ConfigDict
 
 
 class Record(BaseModel):
-    """Immutable; a misspelt key is an error and not a default; NaN and infinity are refused."""
+    """Immutable; unknown keys, NaN and infinity are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)

@@ -1,4 +1,4 @@
-"""Text and TOML files, read with errors for a person."""
+"""Text and TOML files, with errors of one line."""
 
 from __future__ import annotations
 
@@ -8,18 +8,15 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from scanwright.design.errors import TaskError
-
-A_FILE_FOR_A_FOLDER = "this is a file; name the folder of a build, which holds"
-"""What is told to those who name a file of a build folder where the folder is meant; a file's name follows."""
+from scanwright.design.errors import MissingFileError, TaskError
 
 
 def read_text(path: Path) -> str:
-    """The text of a file in UTF-8, also where it begins with a byte order mark, as Windows' Notepad writes it.
+    """Return the text of a UTF-8 file, with or without a byte order mark (Notepad on Windows writes one).
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is not UTF-8.
+        ValueError: it is not UTF-8, or its path has a NUL.
     """
     data = path.read_bytes()
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
@@ -31,19 +28,39 @@ def read_text(path: Path) -> str:
     return io.StringIO(text, newline=None).read()
 
 
-def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The table of a TOML file.
+def read_text_of(path: Path, what: str) -> str:
+    """Return the text of a file that a task, a catalogue or an angle set is read from; `what` names it in errors.
 
     Raises:
-        TaskError: the file cannot be read or is not TOML.
+        MissingFileError: there is no such file.
+        TaskError: it cannot be read.
     """
     try:
-        return tomllib.loads(read_text(path))
+        return read_text(path)
     except NotADirectoryError as error:
-        raise TaskError(f"{path.parent}: {A_FILE_FOR_A_FOLDER} {path.name}") from error
-    except OSError as error:
-        raise TaskError(f"{path}: cannot read {what}: {error.strerror}") from error
+        raise TaskError(
+            f"{path.parent}: this is a file; name the folder of a build, which contains {path.name}"
+        ) from error
+    except (OSError, ValueError) as error:
+        kind = MissingFileError if isinstance(error, FileNotFoundError) else TaskError
+        raise kind(f"{path}: cannot read {what}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Return the table of a TOML file; `what` names it in errors.
+
+    Raises:
+        MissingFileError: there is no such file.
+        TaskError: it cannot be read, or is not TOML.
+    """
+    try:
+        return tomllib.loads(read_text_of(path, what))
     except RecursionError as error:
         raise TaskError(f"{path}: not a TOML file: nested too deeply") from error
-    except ValueError as error:  # not UTF-8, not TOML, or a path with a NUL in it
+    except tomllib.TOMLDecodeError as error:
         raise TaskError(f"{path}: not a TOML file: {error}") from error
+
+
+def first_line(error: Exception) -> str:
+    """Return the first line of an error of other libraries, or its type if it has no text."""
+    return (str(error).strip() or type(error).__name__).splitlines()[0][:200]

@@ -19,10 +19,11 @@ from scanwright.design.arrays import Array, Ints, Mask, Setting
 from scanwright.design.errors import TaskError
 from scanwright.design.motion import Spin, StopAndGo, Sweep
 from scanwright.design.objective.drawn_regions import Layer, Nodes, drawn_in, layers_of, nodes_in, value_and_required
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import EMPTY
 from scanwright.design.task.task import LoadedTask
 
+COUNTED = ("log", "kl", "required", "homogeneity", "worst")  # objectives with a formula in `_moments` and `_joined`
 SETS, POINTS = 8, 2**15  # shifts, and directions that each draws
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
 SMALL_RAD = 1e-3  # of a ball
@@ -56,7 +57,7 @@ def counted_J(
     points: int = POINTS,
     sets: int = SETS,
     bearings_rad: Array | None = None,
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Counted:
     """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
@@ -74,8 +75,10 @@ def counted_J(
         lever: the optical centre off the axis, in the rotation frame, as a share of the range.
 
     Raises:
-        TaskError: next to no direction that is drawn has a weight.
+        TaskError: next to no direction that is drawn has a weight, or the objective is not one of `COUNTED`.
     """
+    if loaded.task.density.objective not in COUNTED:
+        raise TaskError(f"density.objective = '{loaded.task.density.objective}': only {', '.join(COUNTED)} are counted")
     layers = layers_of(loaded)
     density = loaded.task.density
     ball = np.radians(density.ball_radius_deg)

@@ -1,10 +1,10 @@
-"""What the search minimises. Each objective is one function below, with its formula.
+"""What the search minimises. Each objective is one function `(field, loaded) -> Objective` below, with its formula.
 
-An objective is a few moments of the density, joined: `J = join(m_1, m_2, ..)`. A moment is the mean of g(d) over a
-weight and over the start phase of the turn, or the highest g(d) anywhere in it. Every g is convex and every join rises
-with every moment whose g bends, so J of the mean counts is a lower bound of J: what the search orders its work by.
-Weights that differ from region to region (`required`) are split by their levels: exact, one moment a level.
-When to take which: `docs/definitions.md`.
+`design.task.objective_names` lists them; installed packages add theirs by entry points. An objective is a few moments
+of the density, joined: `J = join(m_1, m_2, ..)`. A moment is the mean of g(d) over a weight and over the start phase of
+the turn, or the highest g(d) anywhere in it. Every g is convex and every join rises with every moment whose g bends, so
+J of the mean counts is a lower bound of J: the search orders its work by it. Weights that differ from region to region
+(`required`) are split by their levels: exact, one moment a level. When to use which: `docs/definitions.md`.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from scanwright.design.sphere.directions import equal_angle_grid
 from scanwright.design.sphere.painting import MAP, VALUE
 from scanwright.design.sphere.regions import Field, field_of
 from scanwright.design.sphere.total_weight import RELATIVE_ERROR, total_weight
+from scanwright.design.task.objective_names import objectives
 from scanwright.design.task.shapes import Region
 from scanwright.design.task.task import LoadedTask
 
@@ -62,21 +63,21 @@ def log_density(counts: Counts) -> Array:
 
 
 def objective_of(loaded: LoadedTask, field: Field) -> Objective:
-    """The objective that a task names, over its weights.
+    """Return the objective of a task over its weights.
 
     Raises:
-        TaskError: `required` without a number, or one that nothing asks for.
+        TaskError: the objective cannot be loaded, or is `required` and a region states no density.
     """
-    density = loaded.task.density
-    step_deg = density.grid_step_deg if density.quadrature == "equal_angle" else None
-    if density.objective == "required":
-        return required(loaded, field, step_deg)
-    if density.objective == "kl":
-        return kl(field, step_deg)
-    return {"log": log, "homogeneity": homogeneity, "worst": worst}[density.objective](field)
+    entry = objectives()[loaded.task.density.objective]
+    try:
+        make: Callable[[Field, LoadedTask], Objective] = entry.load()
+    except Exception as error:  # import of an installed package: it can raise anything
+        where = f"{loaded.source}: density.objective = '{entry.name}'"
+        raise TaskError(f"{where}: cannot load {entry.value} of an installed package: {error}") from error
+    return make(field, loaded)
 
 
-def log(field: Field) -> Objective:
+def log(field: Field, _loaded: LoadedTask | None = None) -> Objective:
     """`J = mean_w <-ln(1 + d)>`: `exp(J_other - J)` times more beams per ball, on the geometric mean."""
     return Objective("log", field, (Moment(field, log_density),), _first)
 
@@ -86,13 +87,14 @@ def beams_per_ball(objective: Objective, J: float) -> float | None:
     return float(np.expm1(-J)) + 0.0 if objective.name == "log" else None
 
 
-def kl(field: Field, grid_step_deg: float | None = None) -> Objective:
+def kl(field: Field, loaded: LoadedTask) -> Objective:
     """Distance to the target distribution [nat], 0 where the density is spread just as the weights are.
 
     `J = int p ln(p / q) dO` over the directions that have a weight, p = w / int w, q = (1 + d) / int (1 + d): only how
     the beams are shared out counts, not how many they are. The phase mean is taken of the logarithm, and of the
     normaliser by itself.
     """
+    grid_step_deg = _grid_step_deg(loaded)
     support = _mapped(field, lambda w: (w > 0).astype(float))
     least = _least(field)  # in units of it no weight has a negative logarithm
     logarithms = _mapped(field, lambda w: w * (np.log(np.where(w > 0, w, least)) - np.log(least)))
@@ -103,9 +105,9 @@ def kl(field: Field, grid_step_deg: float | None = None) -> Objective:
     return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift, error)
 
 
-def required(loaded: LoadedTask, field: Field, grid_step_deg: float | None = None) -> Objective:
+def required(field: Field, loaded: LoadedTask) -> Objective:
     """Mean shortfall, 0 to 1: `J = mean_w <max(0, 1 - d / r)>` with the density r that each region requires."""
-    asked = loaded.task.density.required
+    asked, grid_step_deg = loaded.task.density.required, _grid_step_deg(loaded)
     wanted = [asked if region.required is None else region.required for region in loaded.task.weight]
     wanted += [asked] if loaded.task.density.background > 0 else []
     lacking = [i for i, r in enumerate(wanted) if r is None]
@@ -129,7 +131,7 @@ def required(loaded: LoadedTask, field: Field, grid_step_deg: float | None = Non
     return Objective("required", field, shared, lambda m: np.tensordot(shares, m, axes=1), error)
 
 
-def homogeneity(field: Field) -> Objective:
+def homogeneity(field: Field, _loaded: LoadedTask | None = None) -> Objective:
     """Evenness in the region, 0 where every ball holds the same count: `J = ln(mean_w <d^2> / (mean_w <d>)^2)`.
 
     The second moment of counts in balls is the spherical Ripley function, integrated over the overlap of two balls;
@@ -139,9 +141,15 @@ def homogeneity(field: Field) -> Objective:
     return Objective("homogeneity", field, moments, _dispersion)
 
 
-def worst(field: Field) -> Objective:
+def worst(field: Field, _loaded: LoadedTask | None = None) -> Objective:
     """`J = -ln(1 + least)`, least = the fewest beams per ball anywhere in the region, at any start phase."""
     return Objective("worst", field, (Moment(field, log_density, "highest"),), _first)
+
+
+def _grid_step_deg(loaded: LoadedTask) -> float | None:
+    """Return the step of the paper's grid if the task sums over it, else None."""
+    density = loaded.task.density
+    return density.grid_step_deg if density.quadrature == "equal_angle" else None
 
 
 def _summed(field: Field, grid_step_deg: float | None) -> float:

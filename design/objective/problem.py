@@ -16,7 +16,7 @@ from scanwright.design.density.sweep import SweepLines
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.motion import Motion, Shortest, StopAndGo, Sweep
 from scanwright.design.objective.named_objectives import Objective, objective_of
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import EMPTY, equal_angle_grid, require_weight
 from scanwright.design.sphere.regions import Field, field_of
 from scanwright.design.task.task import LoadedTask
@@ -81,7 +81,7 @@ class Problem:
         """The same scanner with another aim."""
         return replace(self, objective=objective)
 
-    def behind(self, shadow: Shadow) -> Problem:
+    def behind(self, shadow: SelfOcclusion) -> Problem:
         """The same task for the beams that no part blocks that turns with the laser.
 
         Raises:

@@ -13,11 +13,11 @@ import numpy as np
 from scanwright.design.arrays import Setting
 from scanwright.design.density.beams import NO_LEVER
 from scanwright.design.errors import NumericalError, TaskError
-from scanwright.design.objective.counted import counted_J
+from scanwright.design.objective.counted import COUNTED, counted_J
 from scanwright.design.objective.named_objectives import log
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import Score, score
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 
 SURE = 4.0 / 3.0  # times the three standard errors that a count states
@@ -32,12 +32,13 @@ def require_counted(
     loaded: LoadedTask,
     angles_rad: Setting,
     found: Score,
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = NO_LEVER,
 ) -> None:
     """Compare the score of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with a count.
 
-    Of the objective `worst` a count finds an upper bound only, so J of `log` is compared too.
+    Of the objective `worst` a count finds an upper bound only, and objectives of installed packages have no formula
+    for counts: J of `log` is compared, which uses the same beams, regions and lines.
 
     Args:
         loaded: the task, with the motion of the score.
@@ -50,9 +51,11 @@ def require_counted(
         NumericalError: they differ by more than their errors.
         TaskError: the masks leave next to nothing of the regions.
     """
-    if loaded.task.density.objective == "worst":
+    objective = loaded.task.density.objective
+    if objective == "worst" or objective not in COUNTED:
         if shadow is None and lever == NO_LEVER:
-            _require_least(loaded, angles_rad, found)
+            if objective == "worst":
+                _require_least(loaded, angles_rad, found)
             _require_log(loaded, angles_rad)
         return
     points = FIRST
@@ -69,7 +72,7 @@ def _counted(
     loaded: LoadedTask,
     angles_rad: Setting,
     points: int,
-    shadow: Shadow | None,
+    shadow: SelfOcclusion | None,
     lever: tuple[float, float, float],
 ) -> tuple[float, float, int]:
     """J by counting, four standard errors of it, and the directions of each set that it took."""

@@ -1,7 +1,7 @@
-"""A parallel view of bodies: which way one looks, which pixel shows what, and how bright it is.
+"""A parallel view of bodies: direction of view, the body of each pixel, and its brightness.
 
-Rays are cast like beams. What a body shows is kept apart from what the others do, so that a picture can lay bodies over
-each other by their distances, or show one through another.
+Rays are cast like beams. Each body has its own view, so that a picture can combine bodies by distance or show one
+through another.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Rotation, Vector
 from scanwright.design.scene.ray_caster import Scene, cast
 
-DARKEST = 0.35  # of a surface that is seen edge on
+DARKEST = 0.35  # brightness of a surface seen edge on
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What the pixels show of a body, row after row from the top left.
+    """The pixels of a body, row by row from the top left.
 
     Attributes:
-        away_m: from the plane of the view, inf where the body is not, shape (n,).
+        away_m: distance from the plane of the view, inf without the body, shape (n,).
         brightness: 0 to 1, shape (n,).
     """
 
@@ -33,7 +33,7 @@ class Shown:
 
 
 def in_front(views: Sequence[Shown]) -> Shown:
-    """What several bodies together show: in each pixel the one that is nearest."""
+    """Return the view of several bodies: in each pixel the nearest one."""
     away_m, brightness = (np.stack(rows) for rows in zip(*((v.away_m, v.brightness) for v in views), strict=True))
     nearest = away_m.argmin(axis=0)[None]
     return Shown(*(np.take_along_axis(rows, nearest, axis=0)[0] for rows in (away_m, brightness)))
@@ -41,12 +41,12 @@ def in_front(views: Sequence[Shown]) -> Shown:
 
 @dataclass(frozen=True, slots=True)
 class ParallelView:
-    """Where one stands.
+    """Position and direction of the viewer.
 
     Attributes:
         axes: rows to the right, up, and back to the viewer.
-        low: middle of the lowest pixel at the left, in right and up [m].
-        away_m: of the plane of the view from the origin, along back: nothing is before it.
+        low: centre of the lowest pixel at the left, in right and up [m].
+        away_m: distance of the plane of the view from the origin, along back; no body is in front of it.
         pixel_m: width of a pixel.
         size: pixels, columns and rows.
     """
@@ -58,12 +58,12 @@ class ParallelView:
     size: tuple[int, int]
 
     def at(self, points_m: Float[ndarray, "*k 3"]) -> Float[ndarray, "*k 2"]:
-        """Columns and rows of points, from the middle of the pixel at the top left, shape (..., 2)."""
+        """Return columns and rows of points, from the centre of the top left pixel, shape (..., 2)."""
         x, y = np.moveaxis(points_m @ self.axes[:2].T - self.low, -1, 0) / self.pixel_m
         return np.stack([x, self.size[1] - 1 - y], axis=-1)
 
     def shown(self, scene: Scene, moved_m: Vector | None = None) -> Shown:
-        """Cast a body, or one that is moved by some way; only the pixels of its box get a ray."""
+        """Cast a body, optionally displaced by `moved_m`; only the pixels of its box get a ray."""
         columns, rows = self.size
         shift = np.zeros(3) if moved_m is None else moved_m
         seen = self.at(scene.triangles_m.reshape(-1, 3) + shift)
@@ -85,20 +85,20 @@ class ParallelView:
 def view_of(
     corners_m: Array, size: tuple[int, int], yaw_rad: float, pitch_rad: float, margin: float, R: Rotation | None = None
 ) -> ParallelView:
-    """The view that shows all of some points.
+    """Return the view that shows all of the points.
 
     Args:
         corners_m: the points, shape (n, 3).
         size: pixels, columns and rows.
         yaw_rad: of the viewer about z, from x.
         pitch_rad: of the viewer above the horizontal.
-        margin: width of the picture, as a multiple of what it shows.
+        margin: width of the picture over the width of the points.
         R: the frame in which z is upright, its axes as columns; the points' own by default.
     """
     cy, sy, cp, sp = np.cos(yaw_rad), np.sin(yaw_rad), np.cos(pitch_rad), np.sin(pitch_rad)
     axes = np.array([[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]])
     axes = axes if R is None else axes @ R.T
-    seen = np.ascontiguousarray((corners_m @ axes.T).T)  # numpy finds the least of a row ten times as fast
+    seen = np.ascontiguousarray((corners_m @ axes.T).T)  # numpy finds the minimum of a row ten times faster
     low, high = seen.min(axis=1), seen.max(axis=1)
     middle, half = (low + high) / 2, (high - low) / 2 * margin
     pixel = float(2 * max(half[:2] / size))

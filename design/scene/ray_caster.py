@@ -1,11 +1,11 @@
-"""The one ray caster: meshes of a room, a robot or a scanner, and what a beam hits first.
+"""The ray caster: meshes of a room, a robot or a scanner, and the surface that a beam hits first.
 
 Embree (extra `scene`) finds the triangle in single precision; the range is then taken from that triangle's plane in
-double precision, so that it is as exact as the mesh. Only a beam within float32 of an edge (some 1e-6 m in a room) may
-be given to the neighbour of the triangle that it truly hits. Where embree is not installed, an R-tree finds the
-triangle (`nearest`): the same ranges and incidences but for such beams, 10 to 50 times as slowly.
+double precision, so that it is as exact as the mesh. Only a beam within float32 of an edge (about 1e-6 m in a room) can
+be assigned to the neighbour of the triangle that it hits. Without embree an R-tree finds the triangle (`nearest`): the
+same ranges and incidences except for such beams, 10 to 50 times more slowly.
 
-trimesh, embree and rtree are imported where they are used: most commands never cast a ray.
+Functions import trimesh, embree and rtree, since most commands never cast a ray.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from scanwright.design.scene.nearest import Nearest, nearest_search
 SUFFIXES = (".stl", ".ply", ".obj", ".dae", ".glb")
 
 _AS_IT_IS = np.eye(4)
-_BATCH = 1 << 17  # rays; bounds what one cast holds beside its result
+_BATCH = 1 << 17  # rays; bounds the memory of one cast
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +48,12 @@ class Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hits:
-    """What each ray hits first; row i is ray i.
+    """The first hit of each ray; row i is ray i.
 
     Attributes:
-        range_m: shape (n,), inf where there is nothing.
-        incidence_rad: angle between ray and surface normal, 0 .. pi/2, shape (n,), NaN where there is nothing.
-        triangle: row of `Scene.triangles_m` and `Scene.normals`, shape (n,), -1 where there is nothing.
+        range_m: shape (n,), inf without a hit.
+        incidence_rad: angle between ray and surface normal, 0 .. pi/2, shape (n,), NaN without a hit.
+        triangle: row of `Scene.triangles_m` and `Scene.normals`, shape (n,), -1 without a hit.
     """
 
     range_m: Float[ndarray, " n"]
@@ -62,12 +62,12 @@ class Hits:
 
 
 def load_scene(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Scene:
-    """Scene of one mesh file; arguments and errors as for `load_triangles`."""
+    """Return the scene of one mesh file; arguments and errors as for `load_triangles`."""
     return build_scene(load_triangles(path, unit_m, T_world_mesh), str(path))
 
 
 def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Float[ndarray, "t 3 3"]:
-    """Corners of a mesh in the world [m], shape (t, 3, 3). The file's axes are taken as they are written.
+    """Return the corners of a mesh in the world [m], shape (t, 3, 3), with the axes of the file.
 
     Args:
         path: STL, PLY, OBJ, DAE or GLB.
@@ -75,7 +75,7 @@ def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _A
         T_world_mesh: pose of the mesh [m].
 
     Raises:
-        SceneError: the file is missing, is no mesh, holds no triangle, or says that its unit is another one.
+        SceneError: the file is missing, is not a mesh, has no triangle, or states another unit.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise SceneError(f"{path}: not a mesh by its name; a mesh is one of {', '.join(SUFFIXES)}")
@@ -88,16 +88,16 @@ def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _A
     try:
         loaded = trimesh.load_scene(path, process=False)
         triangles = np.asarray(loaded.to_mesh().triangles, dtype=float).reshape(-1, 3, 3)
-        said_m = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else unit_m
+        stated_m = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else unit_m
     except Exception as error:  # readers of a dozen formats fail with as many types
         raise SceneError(f"{path}: not a readable {path.suffix[1:].upper()} mesh: {type(error).__name__}") from error
-    if not np.isclose(said_m, unit_m):
-        raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file says that one unit is {said_m:g} m")
+    if not np.isclose(stated_m, unit_m):
+        raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file states that one unit is {stated_m:g} m")
     return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)
 
 
 def build_scene(triangles_m: Float[ndarray, "t 3 3"], name: str = "scene") -> Scene:
-    """Scene of triangles, shape (t, 3, 3); `name` is what an error calls it.
+    """Return the scene of triangles, shape (t, 3, 3); `name` is its name in errors.
 
     Raises:
         SceneError: no triangle has an area, or a corner is not a number.
@@ -116,10 +116,10 @@ def build_scene(triangles_m: Float[ndarray, "t 3 3"], name: str = "scene") -> Sc
 
 
 def cast(scene: Scene, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
-    """The nearest surface along each ray.
+    """Return the nearest surface along each ray.
 
     Args:
-        scene: what can be hit.
+        scene: the surfaces.
         origins_m: where the rays start, shape (n, 3), or (3,) for all.
         directions: unit vectors, shape (n, 3).
     """
@@ -141,7 +141,7 @@ def _cast_batch(scene: Scene, origins: Array, directions: Array, rows: slice, hi
     along = np.einsum("ij,ij->i", normal, direction)
     with np.errstate(divide="ignore", invalid="ignore"):
         exact = np.einsum("ij,ij->i", normal, corner - origin) / along
-    # Seen exactly edge on, a plane gives no range: there what the search found is the best there is.
+    # Seen exactly edge on, a plane gives no range: use that of the search.
     hits.range_m[rows] = np.where(hit, np.where(np.isfinite(exact), exact, roughly), np.inf)
     hits.incidence_rad[rows] = np.where(hit, np.arccos(np.minimum(np.abs(along), 1.0)), np.nan)
     hits.triangle[rows] = triangle

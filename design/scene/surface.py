@@ -1,4 +1,4 @@
-"""What is around the scanner: the surfaces of a mesh, seen from the optical centre, on a grid of directions."""
+"""Surfaces of a mesh, seen from the optical centre on a grid of directions."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Surface:
 
     Attributes:
         directions: unit vectors in the world, shape (rows, columns, 3).
-        range_m: inf where nothing is hit, shape (rows, columns).
-        incidence_rad: between ray and surface normal, NaN where nothing is hit, shape (rows, columns).
-        points_m: what is hit, in the frame of the mesh, shape (rows, columns, 3).
+        range_m: inf without a hit, shape (rows, columns).
+        incidence_rad: between ray and surface normal, NaN without a hit, shape (rows, columns).
+        points_m: the points hit, in the frame of the mesh, shape (rows, columns, 3).
     """
 
     directions: Float[ndarray, "rows columns 3"]
@@ -31,18 +31,18 @@ class Surface:
     points_m: Float[ndarray, "rows columns 3"]
 
     def area_per_sr(self) -> Float[ndarray, "rows columns"]:
-        """Square metres of surface behind a steradian, `r^2 / cos(incidence)`; 0 where nothing is hit."""
+        """Square metres of surface per steradian, `r^2 / cos(incidence)`; 0 without a hit."""
         hit = np.isfinite(self.range_m)
         across = np.cos(np.where(hit, self.incidence_rad, 0.0))
         return np.where(hit & (across > 1e-3), np.where(hit, self.range_m, 0.0) ** 2 / np.maximum(across, 1e-3), 0.0)
 
     def within(self, low_m: float, high_m: float) -> Bool[ndarray, "rows columns"]:
-        """Whether a surface lies between two ranges, shape (rows, columns)."""
+        """Return whether a surface is between two ranges, shape (rows, columns)."""
         return (self.range_m >= low_m) & (self.range_m <= high_m)
 
 
 def cell_directions(step_deg: float) -> Float[ndarray, "rows columns 3"]:
-    """Middles of the cells of a grid in theta and phi, shape (180 / step, 360 / step, 3)."""
+    """Return the centres of the cells of a grid in theta and phi, shape (180 / step, 360 / step, 3)."""
     rows = round(180 / step_deg)
     theta = (np.arange(rows) + 0.5) * np.pi / rows
     phi = (np.arange(2 * rows) + 0.5) * np.pi / rows
@@ -67,7 +67,7 @@ def cast_surface(
         step_deg: between the rays.
 
     Raises:
-        TaskError: the mesh cannot be read, or is hit nowhere.
+        TaskError: the mesh cannot be read, or no ray hits it.
     """
     directions = cell_directions(step_deg)
     roll, pitch, yaw = np.radians(rpy_deg)

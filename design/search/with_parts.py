@@ -26,7 +26,7 @@ from scanwright.design.objective.self_check import require_counted
 from scanwright.design.search.coarse import Progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.grid_classes import mirrors_of
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import sample_set
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import Limits, LoadedTask
@@ -48,11 +48,11 @@ class Workshop(Protocol):
     Settings are (alpha_rot, beta_rot, alpha_laser, beta_laser) in radians.
     """
 
-    def bound(self, setting_rad: Setting) -> Shadow | Refused:
+    def bound(self, setting_rad: Setting) -> SelfOcclusion | Refused:
         """What the parts hide at least, in closed form: `stator` is None, all of it holds at every axis angle."""
         ...
 
-    def shadow(self, setting_rad: Setting) -> Shadow | Refused:
+    def shadow(self, setting_rad: Setting) -> SelfOcclusion | Refused:
         """What the parts hide, from the parts themselves."""
         ...
 
@@ -73,7 +73,7 @@ class Chosen:
 
     family: Family
     bare: Score
-    shadow: Shadow
+    shadow: SelfOcclusion
     bounded: int
     built: int
     refused: tuple[str, ...]
@@ -154,7 +154,7 @@ def choose_with_parts(
     return replace(best, bounded=bounded, built=built, refused=tuple(refused))
 
 
-def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
+def score_with(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion) -> Score:
     """J of a setting whose parts hide beams.
 
     What turns with the laser only removes beams: exact. What stands still breaks the symmetry: its effect is the
@@ -182,7 +182,7 @@ def score_with(problem: Problem, angles_rad: Setting, shadow: Shadow) -> Score:
     )
 
 
-def checked_score(loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: Shadow | None) -> Score:
+def checked_score(loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Score:
     """Score a setting, with its parts if they are known, and compare J with a count over simulated beams.
 
     Raises:
@@ -214,7 +214,7 @@ def _blind(found: Score, avoid_holes: bool) -> bool:
 
 
 def _sampled(
-    problem: Problem, angles_rad: Setting, shadow: Shadow, index: int
+    problem: Problem, angles_rad: Setting, shadow: SelfOcclusion, index: int
 ) -> tuple[Float[ndarray, "2 moments"], float, int]:
     """Moments with and without what stands still, over one set of directions at one start phase, (2, moments).
 

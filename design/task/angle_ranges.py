@@ -1,4 +1,4 @@
-"""The mounting angles of a task: what each may be, and the grid that a search lays over that."""
+"""The mounting angles of a task: their ranges, and the grid of the search."""
 
 from __future__ import annotations
 
@@ -65,17 +65,17 @@ class AngleRanges(Record):
         return self
 
     def limits(self, name: str) -> Span:
-        """Range of one angle in degrees; both ends are equal where it is fixed."""
+        """Return the range of one angle in degrees; both ends are equal if it is fixed."""
         angle: Angle = getattr(self, f"{name}_deg")
         return angle if isinstance(angle, tuple) else (angle, angle)
 
     def hold(self, angles_deg: Sequence[float]) -> bool:
-        """Whether a setting, in the order of `NAMES`, is within all ranges."""
+        """Return whether a setting, in the order of `NAMES`, is within all ranges."""
         limits = [self.limits(name) for name in NAMES]
         return all(low - 1e-9 <= angle <= high + 1e-9 for angle, (low, high) in zip(angles_deg, limits, strict=True))
 
     def grid_deg(self, name: str) -> Array:
-        """Settings of one angle that the search visits, both limits included."""
+        """Return the values of one angle in the grid of the search, both limits included."""
         lower, upper = self.limits(name)
         steps = int(np.floor((upper - lower) / self.step_deg + 1e-9))
         grid = lower + self.step_deg * np.arange(steps + 1)

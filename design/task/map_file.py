@@ -12,14 +12,14 @@ from scanwright.design.errors import TaskError
 from scanwright.design.files.numpy_files import read_npy
 from scanwright.design.files.text_files import read_text
 
-_MOST_PIXELS = 1 << 25  # of a picture: 0.04 deg a pixel
+_MOST_PIXELS = 1 << 25  # of a picture: 0.04 deg each
 
 
 def read_map(path: Path) -> Array:
-    """Weights of cells, (rows, columns), of a PNG, CSV or NPY file.
+    """Return the weights of the cells, (rows, columns), of a PNG, CSV or NPY file.
 
     Raises:
-        TaskError: it is no table of finite numbers that are not negative, and some of them above 0.
+        TaskError: it is not a table of finite numbers of 0 or more, at least one of them above 0.
     """
     try:
         table = _map_table(path)
@@ -27,14 +27,14 @@ def read_map(path: Path) -> Array:
         raise
     except OSError as error:
         raise TaskError(f"{path}: cannot read the map: {error.strerror or error}") from error
-    except Exception as error:  # pictures that are damaged fail in a dozen ways
+    except Exception as error:  # damaged pictures raise a dozen types
         raise TaskError(f"{path}: cannot read the map: {error}") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "biuf":
         raise TaskError(f"{path}: a map is one table of real numbers")
     if table.ndim != 2 or table.size == 0:
         raise TaskError(f"{path}: a map has rows (theta) and columns (phi), this one has shape {table.shape}")
     if not np.isfinite(table).all() or (table < 0).any():
-        raise TaskError(f"{path}: a map holds weights: finite and not negative")
+        raise TaskError(f"{path}: a map contains weights: finite and not negative")
     if not table.any():
         raise TaskError(f"{path}: every weight of the map is 0: nothing in it counts")
     return table.astype(float)

@@ -1,4 +1,4 @@
-"""Whether the products that a task names exist, and whether they can do its motion."""
+"""Check that the products of a task exist and can do its motion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from scanwright.design.files.faults import Fault
 from scanwright.design.motion import Motion, Shortest, Spin, Sweep
 
 NAMED: dict[str, type[Product]] = {"sensor": Lidar, "servo": Servo, "slip_ring": SlipRing, "printer": Printer}
-"""Keys of a task that name a product, and of which kind it is."""
+"""Keys of a task that name a product, and its kind."""
 
 Names = Mapping[str, str | None]
 
 
 def motion_faults(names: Names, motion: Motion | Shortest, products: Catalogue) -> list[Fault]:
-    """What is wrong with the products of a task, or with its motion for them.
+    """Return the faults of the products of a task, and of its motion with them.
 
     Args:
         names: of the products, by the keys of `NAMED`.
-        motion: what they shall do.
-        products: those that there are.
+        motion: of the task.
+        products: the catalogue.
     """
     faults: list[Fault] = []
     for key, kind in NAMED.items():
@@ -43,7 +43,7 @@ def motion_faults(names: Names, motion: Motion | Shortest, products: Catalogue) 
 
 
 def fastest_rpm(names: Names, motion: Motion | Shortest, products: Catalogue) -> tuple[float, str]:
-    """How fast servo and slip ring of a task turn, and what says so: its field.
+    """Return the highest speed of servo and slip ring of a task [rpm], and the field that limits it.
 
     Raises:
         TaskError: one of them is not in the catalogue.
@@ -62,8 +62,8 @@ def _speed_faults(names: Names, motion: Motion | Shortest, products: Catalogue) 
         servo = products.get(str(names["servo"]), Servo)
         reach = servo.angular_range_deg / 2
         if max(-motion.limits_deg[0], motion.limits_deg[1]) > reach:
-            says = f" = {list(motion.limits_deg)}: the {servo.name} reaches -{reach:g} .. {reach:g}"
-            faults.append(Fault(("motion", "limits_deg"), says))
+            message = f" = {list(motion.limits_deg)}: the {servo.name} reaches -{reach:g} .. {reach:g}"
+            faults.append(Fault(("motion", "limits_deg"), message))
     if not isinstance(motion, Spin | Sweep):
         return faults
     most, field = fastest_rpm(names, motion, products)
@@ -73,9 +73,9 @@ def _speed_faults(names: Names, motion: Motion | Shortest, products: Catalogue) 
         span_deg, cruise_deg_s = motion.limits_deg[1] - motion.limits_deg[0], 6 * most
         rpm, least_s = motion.cruise_deg_s / 6, 2 * (span_deg / cruise_deg_s + cruise_deg_s / motion.accel_deg_s2)
     if rpm > most:
-        says = (
+        message = (
             f" = {motion.period_s:g}: that is {rpm:.3g} rpm, and {field} turns at {most:g} rpm at most, without a "
-            f"load: take {np.ceil(1000 * least_s) / 1000:g} or more"
+            f"load: use {np.ceil(1000 * least_s) / 1000:g} or more"
         )
-        faults.append(Fault(("motion", "period_s"), says))
+        faults.append(Fault(("motion", "period_s"), message))
     return faults

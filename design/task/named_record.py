@@ -1,41 +1,40 @@
-"""Tables of records that come with the package by name, or from a file that a person names."""
+"""Tables of shipped records by name, or of the file that the user names."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from scanwright.design.errors import TaskError, suggest
+from scanwright.design.errors import MissingFileError, TaskError, suggest
 from scanwright.design.files.text_files import read_toml
 
 
 def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], Path]:
-    """The table of a TOML file, or of one of the folder `shipped` by its bare name; and the file it came from.
+    """Return the table of a TOML file, or of a file of the folder `shipped` by its bare name; and its path.
 
     Args:
         path: the file, or the name.
-        shipped: folder of those that come with the package.
-        what: the word for it in messages, such as "task".
+        shipped: folder of the package with such files.
+        what: its name in messages, such as "task".
 
     Raises:
-        TaskError: there is none, or it is not TOML.
+        TaskError: there is no such file, or it is not TOML.
     """
-    source = _found(path, shipped, what)
+    source = _path_of(path, shipped, what)
     try:
         return read_toml(source, f"the {what} file"), source
-    except TaskError as error:
-        if not isinstance(error.__cause__, FileNotFoundError):
-            raise
-        beside = [str(other) for other in source.parent.glob("*.toml")]
-        raise TaskError(f"{path}: no such {what} file{suggest(str(path), [*beside, *names_in(shipped)])}") from error
+    except MissingFileError as error:
+        others = [str(other) for other in source.parent.glob("*.toml")]
+        known = suggest(str(path), [*others, *names_in(shipped)])
+        raise MissingFileError(f"{path}: no such {what} file{known}") from error
 
 
 def names_in(shipped: Path) -> list[str]:
-    """What can be named without a file."""
+    """Return the names of the shipped files."""
     return sorted(path.stem for path in shipped.glob("*.toml"))
 
 
-def _found(path: Path, shipped: Path, what: str) -> Path:
+def _path_of(path: Path, shipped: Path, what: str) -> Path:
     if path.suffix == ".toml" or path.is_file():
         return path
     named = shipped / f"{path}.toml"
@@ -47,8 +46,8 @@ def _found(path: Path, shipped: Path, what: str) -> Path:
     if path.is_dir():
         raise TaskError(f"{path}: this is a folder without a {within.name}, not a {what} file")
     if path.exists():
-        raise TaskError(f"{path}: this is no regular file, so no {what} file")
+        raise TaskError(f"{path}: not a regular file, so not a {what} file")
     if path.is_symlink():
-        raise TaskError(f"{path}: this is a link that leads to no file")
+        raise MissingFileError(f"{path}: a link to a file that does not exist")
     known = suggest(path.name, names_in(shipped))
-    raise TaskError(f"{path}: no such {what} file, and no shipped {what} of that name{known}")
+    raise MissingFileError(f"{path}: no such {what} file, and no shipped {what} of that name{known}")

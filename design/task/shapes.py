@@ -1,13 +1,13 @@
-"""Regions of the sphere, of planes around the scanner, and of a scene, as a task file paints them.
+"""Regions of the sphere, of planes around the scanner, and of a scene, in a task file.
 
-Files speak degrees, and metres where a plane or a mesh does; every key that has a unit ends in it.
+Files contain degrees, and metres for planes and meshes; every key with a unit ends in it.
 """
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, Strict, field_validator, model_valid
 from scanwright.design.files.record import Record
 
 Number = Annotated[float, Strict()]
-"""An int or a float of the file; text and true are no numbers."""
+"""An int or a float of the file; text and booleans are not accepted."""
 
 Span = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
@@ -34,8 +34,8 @@ Far = Annotated[Number, Field(ge=-1e4, le=1e4)]
 Turn = Annotated[Number, Field(ge=-360, le=360)]
 Heading = Annotated[Number, Field(ge=-720, le=720)]
 THINNEST_DEG = 1e-3
-STRIPS = 20_000  # of the area of a plane
-LITTLE = 1e-3  # share of a plane beyond a range that is worth no word
+STRIPS = 20_000  # of the area of a plane, to integrate the part in range
+LITTLE = 1e-3  # share of a plane out of range that is not reported
 HEADINGS = {0.0: " ahead", 90.0: " to the left", 180.0: " behind", 270.0: " to the right"}
 
 GridStep = Annotated[Number, Field(ge=0.25, le=10), AfterValidator(_divides_the_half_circle)]
@@ -96,7 +96,7 @@ class ConeRegion(Record):
 class MapRegion(Record):
     """A picture or table of weights: rows theta 0..180, columns phi 0..360, cell centres; PNG value / 255 (grey).
 
-    A .npy or .csv table is taken as it is. `value` scales it.
+    A .npy or .csv table is used unchanged. `value` scales it.
     """
 
     shape: Literal["map"] = Field(description="weights in a picture or a table")
@@ -106,7 +106,7 @@ class MapRegion(Record):
 
 
 class Placed(Record):
-    """A mesh, and where the scanner's optical centre and the world's axes are in it (roll, pitch, yaw; z last)."""
+    """A mesh, and the scanner's optical centre and the world's axes in it (roll, pitch, yaw; z last)."""
 
     file: str = Field(description=".stl, .ply, .obj, .dae or .glb, beside the task")
     unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
@@ -118,14 +118,14 @@ class Placed(Record):
 
 
 class MeshRegion(Placed):
-    """What a mesh hides, such as the robot: every direction in which it is hit."""
+    """Every direction in which a mesh, such as the robot, is hit."""
 
     shape: Literal["mesh"] = Field(description="where a mesh is, such as the robot itself")
     value: Value = 1.0
 
 
 class BoxRegion(Record):
-    """Surfaces of the scene within a box of its frame. Every square metre of them counts the same."""
+    """Surfaces of the scene within a box of its frame. Every square metre counts the same."""
 
     shape: Literal["box"] = Field(description="surfaces of the [scene] inside a box")
     min_m: Triple = Field(description="its lowest corner, in the frame of the scene's mesh")
@@ -140,20 +140,24 @@ class BoxRegion(Record):
         return self
 
 
+Pairs = tuple[tuple[str, str], ...]
+
+
 class OnPlane(Record):
     """A rectangle on a plane near the scanner, in metres: all directions in which its optical centre sees it.
 
-    The world's axes: x ahead, y to the left, z up. Every direction of it weighs the same, so its near part, which fills
-    more of the view, weighs more by the square metre.
+    The world's axes: x ahead, y to the left, z up. Every direction has the same weight, so the near part, which fills
+    more of the view, has a higher weight per square metre.
     """
 
+    _rising: ClassVar[Pairs]  # fields: the first of each pair must be below the second
     heading_deg: Number = Field(default=0.0, ge=-360, le=360, description="where it lies: 0 is ahead, 90 left")
     height_m: Length = Field(description="of the scanner's optical centre over the ground")
     value: Value = 1.0
     required: Required = None
 
     def corners_m(self) -> tuple[Triple, Triple, Triple, Triple]:
-        """Its corners from the optical centre, one after the other around it."""
+        """Return its corners from the optical centre, in order around it."""
         turn = math.radians(self.heading_deg)
         a, b, c, d = (
             (x * math.cos(turn) - y * math.sin(turn), x * math.sin(turn) + y * math.cos(turn), z)
@@ -162,7 +166,7 @@ class OnPlane(Record):
         return a, b, c, d
 
     def share_beyond(self, reach_m: float) -> float:
-        """Share of its area that lies further away from the optical centre than a reach."""
+        """Return the share of its area that is farther from the optical centre than `reach_m`."""
         corners = np.array(self.corners_m())
         sides_m = corners[[1, 3]] - corners[0]
         a_m, b_m = np.linalg.norm(sides_m, axis=1)
@@ -176,24 +180,20 @@ class OnPlane(Record):
         return max(0.0, float(1 - strips_m.mean() / b_m))
 
     def words(self) -> str:
-        """What it is."""
+        """Return its description."""
         return f"{self._named()}{HEADINGS.get(self.heading_deg % 360, f' at {self.heading_deg:g} deg')}"
 
     @abstractmethod
     def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
-        """The corners where it lies ahead."""
+        """Return the corners at heading 0."""
 
     @abstractmethod
     def _named(self) -> str:
-        """What it is, but for its heading."""
-
-    @abstractmethod
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of fields: the first of each is below the second."""
+        """Return its description without the heading."""
 
     @model_validator(mode="after")
     def _can_be_aimed_at(self) -> OnPlane:
-        for low, high in self._rising():
+        for low, high in self._rising:
             if not getattr(self, low) < getattr(self, high):
                 raise ValueError(f"{high} = {getattr(self, high):g} is not above {low} = {getattr(self, low):g}")
         a, b, c, d = self.corners_m()
@@ -206,6 +206,7 @@ class OnPlane(Record):
 class GroundRegion(OnPlane):
     """A rectangle of level ground, in metres from below the scanner."""
 
+    _rising: ClassVar[Pairs] = (("from_m", "to_m"),)
     shape: Literal["ground"] = Field(description="level ground, in metres")
     from_m: Far = Field(description="where it begins; negative is behind")
     to_m: Far = Field(description="where it ends")
@@ -217,13 +218,11 @@ class GroundRegion(OnPlane):
     def _named(self) -> str:
         return f"ground {self.from_m:g} to {self.to_m:g} m"
 
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        return (("from_m", "to_m"),)
-
 
 class CeilingRegion(OnPlane):
     """A rectangle of a level ceiling, in metres from above the scanner."""
 
+    _rising: ClassVar[Pairs] = ("height_m", "ceiling_m"), ("from_m", "to_m")
     shape: Literal["ceiling"] = Field(description="a level ceiling, in metres")
     ceiling_m: Length = Field(default=2.5, description="its height over the ground")
     from_m: Far = Field(default=-2.0, description="where it begins; negative is behind")
@@ -236,13 +235,11 @@ class CeilingRegion(OnPlane):
     def _named(self) -> str:
         return f"ceiling at {self.ceiling_m:g} m, {self.from_m:g} to {self.to_m:g} m"
 
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        return ("height_m", "ceiling_m"), ("from_m", "to_m")
-
 
 class WallRegion(OnPlane):
     """A rectangle of an upright wall across the heading."""
 
+    _rising: ClassVar[Pairs] = (("bottom_m", "top_m"),)
     shape: Literal["wall"] = Field(description="an upright wall, in metres")
     distance_m: Length = Field(description="to it, level")
     width_m: Length = Field(description="across, half of it to each side")
@@ -257,12 +254,9 @@ class WallRegion(OnPlane):
     def _named(self) -> str:
         return f"wall {self.distance_m:g} m away, {self.bottom_m:g} to {self.top_m:g} m high"
 
-    def _rising(self) -> tuple[tuple[str, str], ...]:
-        return (("bottom_m", "top_m"),)
-
 
 def beyond_words(share: float) -> str:
-    """A share of a plane that is beyond a range: all of it only where nothing is left."""
+    """Return a share of a plane that is out of range as text: "all" only if nothing is within."""
     return "all" if share == 1 else f"{min(share, 0.9999):.2%}" if share > 0.99 else f"{100 * share:.2g}%"
 
 

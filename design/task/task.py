@@ -1,6 +1,6 @@
-"""The task file: what the scanner shall see, what it is made of, and which angles may be chosen.
+"""The task file: regions of interest, products, and the mounting angles to search.
 
-Files speak degrees and millimetres; every key that has a unit ends in it.
+Files contain degrees and millimetres; every key with a unit ends in it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from scanwright.design.camera import Camera
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.deck_holes import DeckHoles
-from scanwright.design.errors import ScanwrightError, TaskError
-from scanwright.design.files.faults import Fault, faults_of, tell
+from scanwright.design.errors import ScanwrightError, TaskError, suggest
+from scanwright.design.files.faults import Fault, faults_in, format_faults
 from scanwright.design.files.record import Record
 from scanwright.design.motion import Motion, Shortest, Sweep
 from scanwright.design.scanner import NO_MODULES, Modules, Scanner, scanner_of
@@ -32,6 +32,7 @@ from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.map_file import read_map
 from scanwright.design.task.named_products import NAMED, motion_faults
 from scanwright.design.task.named_record import named_table, names_in
+from scanwright.design.task.objective_names import SHIPPED_OBJECTIVES, objectives
 from scanwright.design.task.shapes import (
     LITTLE,
     BoxRegion,
@@ -59,18 +60,16 @@ STAND_INS: dict[str, Any] = {
     "servo": "MX-64R",
     "motion": {"mode": "sweep", "limits_deg": (-1.0, 1.0), "period_s": 600.0},
 }
-"""For keys without a default that are wrong in a file, while the others are looked at: nothing is wrong with these."""
+"""Valid values that replace faulty keys without a default, so that the other keys can be checked."""
 
 
 class DensityRules(Record):
-    """How density is counted and judged; see `docs/definitions.md`, Density and Objective."""
+    """How density is counted and J is computed; see `docs/definitions.md`, Density and Objective."""
 
     ball_radius_deg: Number = Field(
         default=2.0, ge=SMALLEST_BALL_DEG, le=90, description="beams this near to a direction count for it"
     )
-    objective: Literal["log", "kl", "required", "homogeneity", "worst"] = Field(
-        default="log", description="what J is; see Definitions"
-    )
+    objective: str = Field(default="log", description="what J is; see Definitions", examples=[*SHIPPED_OBJECTIVES])
     required: Required = None
     background: Value = Field(default=0.0, description="how much directions matter that no weight names")
     quadrature: Literal["solid_angle", "equal_angle"] = Field(
@@ -80,9 +79,16 @@ class DensityRules(Record):
     tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
     budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
 
+    @field_validator("objective")
+    @classmethod
+    def _is_an_objective(cls, name: str) -> str:
+        if name not in (known := objectives()):
+            raise ValueError(f"no objective of that name{suggest(name, known)}")
+        return name
+
 
 class Limits(Record):
-    """What every reported setting must keep, whatever its J."""
+    """Limits that every reported setting must meet."""
 
     min_density: Number | None = Field(default=None, ge=1, description="beams per ball, anywhere in the region")
     max_line_gap_deg: Number | None = Field(default=None, gt=0, le=360, description="between neighbouring scan lines")
@@ -95,10 +101,10 @@ class Task(Record):
     """One task file with every default written out."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="of the task and its build folder")
-    sensor: str = Field(description="the 2D lidar: `scanwright catalogue --kind lidar` lists them")
-    servo: str = Field(description="what turns it: `scanwright catalogue --kind servo` lists them")
+    sensor: str = Field(description="the 2D lidar, by its name in the catalogue")
+    servo: str = Field(description="what turns it, by its name in the catalogue")
     slip_ring: str | None = Field(default=None, description="what lets its cable turn for ever; a sweep needs none")
-    printer: str = Field(default="fdm-0.4", description="how the parts are made: `scanwright catalogue --kind printer`")
+    printer: str = Field(default="fdm-0.4", description="how the parts are made, by its name in the catalogue")
     catalogue: tuple[str, ...] = Field(default=(), description="product files of your own, beside the task")
     deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck")
     modules: Modules = Field(default=NO_MODULES, description="parts that it works without: none by default")
@@ -127,7 +133,7 @@ class Task(Record):
 
     @field_validator("motion", mode="before")
     @classmethod
-    def _spins_if_not_told(cls, motion: Any) -> Any:
+    def _spins_by_default(cls, motion: Any) -> Any:
         if not isinstance(motion, dict):
             return motion
         if motion.get("period_s") == "shortest" and motion.get("mode", "spin") == "spin":
@@ -142,16 +148,16 @@ class Task(Record):
         return name
 
     def product_names(self) -> dict[str, str | None]:
-        """What it is made of: the product under each key that names one."""
+        """Return the product under each key that names one."""
         return {key: getattr(self, key) for key in NAMED}
 
 
 @dataclass(frozen=True, slots=True)
 class LoadedTask:
-    """A task, the file it came from, the products it names, and its maps.
+    """A task, its file, its products, and its maps.
 
-    `maps` holds the tables of the `map` and `mesh` regions, weights first, then masks, in their order; (rows, columns)
-    each. `surface` is what the rays into the scene hit.
+    `maps` contains the tables of the `map` and `mesh` regions, weights first, then masks, in order; (rows, columns)
+    each. `surface` is the surface that the rays into the scene hit.
     """
 
     task: Task
@@ -161,7 +167,7 @@ class LoadedTask:
     surface: Surface | None = None
 
     def angle_set(self, angles_deg: Sequence[float]) -> AngleSet:
-        """Mounting angles with the products of this task, in the order of `NAMES`; the motion is open where it is."""
+        """Return mounting angles, in the order of `NAMES`, with the products of this task and its motion, if known."""
         task = self.task
         return AngleSet(
             task=task.name,
@@ -173,7 +179,7 @@ class LoadedTask:
         )
 
     def scanner(self, angles: AngleSet) -> Scanner:
-        """The scanner of an angle set, with the printer, the deck and the modules of this task.
+        """Return the scanner of an angle set, with the printer, the deck and the modules of this task.
 
         Raises:
             TaskError: a product of the angle set is not in the catalogue.
@@ -191,16 +197,16 @@ class LoadedTask:
         return self.products.get(self.task.servo, Servo)
 
     def warnings(self) -> list[str]:
-        """What the task can do, but not as well as its author may think."""
+        """Return warnings: what the scanner of this task does less well than expected."""
         return [*self.unread_angles(), *self._out_of_range()]
 
     def misfits(self) -> list[str]:
-        """Its products that printed parts do not fit, and why, in lines."""
+        """Return a line for each product that printed parts do not fit, with the reason."""
         names = (self.task.sensor, self.task.servo, self.task.slip_ring)
         return [line for name in names if name for line in self.products.products[name].misfit()]
 
     def _out_of_range(self) -> list[str]:
-        """Planes that the lidar does not reach, where no scene tells how far everything is."""
+        """Return warnings of planes outside the lidar's range; none with a scene, which has all ranges."""
         if self.task.scene is not None:
             return []
         reach_m = self.lidar.practical_range_m
@@ -211,26 +217,26 @@ class LoadedTask:
         ]
         return [
             f"{name}: {beyond_words(beyond)} of it lies beyond the {reach_m:g} m that {self.lidar.name} sees, and J "
-            "counts beams that measure nothing there; bring it nearer, or take a lidar that sees farther"
+            "counts beams that measure nothing there; move it nearer, or use a lidar with a longer range"
             for name, beyond in planes
             if beyond > LITTLE
         ]
 
     def unread_angles(self) -> list[str]:
-        """Where the servo reads no angle in a part of every turn: what makes it a poor choice anywhere."""
+        """Return a warning if the servo measures no angle in a part of every turn."""
         seen_deg = self.servo.position_feedback_deg
         if seen_deg < 360 and not isinstance(self.task.motion, Sweep):
             return [
                 f"{self.servo.name}: position_feedback_deg = {seen_deg:g}: in {360 - seen_deg:g} deg of every turn no "
-                "angle is read, and scans there have none; take a servo that reads all around, such as MX-64R"
+                "angle is measured, and scans there have none; use a servo that measures all around, such as MX-64R"
             ]
         return []
 
     def sha256(self) -> str:
-        """Digest of all that decides the result: the task, its maps, and the records of its products."""
-        task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # it only looks on
+        """Return the digest of all inputs of the result: the task, its maps, and the records of its products."""
+        task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # no part of the result
         for region in [*task["weight"], *task["mask"]]:
-            region.pop("file", None)  # what is in it counts, not what it is called
+            region.pop("file", None)  # its contents count, not its name
         if task["scene"]:
             task["scene"].pop("file")
         parts = [json.dumps(task, sort_keys=True)]
@@ -249,7 +255,7 @@ def load_task(source: Path | str | Mapping[str, Any], folder: Path = Path()) -> 
 
     Args:
         source: the file, the name, or the table.
-        folder: where the files are that a table names; those that a file names lie beside it.
+        folder: of the files that a table names; those of a task file are next to it.
 
     Raises:
         TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
@@ -261,15 +267,15 @@ def load_task(source: Path | str | Mapping[str, Any], folder: Path = Path()) -> 
 
 
 def _load(table: dict[str, Any], source: Path) -> LoadedTask:
-    """The task of a table, with its products and maps; all that is wrong is told at once."""
+    """Return the task of a table, with its products and maps; report all faults at once."""
     task, faults = _sound_part(table)
     if task is None:
-        raise TaskError(tell(faults, source))
+        raise TaskError(format_faults(faults, source))
     try:
         products = load_catalogue(*(source.parent / extra for extra in task.catalogue))
         own_products = ""
         faults += motion_faults(task.product_names(), task.motion, products)
-    except TaskError as error:  # it names lines of files of its own
+    except TaskError as error:  # it names lines of other files
         own_products = str(error)
     limits = task.limits
     if isinstance(task.motion, Shortest) and limits.min_density is None and limits.max_line_gap_deg is None:
@@ -291,18 +297,18 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     ]
     surface = None if task.scene is None else tried("scene", partial(_surface, task.scene, source.parent))
     if faults or own_products:
-        raise TaskError("\n".join(each for each in (own_products, tell(faults, source)) if each))
+        raise TaskError("\n".join(each for each in (own_products, format_faults(faults, source)) if each))
     return LoadedTask(task, source, products, tuple(each for each in maps if each is not None), surface)
 
 
 def _sound_part(table: dict[str, Any]) -> tuple[Task | None, list[Fault]]:
-    """The task without what is wrong in its file, so that the rest can be looked at; None where too little is left."""
+    """Return the task without its faulty keys, so that the rest can be checked, or None; and the faults."""
     try:
         return Task.model_validate(table), []
     except ValidationError as error:
-        faults = faults_of(error, Task)
+        faults = faults_in(error, Task)
     wrong = {fault.path[0] for fault in faults if fault.path}
-    wrong |= {"motion"} if wrong & {"servo", "slip_ring"} else set()  # what these cannot do is asked for by the motion
+    wrong |= {"motion"} if wrong & {"servo", "slip_ring"} else set()  # the motion is checked against these
     sound = {key: value for key, value in table.items() if key not in wrong}
     try:
         return Task.model_validate({key: STAND_INS[key] for key in STAND_INS if key not in sound} | sound), faults
@@ -311,7 +317,7 @@ def _sound_part(table: dict[str, Any]) -> tuple[Task | None, list[Fault]]:
 
 
 def shipped_tasks() -> list[str]:
-    """Names of the tasks that come with the package."""
+    """Return the names of the shipped tasks."""
     return names_in(SHIPPED)
 
 
@@ -320,7 +326,7 @@ def _surface(placed: Placed, folder: Path) -> Surface:
 
 
 def _table(region: MapRegion | MeshRegion, folder: Path) -> Array:
-    """Weights of a map, or 1 where a mesh is hit and 0 where not."""
+    """Return the weights of a map, or 1 for hits of a mesh and 0 elsewhere."""
     if isinstance(region, MapRegion):
         return read_map(folder / region.file)
     return np.isfinite(_surface(region, folder).range_m).astype(float)

@@ -38,7 +38,7 @@ from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import Block, straight
 
 Per = Literal["recording", "turn", "half"]
-_WHOLE_RAD = {"turn": 2 * math.pi, "half": math.pi}
+_PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
@@ -48,15 +48,15 @@ _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
 
 @dataclass(frozen=True, slots=True)
 class BeamLimits:
-    """Which beams are wanted.
+    """Limits that a beam must keep to become a point.
 
     Attributes:
-        min_range_m: shorter ones are too near, also where the sensor means them.
-        max_range_m: longer ones are too far.
-        edges_deg: leave out what hangs between two surfaces, as `between_surfaces` finds it; None to keep it.
+        min_range_m: shorter ranges are dropped, even if the sensor allows them.
+        max_range_m: longer ranges are dropped.
+        edges_deg: drop points between two surfaces, see `between_surfaces`; None keeps them.
 
     Raises:
-        RecordingError: a limit is none.
+        RecordingError: a limit is out of bounds.
     """
 
     min_range_m: float = 0.0
@@ -66,10 +66,10 @@ class BeamLimits:
     def __post_init__(self) -> None:
         if not 0 <= self.min_range_m < self.max_range_m:
             raise RecordingError(
-                f"--min-range-m = {self.min_range_m}, --max-range-m = {self.max_range_m}: 0 <= the one < the other"
+                f"min_range_m = {self.min_range_m}, max_range_m = {self.max_range_m}: allowed 0 <= minimum < maximum"
             )
         if self.edges_deg is not None and not 0 < self.edges_deg < 45:
-            raise RecordingError(f"--edges-deg = {self.edges_deg}: above 0, below 45; 8 is usual")
+            raise RecordingError(f"edges_deg = {self.edges_deg}: must be above 0 and below 45; 8 is usual")
 
     def limited(self, block: Block) -> Block:
         """The scans, as if their sensor saw no nearer and no farther."""
@@ -79,9 +79,9 @@ class BeamLimits:
     def leave_out(self, block: Block, placed: PlacedBlock) -> None:
         """Take what hangs between two surfaces out of a placed block."""
         if self.edges_deg is not None:
-            gone = (placed.verdict == Verdict.POINT) & between_surfaces(block, self.edges_deg)
-            placed.verdict[gone] = Verdict.BETWEEN_SURFACES
-            placed.points_m[gone] = np.nan
+            dropped = (placed.verdict == Verdict.POINT) & between_surfaces(block, self.edges_deg)
+            placed.verdict[dropped] = Verdict.BETWEEN_SURFACES
+            placed.points_m[dropped] = np.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class AssembleSummary:
         height: scans.
         padding: rows that fill up scans shorter than `width`.
         left_out: reason -> beams; NaN rows in an organised cloud, absent in a flat one.
-        said: what a person should know, one sentence each.
+        notes: what a person should know, one sentence each.
     """
 
     out: Path
@@ -110,7 +110,7 @@ class AssembleSummary:
     height: int
     padding: int
     left_out: dict[str, int]
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
         """The same in words."""
@@ -119,7 +119,7 @@ class AssembleSummary:
             rows = f"wrote {self.rows:,} rows ({self.points:,} points, {self.width:,} rows a scan)"
         where = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
         return [
-            *self.said,
+            *self.notes,
             *(f"left out {count:,} beams: {reason.replace('_', ' ')}" for reason, count in self.left_out.items()),
             f"{rows} to {where}",
         ]
@@ -163,9 +163,9 @@ def assemble_recording(
     _check(out, lag_s, columns)
     source = open_recording(recording)
     if smooth:
-        curve, said = axis_curve(source.joint_log, held=source.held)
+        curve, notes = axis_curve(source.joint_log, at_rest=source.at_rest)
     else:
-        curve, said = straight(source.joint_log), "axis angle: straight between samples, as asked"
+        curve, notes = straight(source.joint_log), "axis angle: straight between samples, as asked"
     cloud_from_rows = _cloud_of(source, per, round(lag_s * 1e9))
     fields = cloud_fields(source.has_intensity, columns)
     if source.beams.max() > _RINGS:
@@ -211,8 +211,8 @@ def assemble_recording(
         height=source.beams.size,
         padding=width * source.beams.size - beam_count if width else 0,
         left_out=_left_out(counts),
-        said=(
-            said,
+        notes=(
+            notes,
             *_about_sensor(source, angles.sensor),
             *(*_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
             *_about_slivers(clouds, per),
@@ -236,14 +236,14 @@ def _cloud_of(source: Recording, per: Per, lag_ns: int) -> NDArray[np.int64]:
     if per == "recording":
         return np.zeros(source.stamp_ns.size, np.int64)
     logged_ns = source.stamp_ns + lag_ns
-    starts_ns = turn_starts(source.joint_log, int(logged_ns[0]), _WHOLE_RAD[per])
+    starts_ns = turn_starts(source.joint_log, int(logged_ns[0]), _PER_RAD[per])
     return np.maximum.accumulate(np.searchsorted(starts_ns, logged_ns, side="right"))
 
 
-def _by_cloud(found: Iterable[Block], cloud_from_rows: NDArray[np.int64]) -> Iterator[tuple[int, Block]]:
+def _by_cloud(blocks: Iterable[Block], cloud_from_rows: NDArray[np.int64]) -> Iterator[tuple[int, Block]]:
     """The blocks, none of them in two clouds, each behind the number of its cloud."""
     at = 0
-    for block in found:
+    for block in blocks:
         numbers = cloud_from_rows[at : at + len(block.stamp_ns)]
         at += numbers.size
         ends = [*(np.flatnonzero(np.diff(numbers)) + 1).tolist(), numbers.size]
@@ -264,19 +264,19 @@ def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
     if not isinstance(named, Lidar):
         return
     scan = next(iter(source.scans()))
-    own_deg, found_deg = np.degrees(named.bearings_rad()), np.degrees(np.sort(scan.bearing_rad))
-    if found_deg.size < 2:
+    own_deg, scan_deg = np.degrees(named.bearings_rad()), np.degrees(np.sort(scan.bearing_rad))
+    if scan_deg.size < 2:
         return
     step_deg, grid_deg = 360 / named.steps_per_turn, math.degrees(abs(scan.angle_increment_rad))
     if own_deg.size >= named.steps_per_turn - 1:  # drivers give what turns all around any grid, but no gap
-        other = np.ptp(found_deg) < 0.9 * 360
+        other = np.ptp(scan_deg) < 0.9 * 360
     else:
         steps = grid_deg / step_deg
-        beyond = found_deg[0] < own_deg[0] - grid_deg or found_deg[-1] > own_deg[-1] + grid_deg
+        beyond = scan_deg[0] < own_deg[0] - grid_deg or scan_deg[-1] > own_deg[-1] + grid_deg
         other = beyond or abs(steps - max(round(steps), 1)) > _STEP_ERROR * steps
     if other:
         yield (
-            f"warning: its beams go from {found_deg[0]:.4g} to {found_deg[-1]:.4g} deg, {grid_deg:.3g} deg apart, "
+            f"warning: its beams go from {scan_deg[0]:.4g} to {scan_deg[-1]:.4g} deg, {grid_deg:.3g} deg apart, "
             f"those of {sensor} from {own_deg[0]:.4g} to {own_deg[-1]:.4g} deg, {step_deg:.3g} deg apart: are these "
             "the angles of another scanner?"
         )
@@ -285,7 +285,7 @@ def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
 def _about_gaps(source: Recording) -> Iterator[str]:
     """Time that is missing; scans that were left out on the way between two stops are not."""
     usual_s = float(np.median(np.diff(source.stamp_ns))) / 1e9 if source.stamp_ns.size > 1 else math.inf
-    known_ns = np.union1d(source.stamp_ns, source.joint_log.time_ns) if source.held else source.stamp_ns
+    known_ns = np.union1d(source.stamp_ns, source.joint_log.time_ns) if source.at_rest else source.stamp_ns
     gap_s = np.diff(known_ns) / 1e9
     if long := int(np.sum(gap_s > _LONG_GAP * usual_s)):
         longest, at_s = gap_s.max(), (known_ns[gap_s.argmax()] - source.start_ns) / 1e9

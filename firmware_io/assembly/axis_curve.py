@@ -51,19 +51,19 @@ class SmoothAxis:
     error_rad: float
 
 
-def axis_curve(log: JointLog, *, held: bool) -> tuple[AxisCurve, str]:
+def axis_curve(log: JointLog, *, at_rest: bool) -> tuple[AxisCurve, str]:
     """The angle to assemble with, and one line about it: smoothed where that is better than straight lines.
 
-    `held`: the motor stood still during each scan; the log is exact then.
+    `at_rest`: the motor stood still during each scan; the log is exact then.
     """
-    if held:
+    if at_rest:
         return straight(log), "axis angle: held during each scan"
-    found = smooth(log)
-    if isinstance(found, str):
-        return straight(log), f"axis angle: straight between samples ({found})"
-    off_deg, error_deg = np.degrees([found.residual_rad, found.error_rad])
-    return found.curve, (
-        f"axis angle: smoothed, a knot every {found.knot_s:.3g} s; samples lie {off_deg:.2g} deg rms off the curve, "
+    fitted = smooth(log)
+    if isinstance(fitted, str):
+        return straight(log), f"axis angle: straight between samples ({fitted})"
+    off_deg, error_deg = np.degrees([fitted.residual_rad, fitted.error_rad])
+    return fitted.curve, (
+        f"axis angle: smoothed, a knot every {fitted.knot_s:.3g} s; samples lie {off_deg:.2g} deg rms off the curve, "
         f"the curve about {error_deg:.1g} deg rms off the truth"
     )
 
@@ -160,13 +160,13 @@ def _b_splines(at: Floats, knots: Floats, piece: Ints, degree: int) -> list[Floa
     """The B-splines that are not 0 in the piece of each time, number `piece - degree` first (de Boor's recurrence)."""
     value = [np.ones_like(at)]
     for d in range(1, degree + 1):
-        kept = np.zeros_like(at)
+        carry = np.zeros_like(at)
         for k in range(d):
             after, before = knots[piece + k + 1], knots[piece + k + 1 - d]
             part = value[k] / (after - before)
-            value[k] = kept + (after - at) * part
-            kept = (at - before) * part
-        value.append(kept)
+            value[k] = carry + (after - at) * part
+            carry = (at - before) * part
+        value.append(carry)
     return value
 
 

@@ -73,12 +73,12 @@ class AxisWindow:
         log = JointLog(np.array(self._time_ns), np.array(self._position_rad))
         if self.last_ns - self._chosen_ns > _CHOOSE_NS:
             self._per_knot = None
-        found = smooth(log, longest_knot_s=behind_s, per_knot=self._per_knot)
+        fitted = smooth(log, longest_knot_s=behind_s, per_knot=self._per_knot)
         if self._per_knot is None:
             self._chosen_ns = self.last_ns
         self._fitted_ns = self.last_ns
         self._serves_until_ns = self.last_ns - round(behind_s * 1e9)
-        if isinstance(found, str):
+        if isinstance(fitted, str):
             self._curve, self._error_rad, self._per_knot = None, math.nan, None
         else:
-            self._curve, self._error_rad, self._per_knot = found.curve, found.error_rad, found.per_knot
+            self._curve, self._error_rad, self._per_knot = fitted.curve, fitted.error_rad, fitted.per_knot

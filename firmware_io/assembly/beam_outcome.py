@@ -67,6 +67,6 @@ def between_surfaces(block: Block, grazing_deg: float) -> Bool[ndarray, "scans b
 
     nearer = [slant_rad(side) < grazing_rad for side in (left, right)]
     farther = [slant_rad(side) > np.pi - grazing_rad for side in (left, right)]
-    found = np.zeros(r.shape, bool)
-    found[:, 1:-1] = (nearer[0] & farther[1]) | (nearer[1] & farther[0])
-    return found
+    between = np.zeros(r.shape, bool)
+    between[:, 1:-1] = (nearer[0] & farther[1]) | (nearer[1] & farther[0])
+    return between

@@ -217,11 +217,11 @@ def _judge(range_m: Float32s, angle_rad: Floats, fan: _Fan, verdict: Bytes) -> N
     near_m, far_m = fan.near_m, fan.far_m
     for k in range(range_m.size):
         r = range_m[k]
-        found = fan.verdict[k]
-        found = _NO_ANGLE if angle_rad[k] != angle_rad[k] else found
-        found = _TOO_FAR if r > far_m else found
-        found = _TOO_NEAR if r < near_m else found
-        verdict[k] = _NO_RETURN if (r != r) | (r == np.inf) | (r == 0) else found
+        outcome = fan.verdict[k]
+        outcome = _NO_ANGLE if angle_rad[k] != angle_rad[k] else outcome
+        outcome = _TOO_FAR if r > far_m else outcome
+        outcome = _TOO_NEAR if r < near_m else outcome
+        verdict[k] = _NO_RETURN if (r != r) | (r == np.inf) | (r == 0) else outcome
     steps = fan.stator.shape[1]
     if steps:
         for k in range(range_m.size):

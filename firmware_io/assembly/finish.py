@@ -44,9 +44,9 @@ class Finish:
     normals: bool = False
 
     def __post_init__(self) -> None:
-        for name, value in (("--outliers", self.outlier_sigmas), ("--voxel-m", self.voxel_m)):
+        for name, value in (("outliers", self.outlier_sigmas), ("voxel_m", self.voxel_m)):
             if value is not None and not 0 < value < np.inf:
-                raise RecordingError(f"{name} = {value}: a number above 0")
+                raise RecordingError(f"{name} = {value}: must be above 0 and finite")
 
     @property
     def thins(self) -> bool:
@@ -56,20 +56,17 @@ class Finish:
 
 def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
     """Where the scanner was when it saw each point of a cloud of ours, shape (n, 3)."""
-    stands_m = angles.T_world_rot(0.0)[:3, 3]
+    origin_m = angles.T_world_rot(0.0)[:3, 3]
 
     def of(cloud: Cloud) -> Floats:
         if poses is None:
-            return np.broadcast_to(stands_m, cloud.points_m.shape).astype(float)
+            return np.broadcast_to(origin_m, cloud.points_m.shape).astype(float)
         if cloud.start_ns is None or "time_s" not in cloud.columns:
-            raise RecordingError(
-                "--normals on a map: the times of the points tell where they were seen from: "
-                "leave time_s among the --columns"
-            )
+            raise RecordingError("normals of a map need the times of its points: include time_s in columns")
         time_ns = cloud.start_ns + np.rint(cloud.columns["time_s"] * 1e9).astype(np.int64)
         # a time in the file is rounded: the first and the last point may come to lie just outside
         T = poses.T_map_world(np.clip(time_ns, poses.time_ns[0], poses.time_ns[-1]))
-        return T[:, :3, :3] @ stands_m + T[:, :3, 3]
+        return T[:, :3, :3] @ origin_m + T[:, :3, 3]
 
     return of
 
@@ -83,16 +80,16 @@ def finish_clouds(
         RecordingError: the format cannot hold them, or points are to go from an organised cloud.
         InstallError: the format needs the extra `clouds`.
     """
-    left_out, said, rows = Counter(summary.left_out), list(summary.said), 0
+    left_out, notes, rows = Counter(summary.left_out), list(summary.notes), 0
     written: list[Path] = []
     for path in summary.clouds:
         (cloud, *_), _ = read_clouds(path)
-        cloud, gone = _finished(cloud, finish, where)
-        left_out.update(gone)
+        cloud, dropped = _finished(cloud, finish, where)
+        left_out.update(dropped)
         target = out.with_name(f"{path.stem}{out.suffix}")
         wrote = write_clouds(target, [cloud], organised=organised)
         rows += wrote.rows
-        said += [line for line in wrote.said if line not in said]
+        notes += [line for line in wrote.notes if line not in notes]
         written += wrote.paths
     return replace(
         summary,
@@ -101,23 +98,23 @@ def finish_clouds(
         points=summary.beams - sum(left_out.values()),
         rows=rows,
         left_out=dict(left_out),
-        said=tuple(said),
+        notes=tuple(notes),
     )
 
 
 def _finished(cloud: Cloud, finish: Finish, where: SeenFrom) -> tuple[Cloud, dict[str, int]]:
-    gone: dict[str, int] = {}
+    dropped: dict[str, int] = {}
     if finish.outlier_sigmas is not None:
         stray = filters.outliers(cloud.points_m, finish.outlier_sigmas)
-        gone["outlier"] = int(stray.sum())
-        cloud = cloud.taken(np.flatnonzero(~stray))
+        dropped["outlier"] = int(stray.sum())
+        cloud = cloud.select(np.flatnonzero(~stray))
     if finish.voxel_m is not None:
-        kept = filters.one_to_a_voxel(cloud.points_m, finish.voxel_m)
-        gone["another_point_of_the_voxel"] = len(cloud.points_m) - len(kept)
-        cloud = cloud.taken(kept)
+        rows_kept = filters.one_to_a_voxel(cloud.points_m, finish.voxel_m)
+        dropped["another_point_of_the_voxel"] = len(cloud.points_m) - len(rows_kept)
+        cloud = cloud.select(rows_kept)
     if finish.normals:
         there = cloud.valid
         normal = np.full(cloud.points_m.shape, np.nan, np.float32)
         normal[there] = filters.normals(cloud.points_m[there], where(cloud)[there])
         cloud = replace(cloud, columns={**cloud.columns, **dict(zip(("nx", "ny", "nz"), normal.T.copy(), strict=True))})
-    return cloud, {reason: count for reason, count in gone.items() if count}
+    return cloud, {reason: count for reason, count in dropped.items() if count}

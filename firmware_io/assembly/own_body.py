@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
-from scanwright.design.shadow import load_own_body
+from scanwright.design.self_occlusion import load_self_occlusion
 
 FILE_NAME = "own_body.npz"
 _TURN = 2 * np.pi
@@ -63,7 +63,7 @@ class OwnBody:
         return nearest, np.abs(self.bearing_rad[nearest] - folded) <= step
 
 
-def own_body_beside(angles: Path) -> OwnBody | None:
+def own_body_of(angles: Path) -> OwnBody | None:
     """The mask in the folder of an angle set; None where there is none.
 
     Raises:
@@ -72,6 +72,6 @@ def own_body_beside(angles: Path) -> OwnBody | None:
     path = angles.parent / FILE_NAME
     if not path.is_file():
         return None
-    shadow, bearing_rad = load_own_body(path)
+    shadow, bearing_rad = load_self_occlusion(path)
     stator = np.zeros((bearing_rad.size, 0), bool) if shadow.stator is None else shadow.stator
     return OwnBody(bearing_rad, shadow.beams, stator)

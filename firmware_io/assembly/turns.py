@@ -13,8 +13,8 @@ from scanwright.firmware_io.samples import JointLog
 _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash
 
 
-def turn_starts(log: JointLog, begin_ns: int, whole_rad: float) -> Int64[ndarray, " turns"]:
-    """Times at which the axis has turned by a further `whole_rad`, or turns back, increasing.
+def turn_starts(log: JointLog, begin_ns: int, turn_rad: float) -> Int64[ndarray, " turns"]:
+    """Times at which the axis has turned by a further `turn_rad`, or turns back, increasing.
 
     The first turn begins at `begin_ns`, and each way anew at its turning point: a full scan of a sweep, there and back,
     is two of them, as its ways see the same directions twice.
@@ -27,23 +27,23 @@ def turn_starts(log: JointLog, begin_ns: int, whole_rad: float) -> Int64[ndarray
     starts = [time_ns[back]]
     for first, last in pairwise([0, *back, position.size - 1]):
         turned = np.maximum.accumulate(np.abs(position[first : last + 1] - position[first]))
-        whole = np.arange(whole_rad, turned[-1], whole_rad)
-        since_ns = np.interp(whole, turned, (time_ns[first : last + 1] - time_ns[first]).astype(float))
+        ends_rad = np.arange(turn_rad, turned[-1], turn_rad)
+        since_ns = np.interp(ends_rad, turned, (time_ns[first : last + 1] - time_ns[first]).astype(float))
         starts.append(time_ns[first] + np.rint(since_ns).astype(np.int64))
     return np.unique(np.concatenate(starts))
 
 
 def _turning_points(position: list[float]) -> list[int]:
     """Indices of the extremes from which the axis goes back by more than noise."""
-    found = []
-    way, extreme = 0, 0
+    turning = []
+    sense, extreme = 0, 0
     for i, here in enumerate(position):
-        ahead = (here - position[extreme]) * (way or 1)
-        if way == 0 and abs(ahead) > _NOISE_RAD:
-            way, extreme = (1 if ahead > 0 else -1), i
-        elif way and ahead >= 0:
+        ahead = (here - position[extreme]) * (sense or 1)
+        if sense == 0 and abs(ahead) > _NOISE_RAD:
+            sense, extreme = (1 if ahead > 0 else -1), i
+        elif sense and ahead >= 0:
             extreme = i
-        elif way and ahead < -_NOISE_RAD:
-            found.append(extreme)
-            way, extreme = -way, i
-    return found
+        elif sense and ahead < -_NOISE_RAD:
+            turning.append(extreme)
+            sense, extreme = -sense, i
+    return turning

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,8 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.entropy import witness
 from scanwright.firmware_io.calibration.estimate import Estimate, estimate
@@ -53,7 +54,7 @@ def calibrate_recordings(
     *,
     one_place: bool = False,
     own_body: OwnBody | None = None,
-    say: Callable[[str], None] = lambda _: None,
+    progress: Progress = no_progress,
 ) -> Calibration:
     """Write the calibrated angle set to `out` and what was found to `report_path(out)`.
 
@@ -63,7 +64,7 @@ def calibrate_recordings(
         out: the calibrated angle set, `.json`.
         one_place: the scanner stood still from the first recording to the last.
         own_body: beams that end on the scanner itself, to be left out.
-        say: told what is going on.
+        progress: callback.
 
     Raises:
         RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
@@ -73,30 +74,30 @@ def calibrate_recordings(
         raise RecordingError(f"{out}: an angle set is JSON; name it {out.with_suffix('.json').name}")
     for k, recording in enumerate(recordings):
         if recording.resolve() in [other.resolve() for other in recordings[:k]]:
-            raise RecordingError(f"{recording}: named twice; the same beams twice tell nothing more, but seem to")
-    say(f"reading {len(recordings)} recording{'s'[: len(recordings) > 1]}")
+            raise RecordingError(f"{recording}: given twice; the same beams would count as independent")
+    progress("reading recordings")
     gamma_rot_rad = math.radians(angles.angles_deg.gamma_rot)
     opened = [open_recording(path) for path in recordings]
     beams, left_out = gather(opened, one_place=one_place, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
     mount, start = Mount.of(angles), start_vector(angles)
-    say(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
+    progress(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
     try:
-        found = estimate(beams, mount, start)
+        result = estimate(beams, mount, start)
     except RecordingError as refusal:
-        say("asking how late the angles are")
+        progress("estimating the time offset of the angles")
         named = ", ".join(str(path) for path in recordings)
         raise RecordingError(f"{named}: {refusal}{_late(opened)}") from refusal
-    say("asking the entropy")
-    seen = witness(mount, beams, fan_side(beams, mount), start, found.x, found.noise_m)
+    progress("comparing with the entropy of the cloud")
+    seen = witness(mount, beams, fan_side(beams, mount), start, result.x, result.noise_m)
     record = {
         "recordings": [path.name for path in recordings],
         "left_out": left_out,
-        **calibration_report(found, start, mount, beams, seen),
+        **calibration_report(result, start, mount, beams, seen),
     }
-    calibration = Calibration(calibrated(angles, found), record, out)
-    with whole_file(out, RecordingError) as part, whole_file(report_path(out), RecordingError) as beside:
+    calibration = Calibration(calibrated(angles, result), record, out)
+    with atomic_write(out, RecordingError) as part, atomic_write(report_path(out), RecordingError) as report_part:
         part.write_text(calibration.angles.to_json(), encoding="utf-8")
-        beside.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        report_part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return calibration
 
 
@@ -117,15 +118,15 @@ def report_path(out: Path) -> Path:
     return out.with_suffix(".report.json")
 
 
-def calibrated(angles: AngleSet, found: Estimate) -> AngleSet:
+def calibrated(angles: AngleSet, result: Estimate) -> AngleSet:
     """The angle set with the mounting errors that were found, and their covariance (rad and m)."""
-    x = found.x
+    x = result.x
     offset_mm = np.round(x[2:4] * 1e3, 5)
     return angles.model_copy(
         update={
             "source": "calibration",
             "delta_rotvec_rot_deg": tuple(np.round(np.degrees(x[0:2]), 7).tolist()),
             "t_rot_laser_mm": (*offset_mm.tolist(), angles.t_rot_laser_mm[2]),
-            "covariance": tuple(tuple(row) for row in found.covariance[:4, :4].tolist()),
+            "covariance": tuple(tuple(row) for row in result.covariance[:4, :4].tolist()),
         }
     )

@@ -31,7 +31,7 @@ def clear_of_edges(
     tile = tiles.tile
     surface = grouping.surface[tile]
     on = np.flatnonzero(surface >= 0)
-    tile, surface, beams = tile[on], surface[on], tiles.beams.taken(on).under(x)
+    tile, surface, beams = tile[on], surface[on], tiles.beams.select(on).under(x)
     origin, direction = beam_rays(mount, x, beams)
     length = np.linalg.norm(grouping.q, axis=1)
     slant = np.sum(grouping.q[surface] * direction, axis=1)
@@ -42,9 +42,9 @@ def clear_of_edges(
     clear &= ~_crossed(
         origin, direction, met_m, surface, grouping.q, grouping.q / length[:, None], place, low_m, high_m, _APART * sd_m
     )
-    whole = np.zeros(tiles.tile.size, bool)
-    whole[on] = clear
-    return whole
+    complete = np.zeros(tiles.tile.size, bool)
+    complete[on] = clear
+    return complete
 
 
 def _boxes(
@@ -52,7 +52,7 @@ def _boxes(
 ) -> tuple[Floats, Floats, Ints]:
     """Where each surface has been seen, shapes (s, 3) and (s, 3), and from which place, shape (s,)."""
     used = grouping.used
-    middle = tiles.middle.taken(used).under(x)
+    middle = tiles.middle.select(used).under(x)
     origin, direction = beam_rays(mount, x, middle)
     point = origin + (middle.range_m + x[4])[:, None] * direction
     surface = grouping.surface[used]

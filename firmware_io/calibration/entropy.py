@@ -65,17 +65,17 @@ def witness(
     beams: ReturnedBeams,
     side: Int64[ndarray, " beams"],
     start: Float64[ndarray, " parameters"],
-    found: Float64[ndarray, " parameters"],
+    estimated: Float64[ndarray, " parameters"],
     noise_m: float,
 ) -> Witness:
     """Ask the entropy before, after, and around the result."""
     rng = np.random.default_rng(0)
     halves = [np.flatnonzero(side == k) for k in (0, 1)]
     sample = np.concatenate([rng.choice(half, min(half.size, _SAMPLE), replace=False) for half in halves])
-    few, one = beams.taken(sample), side[sample] == 0
+    few, one = beams.select(sample), side[sample] == 0
 
     # The same weights for all, or their own change would pass for one of the cloud
-    weight = _areas(mount, found, few)
+    weight = _areas(mount, estimated, few)
     width_m = max(3 * noise_m, 0.03, _SPACINGS * _spacing_m(beams, float(np.average(few.range_m, weights=weight))))
 
     def crispness(x: Floats) -> _Crispness:
@@ -83,8 +83,8 @@ def witness(
         origin, direction = beam_rays(mount, x, late)
         return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, one, width_m)
 
-    before, after = crispness(start), crispness(found)
-    around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, found, k, after.entropy) for k in MOUNT}
+    before, after = crispness(start), crispness(estimated)
+    around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, estimated, k, after.entropy) for k in MOUNT}
     spread = (after.share - before.share) * after.weight
     return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
 

@@ -21,6 +21,7 @@ from scanwright.firmware_io.calibration.model import (
     beam_rays,
 )
 from scanwright.firmware_io.calibration.observable import Choice, check_fan, choose_observable, several_speeds, spectrum
+from scanwright.firmware_io.calibration.scene_motion.drift import Drift, drifts
 from scanwright.firmware_io.calibration.solve import (
     Grouping,
     bulge_m,
@@ -33,7 +34,6 @@ from scanwright.firmware_io.calibration.solve import (
 )
 from scanwright.firmware_io.calibration.surfaces import group, without_misfits
 from scanwright.firmware_io.calibration.tiles import FlatTiles, flat_tiles
-from scanwright.firmware_io.calibration.unrest.drift import Drift, drifts
 
 # (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
@@ -89,14 +89,14 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
     for near_m, turn_deg in _WIDE:
         x, grouping, normal = _coarse(tiles, mount, x, free, near_m, turn_deg)
     x, grouping, normal = _coarse(tiles, mount, x, np.union1d(free, MOUNT), *_WIDE[-1])
-    choice = choose_observable(beams, tiles, grouping, normal, mount.play_rad)
+    choice = choose_observable(beams, tiles, grouping, normal, mount.backlash_rad)
     for near_m, turn_deg in _NARROW:
         x, grouping, normal = _coarse(tiles, mount, x, choice.free, near_m, turn_deg)
     last_m = max(_LAST_NOISES * tiles.noise_m, _LAST_M)
     for _ in range(_ROUNDS):
-        choice = choose_observable(beams, tiles, grouping, normal, mount.play_rad)
-        held = np.setdiff1d(np.arange(COUNT), choice.free)
-        x[held] = start[held]
+        choice = choose_observable(beams, tiles, grouping, normal, mount.backlash_rad)
+        fixed = np.setdiff1d(np.arange(COUNT), choice.free)
+        x[fixed] = start[fixed]
         grouping = group(tiles, mount, x, last_m, *np.radians([_LAST_DEG, _LAST_VAGUE_DEG]))
         near = _refined(tiles, mount, x, choice.free, grouping, grouping.surface[tiles.tile] >= 0)
         clear = clear_of_edges(mount, near.x, tiles, near.grouping, near.bulge_m)
@@ -108,7 +108,7 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
         x=x,
         choice=choice,
         covariance=scale * covariance(part)
-        + _of_held_backlash(normal, grouping, choice.free, last.bulge_m, mount.play_rad),
+        + _of_fixed_backlash(normal, grouping, choice.free, last.bulge_m, mount.backlash_rad),
         spectrum=spectrum(part, choice.free),
         tiles=tiles,
         grouping=grouping,
@@ -119,11 +119,11 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
     )
 
 
-def _of_held_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: float, play_rad: float) -> Floats:
+def _of_fixed_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: float, backlash_rad: float) -> Floats:
     """Covariance that a backlash brings which is held at 0 and may be as wide as the gear's play, shape (k, k)."""
     if BACKLASH[0] in free:
         return np.zeros((free.size, free.size))
-    moved = moved_by_last(reduced(normal, grouping, np.append(free, BACKLASH), bulge)) * play_rad
+    moved = moved_by_last(reduced(normal, grouping, np.append(free, BACKLASH), bulge)) * backlash_rad
     return np.outer(moved, moved)
 
 
@@ -142,7 +142,7 @@ def _refined(
     tiles: FlatTiles, mount: Mount, x: Floats, free: Ints, grouping: Grouping, which: NDArray[np.bool_]
 ) -> _Refined:
     """Solve with some beams of the tiles, one by one; tiles that none is left of, or that do not fit, drop out."""
-    own, tile = tiles.beams.taken(which), tiles.tile[which]
+    own, tile = tiles.beams.select(which), tiles.tile[which]
     weight = 1 / tiles.variance_m2[tile]
     count = np.bincount(tile, minlength=tiles.count.size)
     grouping = replace(grouping, surface=np.where(count > 0, grouping.surface, -1))
@@ -164,7 +164,7 @@ def _coarse(
     plane = _planes(grouping)
     slant = np.sum(plane * beam_rays(mount, x, tiles.middle.under(x))[1], axis=1) / np.linalg.norm(plane, axis=1)
     weight = 1 / (variance + (_TRUST * near_m / slant) ** 2)[on]
-    own, tile = tiles.middle.taken(on), np.flatnonzero(on)
+    own, tile = tiles.middle.select(on), np.flatnonzero(on)
     for _ in range(_STEPS):
         x, grouping, _ = _iterated(mount, x, free, grouping, own, tile, weight, 0.0)
     normal = sums(mount, x, own.under(x), tile, 1 / variance[on], _planes(grouping))

@@ -76,14 +76,14 @@ def find_lag(recording: Recording) -> Lag:
         RecordingError: its axis does not turn there and back, or its scene tells less than a quarter of a second.
     """
     curve = lag_curve(recording.scans(), recording.joint_log, _LAGS_S)
-    still_s = float(np.median(np.diff(recording.stamp_ns))) / 2e9 if recording.held else 0.0
+    still_s = float(np.median(np.diff(recording.stamp_ns))) / 2e9 if recording.at_rest else 0.0
     sd_s = float(np.hypot(curve.sd_s, still_s))
     if sd_s > _VAGUE_S or curve.best_s in (_LAGS_S[0], _LAGS_S[-1]):
         raise RecordingError(f"{recording.path}: the scene does not tell how late the angles are")
     log = recording.joint_log
     first_ns, _, last_ns = _there_and_back(log)
-    on_way = log.position_rad[(log.time_ns >= first_ns) & (log.time_ns <= last_ns)]
-    return Lag(curve.best_s, sd_s, float(np.abs(np.diff(on_way)).sum()) / (last_ns - first_ns) * 1e9)
+    positions = log.position_rad[(log.time_ns >= first_ns) & (log.time_ns <= last_ns)]
+    return Lag(curve.best_s, sd_s, float(np.abs(np.diff(positions)).sum()) / (last_ns - first_ns) * 1e9)
 
 
 def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Float64[ndarray, " lags"]) -> LagCurve:
@@ -167,16 +167,16 @@ def _differences(
     low = max(np.nanmin(joint_rad[there]), np.nanmin(joint_rad[back]))
     high = min(np.nanmax(joint_rad[there]), np.nanmax(joint_rad[back]))
     cells = np.linspace(low, high, _CELLS)
-    images = [_range_image(joint_rad, range_m, way, cells) for way in (there, back)]
+    images = [_range_image(joint_rad, range_m, direction, cells) for direction in (there, back)]
     both = np.minimum(np.abs(images[0] - images[1]), _CAP_M)
     return np.nansum(both, axis=1), np.isfinite(both).sum(axis=1).astype(float)
 
 
-def _range_image(joint_rad: Floats, range_m: Floats, way: Mask, cells: Floats) -> Floats:
+def _range_image(joint_rad: Floats, range_m: Floats, direction: Mask, cells: Floats) -> Floats:
     """Range of each beam at each angle cell, straight between neighbouring scans, shape (beams, cells)."""
     image = np.full((range_m.shape[1], cells.size), np.nan)
     for beam in range(range_m.shape[1]):
-        use = way[:, beam]
+        use = direction[:, beam]
         angle, distance = joint_rad[use, beam], range_m[use, beam]
         order = np.argsort(angle, kind="stable")
         if order.size:

@@ -5,7 +5,7 @@ In the frame of the axis that stands still (`rot` at joint 0), a beam of joint a
     p   = o + (r + bias) d,     o = Rz(psi) t,     d = Rz(psi) exp(delta) R_designed [cos b, sin b, 0]
     psi = j(t + lag) + cos1 cos j + sin1 sin j + cos2 cos 2j + sin2 sin 2j - way backlash / 2
 
-`way` is the sign of the turning. Rotation about the axis, translation along it, and the zero of the bearing are
+`direction` is the sign of the turning. Rotation about the axis, translation along it, and the zero of the bearing are
 gauges: no static scene shows them, so they are no parameters.
 """
 
@@ -32,7 +32,7 @@ from scanwright.firmware_io.recording.recording import Recording
 from scanwright.firmware_io.samples import AxisCurve
 
 _SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed
-STANDING_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder that flickers by one step
+AT_REST_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder that flickers by one step
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +55,13 @@ class Parameter:
 
 
 _DEG, _MM, _MS = float(np.degrees(1.0)), 1e3, 1e3
-_TURN, _WAY = np.radians(0.15), 5e-3
+_TURN, _DIRECTION = np.radians(0.15), 5e-3
 PARAMETERS = (
     Parameter("delta_x_rad", "tilt about x", _DEG, "deg", _TURN),
     Parameter("delta_y_rad", "tilt about y", _DEG, "deg", _TURN),
-    Parameter("t_x_m", "offset along x", _MM, "mm", _WAY),
-    Parameter("t_y_m", "offset along y", _MM, "mm", _WAY),
-    Parameter("range_bias_m", "range bias", _MM, "mm", _WAY),
+    Parameter("t_x_m", "offset along x", _MM, "mm", _DIRECTION),
+    Parameter("t_y_m", "offset along y", _MM, "mm", _DIRECTION),
+    Parameter("range_bias_m", "range bias", _MM, "mm", _DIRECTION),
     Parameter("cos_1_rad", "1st harmonic, cosine", _DEG, "deg", _TURN),
     Parameter("sin_1_rad", "1st harmonic, sine", _DEG, "deg", _TURN),
     Parameter("cos_2_rad", "2nd harmonic, cosine", _DEG, "deg", _TURN),
@@ -98,7 +98,7 @@ class ReturnedBeams:
     time_ns: Int64[ndarray, " n"]
     curves: tuple[AxisCurve, ...]
 
-    def taken(self, which: NDArray[np.generic]) -> ReturnedBeams:
+    def select(self, which: NDArray[np.generic]) -> ReturnedBeams:
         """Some of the beams: a mask or indices."""
         columns = {name: getattr(self, name)[which] for name in _COLUMNS}
         return ReturnedBeams(**columns, curves=self.curves)
@@ -116,9 +116,9 @@ class ReturnedBeams:
         return self.late_by(x[LAG[0]]) if x[LAG[0]] else self
 
     @property
-    def way(self) -> Float64[ndarray, " n"]:
+    def direction(self) -> Float64[ndarray, " n"]:
         """+1, -1 or 0 (standing) for each beam."""
-        return np.where(np.abs(self.speed_rad_s) > STANDING_RAD_S, np.sign(self.speed_rad_s), 0.0)
+        return np.where(np.abs(self.speed_rad_s) > AT_REST_RAD_S, np.sign(self.speed_rad_s), 0.0)
 
 
 _COLUMNS = ("range_m", "bearing_rad", "joint_rad", "speed_rad_s", "recording", "place", "time_ns")
@@ -138,7 +138,7 @@ def gather(
     """
     ranges, bearings, numbers, times = [], [], [], []
     verdicts = np.zeros(len(Verdict), np.int64)
-    curves = [axis_curve(recording.joint_log, held=recording.held)[0] for recording in recordings]
+    curves = [axis_curve(recording.joint_log, at_rest=recording.at_rest)[0] for recording in recordings]
     for k, (recording, curve) in enumerate(zip(recordings, curves, strict=True)):
         for scan in recording.scans():
             time_ns = scan.time_ns
@@ -186,7 +186,7 @@ def start_vector(angles: AngleSet) -> Float64[ndarray, " parameters"]:
     return x
 
 
-def play_rad(servo: str) -> float:
+def backlash_rad(servo: str) -> float:
     """Full play of the gear of a servo; the most of any in the catalogue where that does not tell it."""
     servos = [product for product in load_catalogue() if isinstance(product, Servo)]
     known = {product.name: product.backlash_deg for product in servos if product.backlash_deg is not None}
@@ -200,18 +200,18 @@ class Mount:
     Attributes:
         designed: rotation of the angle set without its delta, shape (3, 3).
         along_m: translation along the axis, which no calibration changes.
-        play_rad: of the servo's gear, as wide as a backlash can be that is not found.
+        backlash_rad: of the servo's gear, as wide as a backlash can be that is not found.
     """
 
     designed: Rotation
     along_m: float
-    play_rad: float
+    backlash_rad: float
 
     @staticmethod
     def of(angles: AngleSet) -> Mount:
         """The mount of an angle set, its delta taken off."""
         bare = angles.model_copy(update={"delta_rotvec_rot_deg": (0.0, 0.0)})
-        return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000, play_rad(angles.servo))
+        return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000, backlash_rad(angles.servo))
 
     def plane(self, x: Float64[ndarray, " parameters"]) -> Floats:
         """First two columns of `exp(delta) R_designed`, and what 1 rad of each delta adds to them, shape (3, 3, 2)."""
@@ -230,19 +230,19 @@ def _left_jacobian(rotvec_rad: Float64[ndarray, " 3"]) -> Float64[ndarray, "3 3"
 
 
 def axis_angle(
-    x: Float64[ndarray, " parameters"], joint_rad: Float64[ndarray, " n"], way: Float64[ndarray, " n"]
+    x: Float64[ndarray, " parameters"], joint_rad: Float64[ndarray, " n"], direction: Float64[ndarray, " n"]
 ) -> Float64[ndarray, " n"]:
     """Psi of each beam, shape (n,)."""
     one, two = joint_rad, 2 * joint_rad
     harmonics = x[5] * np.cos(one) + x[6] * np.sin(one) + x[7] * np.cos(two) + x[8] * np.sin(two)
-    return joint_rad + harmonics - 0.5 * x[10] * way
+    return joint_rad + harmonics - 0.5 * x[10] * direction
 
 
 def beam_rays(
     mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams
 ) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
     """Origin and direction of each beam, its lag already in `beams.joint_rad`, each shape (n, 3)."""
-    psi = axis_angle(x, beams.joint_rad, beams.way)
+    psi = axis_angle(x, beams.joint_rad, beams.direction)
     columns = mount.plane(x)[0]
     u = np.multiply.outer(np.cos(beams.bearing_rad), columns[:, 0])
     u += np.multiply.outer(np.sin(beams.bearing_rad), columns[:, 1])

@@ -15,7 +15,7 @@ from numpy import ndarray
 from scanwright.design.arrays import Floats, Ints
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.calibration import model
-from scanwright.firmware_io.calibration.model import MOUNT, PARAMETERS, STANDING_RAD_S, Mount, ReturnedBeams
+from scanwright.firmware_io.calibration.model import AT_REST_RAD_S, MOUNT, PARAMETERS, Mount, ReturnedBeams
 from scanwright.firmware_io.calibration.solve import Grouping, Reduced, covariance, reduced
 from scanwright.firmware_io.calibration.surfaces import seen_twice
 from scanwright.firmware_io.calibration.tiles import FlatTiles
@@ -28,7 +28,7 @@ _JOINED = 0.5  # of the flat patches: three of 100 furnished rooms have 0.57 or 
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class Fixed:
     """A parameter that stays as it was, and why."""
 
     names: tuple[str, ...]
@@ -42,12 +42,12 @@ class Choice:
 
     Attributes:
         free: parameters to find, in the order of `PARAMETERS`.
-        held: those that the recordings do not show.
+        fixed: those that the recordings do not show.
         notes: what a person should know though nothing had to be held for it.
     """
 
     free: Int64[ndarray, " free"]
-    held: tuple[Held, ...]
+    fixed: tuple[Fixed, ...]
     notes: tuple[str, ...]
 
 
@@ -74,7 +74,7 @@ def several_speeds(beams: ReturnedBeams) -> bool:
 
 def stood_still(beams: ReturnedBeams) -> bool:
     """Whether the axis moves between scans only."""
-    return bool(np.median(np.abs(beams.speed_rad_s)) < STANDING_RAD_S)
+    return bool(np.median(np.abs(beams.speed_rad_s)) < AT_REST_RAD_S)
 
 
 def choose_observable(
@@ -82,7 +82,7 @@ def choose_observable(
     tiles: FlatTiles,
     grouping: Grouping,
     normal: Float64[ndarray, "tiles width width"],
-    play_rad: float,
+    backlash_rad: float,
 ) -> Choice:
     """Decide which parameters the recordings (all their `beams`) show, with a gear of that play.
 
@@ -103,9 +103,9 @@ def choose_observable(
     if weak:
         named = ", ".join(f"{PARAMETERS[k].words} (+-{_shown(k, sd[k])}, limit {_shown(k)})" for k in weak)
         raise RecordingError(f"the scene does not show {named}: {_geometry(tiles, grouping)}")
-    held: list[Held] = []
+    fixed: list[Fixed] = []
     for group in (model.BIAS, model.HARMONIC_1, model.LAG, model.BACKLASH, model.HARMONIC_2):
-        why = _motion(beams, group, play_rad)
+        why = _motion(beams, group, backlash_rad)
         if not why:
             tried = np.sort(np.append(free, group))
             sd = _sd(reduced(normal, grouping, tried, BUILDERS_BULGE_M), tried)
@@ -118,8 +118,8 @@ def choose_observable(
                 f"+-{_shown(worst, sd[worst])} only (limit {_shown(worst)})"
             )
             if group == model.BACKLASH and model.LAG[0] in free:
-                why += f"; {_inside(play_rad)}"
-        held.append(Held(tuple(PARAMETERS[k].name for k in group), _words(group), why))
+                why += f"; {_inside(backlash_rad)}"
+        fixed.append(Fixed(tuple(PARAMETERS[k].name for k in group), _words(group), why))
     share = _facing(tiles, grouping)[0]
     notes = []
     if share[0] < _ONE_LINE:
@@ -127,7 +127,7 @@ def choose_observable(
     joined = tiles.count[grouping.used].sum() / tiles.count.sum()
     if joined < _JOINED:
         notes.append(f"only {joined:.0%} of the flat patches join surfaces: the result may be worse than it says")
-    return Choice(free, tuple(held), tuple(notes))
+    return Choice(free, tuple(fixed), tuple(notes))
 
 
 def spectrum(part: Reduced, free: Int64[ndarray, " free"]) -> Float64[ndarray, " free"]:
@@ -141,28 +141,28 @@ def _sd(part: Reduced, free: Ints) -> dict[int, float]:
     return dict(zip(free.tolist(), np.sqrt(np.diag(covariance(part))).tolist(), strict=True))
 
 
-def _inside(play_rad: float) -> str:
+def _inside(backlash_rad: float) -> str:
     return (
         "half of it, divided by the speed, is inside the time offset, whose stated error allows for "
-        f"{np.degrees(play_rad):.2f} deg of it"
+        f"{np.degrees(backlash_rad):.2f} deg of it"
     )
 
 
-def _motion(beams: ReturnedBeams, group: tuple[int, ...], play_rad: float) -> str:
+def _motion(beams: ReturnedBeams, group: tuple[int, ...], backlash_rad: float) -> str:
     """Why the motion of the axis cannot show a parameter, "" where it can."""
     if group not in (model.LAG, model.BACKLASH):
         return ""
-    ways = set(np.unique(beams.way).tolist()) - {0.0}
+    directions = set(np.unique(beams.direction).tolist()) - {0.0}
     if stood_still(beams):
         return "the axis stood still while the lidar measured"
     if group == model.LAG and not several_speeds(beams):
         return "one way at one speed: late angles turn the whole cloud about the axis, and no scene shows that"
-    if group == model.BACKLASH and len(ways) == 1:
+    if group == model.BACKLASH and len(directions) == 1:
         return "the axis turned one way only"
-    moving = np.abs(beams.speed_rad_s[beams.way != 0])
+    moving = np.abs(beams.speed_rad_s[beams.direction != 0])
     slow, fast = np.percentile(moving, [5, 95])
     if group == model.BACKLASH and fast < 1.2 * slow:
-        return f"both ways at one speed: {_inside(play_rad)}"
+        return f"both ways at one speed: {_inside(backlash_rad)}"
     return ""
 
 

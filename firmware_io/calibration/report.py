@@ -14,8 +14,8 @@ from scanwright.design.arrays import Floats
 from scanwright.firmware_io.calibration.entropy import Witness
 from scanwright.firmware_io.calibration.estimate import Estimate
 from scanwright.firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
+from scanwright.firmware_io.calibration.scene_motion.overlapping_views import OverlappingViews, overlapping_views
 from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
-from scanwright.firmware_io.calibration.unrest.second_looks import SecondLooks, second_looks
 
 _WALLS = 3
 _FEW = 3  # beams that a slim thing may leave where others went through
@@ -37,19 +37,19 @@ class Agreement:
     walls_m: tuple[float, ...]
 
 
-def agreement(found: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> Agreement:
+def agreement(result: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> Agreement:
     """Agreement of the beams that a calibration used, under any parameters; the planes are fitted anew."""
-    tiles, grouping = found.tiles, found.grouping
-    on = found.clear & (grouping.surface[tiles.tile] >= 0)
-    beams, tile = tiles.beams.taken(on).late_by(x[LAG[0]]), tiles.tile[on]
+    tiles, grouping = result.tiles, result.grouping
+    on = result.clear & (grouping.surface[tiles.tile] >= 0)
+    beams, tile = tiles.beams.select(on).late_by(x[LAG[0]]), tiles.tile[on]
     weight = np.ones(tile.size)
-    grouping = planes_alone(mount, x, beams, tile, weight / found.noise_m**2, grouping)
+    grouping = planes_alone(mount, x, beams, tile, weight / result.noise_m**2, grouping)
     normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)], kink=np.inf)
-    return Agreement(rms(normal, float(tile.size)), _straightness(found, normal, grouping))
+    return Agreement(rms(normal, float(tile.size)), _straightness(result, normal, grouping))
 
 
-def _straightness(found: Estimate, normal: Floats, grouping: Grouping) -> tuple[float, ...]:
-    used, tiles = grouping.used, found.tiles
+def _straightness(result: Estimate, normal: Floats, grouping: Grouping) -> tuple[float, ...]:
+    used, tiles = grouping.used, result.tiles
     height_m, weight = heights(normal[used])
     surface = grouping.surface[used]
     size = np.bincount(surface, tiles.count[used])
@@ -64,43 +64,43 @@ def _straightness(found: Estimate, normal: Floats, grouping: Grouping) -> tuple[
 
 
 def calibration_report(
-    found: Estimate, start: Float64[ndarray, " parameters"], mount: Mount, beams: ReturnedBeams, witness: Witness
+    result: Estimate, start: Float64[ndarray, " parameters"], mount: Mount, beams: ReturnedBeams, witness: Witness
 ) -> dict[str, Any]:
     """The record that is written beside the calibrated angle set."""
     sd = np.full(COUNT, np.nan)
-    sd[found.choice.free] = np.sqrt(np.diag(found.covariance))
+    sd[result.choice.free] = np.sqrt(np.diag(result.covariance))
     applied = start.copy()
-    applied[[*MOUNT, *LAG]] = found.x[[*MOUNT, *LAG]]
-    fits = {"before": start, "after": found.x, "as_assembled": applied}
-    fit = {name: agreement(found, mount, x) for name, x in fits.items()}
-    looks = second_looks(mount, found.x, beams, found.tiles.noise_m)
+    applied[[*MOUNT, *LAG]] = result.x[[*MOUNT, *LAG]]
+    fits = {"before": start, "after": result.x, "as_assembled": applied}
+    fit = {name: agreement(result, mount, x) for name, x in fits.items()}
+    views = overlapping_views(mount, result.x, beams, result.tiles.noise_m)
     return {
         "schema": "scanwright/calibration/1",
         "beams": int(beams.range_m.size),
-        "beams_used": int(found.clear.sum()),
-        "beams_at_edges": int(found.tiles.count[found.grouping.used].sum() - found.clear.sum()),
-        "surfaces": len(found.grouping.q),
+        "beams_used": int(result.clear.sum()),
+        "beams_at_edges": int(result.tiles.count[result.grouping.used].sum() - result.clear.sum()),
+        "surfaces": len(result.grouping.q),
         "parameters": [
             {
                 "name": PARAMETERS[k].name,
                 "words": PARAMETERS[k].words,
                 "unit": PARAMETERS[k].unit,
-                "value": float(found.x[k] * PARAMETERS[k].shown),
+                "value": float(result.x[k] * PARAMETERS[k].shown),
                 "sd": float(sd[k] * PARAMETERS[k].shown),
                 "start": float(start[k] * PARAMETERS[k].shown),
                 "applied_by": "angle set" if k in MOUNT else "assemble --lag-s" if k in LAG else None,
             }
-            for k in found.choice.free.tolist()
+            for k in result.choice.free.tolist()
         ],
         "covariance": {
-            "names": [PARAMETERS[k].name for k in found.choice.free.tolist()],
-            "matrix": found.covariance.tolist(),
+            "names": [PARAMETERS[k].name for k in result.choice.free.tolist()],
+            "matrix": result.covariance.tolist(),
         },
-        "singular_values": found.spectrum.tolist(),
-        "held": [{"names": list(held.names), "words": held.words, "why": held.why} for held in found.choice.held],
+        "singular_values": result.spectrum.tolist(),
+        "held": [{"names": list(fixed.names), "words": fixed.words, "why": fixed.why} for fixed in result.choice.fixed],
         "notes": [
-            *found.choice.notes,
-            *_unrest(found, looks, beams, fit["after"].residual_m),
+            *result.choice.notes,
+            *_motion_warnings(result, views, beams, fit["after"].residual_m),
             *([_LESS_CRISP] if witness.less_crisp else []),
         ],
         "drift": [
@@ -110,15 +110,15 @@ def calibration_report(
                 "turn_deg_s": np.degrees(drift.turn_rad_s).tolist(),
                 "chi2_of_6": drift.chi2,
             }
-            for drift in found.drifts
+            for drift in result.drifts
         ],
         "second_looks": {
-            "asked": looks.asked,
-            "compared": looks.compared,
-            "seen_through": looks.seen_through,
+            "asked": views.tested,
+            "compared": views.compared,
+            "seen_through": views.seen_through,
         },
-        "range_noise_mm": found.noise_m * 1e3,
-        "wall_bulge_mm": found.bulge_m * 1e3,
+        "range_noise_mm": result.noise_m * 1e3,
+        "wall_bulge_mm": result.bulge_m * 1e3,
         "residual_mm": {name: one.residual_m * 1e3 for name, one in fit.items()},
         "wall_straightness_mm": {name: [wall * 1e3 for wall in one.walls_m] for name, one in fit.items()},
         "entropy": {
@@ -136,33 +136,33 @@ def calibration_report(
     }
 
 
-def _unrest(found: Estimate, looks: SecondLooks, beams: ReturnedBeams, residual_m: float) -> list[str]:
+def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedBeams, residual_m: float) -> list[str]:
     """What a person should know of it, one line each."""
-    said, noise_m = [], found.tiles.noise_m
-    for drift in found.drifts:
+    warnings, noise_m = [], result.tiles.noise_m
+    for drift in result.drifts:
         if drift.sure:
             mm_s, deg_s = 1e3 * np.linalg.norm(drift.velocity_m_s), np.degrees(np.linalg.norm(drift.turn_rad_s))
-            said.append(
+            warnings.append(
                 f"the platform moved during recording {drift.recording + 1}, by about {mm_s:.2g} mm/s and "
                 f"{deg_s:.2g} deg/s: do not trust this calibration; scan again with the scanner held still"
             )
-    if looks.seen_through > _FEW:
-        taken_for_one = len(beams.curves) > 1 and not beams.place.any()
+    if views.seen_through > _FEW:
+        joined = len(beams.curves) > 1 and not beams.place.any()
         causes = [
-            "somebody walked",
-            "something was moved",
-            *["the scanner itself was, in spite of --one-place"] * taken_for_one,
+            "a person walked through the scene",
+            "an object was moved",
+            *["the scanner was moved between recordings (one_place says that it was not)"] * joined,
         ]
-        said.append(
-            f"{looks.seen_through:,} of {looks.compared:,} beams ended where another look, at another time, went "
+        warnings.append(
+            f"{views.seen_through:,} of {views.compared:,} beams ended where another view, at another time, went "
             f"through: {', '.join(causes[:-1])}, or {causes[-1]}"
         )
     if residual_m > _RESIDUAL * noise_m:
-        said.append(
+        warnings.append(
             f"the ranges are off by {1e3 * residual_m:.1f} mm, their noise is {1e3 * noise_m:.1f} mm: something moved, "
             "or the scanner has an error that no parameter here stands for"
         )
-    return said
+    return warnings
 
 
 def lines(record: dict[str, Any]) -> Iterator[str]:
@@ -177,8 +177,8 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     for one in record["parameters"]:
         change = f"  from {one['start']:.4f}" if one["applied_by"] == "angle set" else ""
         yield f"  {one['words']:22} {one['value']:10.4f} +- {one['sd']:.4f} {one['unit']}{change}"
-    for held in record["held"]:
-        yield f"  {held['words']:22}       held: {held['why']}"
+    for fixed in record["held"]:
+        yield f"  {fixed['words']:22}       held: {fixed['why']}"
     residual, walls, entropy = record["residual_mm"], record["wall_straightness_mm"], record["entropy"]
     yield (
         f"residual          {residual['before']:.1f} -> {residual['after']:.1f} mm "
@@ -195,13 +195,13 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         f"{entropy['before']:.3f} -> {entropy['after']:.3f}, changed by {fallen:+.3f} +- {entropy['change_sd']:.3f}"
     )
     yield f"entropy           {change}; its own minimum lies at {', '.join(own)}"
-    looks = record["second_looks"]
+    views = record["second_looks"]
     yield (
-        f"looked at twice   {100 * looks['compared'] // max(looks['asked'], 1)} % of the beams: "
+        f"looked at twice   {100 * views['compared'] // max(views['asked'], 1)} % of the beams: "
         "who walked elsewhere, or stood still, leaves no trace"
     )
     for note in record["notes"]:
         yield f"warning: {note}"
     by_name = {one["name"]: one for one in record["parameters"]}
     if "lag_s" in by_name:
-        yield f"the angles are late: assemble with --lag-s {by_name['lag_s']['value'] / 1e3:.6f}"
+        yield f"the angles are late: assemble with lag_s = {by_name['lag_s']['value'] / 1e3:.6f}"

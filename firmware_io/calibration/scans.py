@@ -43,9 +43,10 @@ class Scans:
         gap_rad = float(np.quantile(np.abs(step_rad[onward]), 0.1))  # most may lack a neighbour
         first_rad = sense * float(np.min(sense * beams.bearing_rad)) - sense * gap_rad
         middle = np.searchsorted(scan, np.arange(scan[-1] + 1)) + np.bincount(scan) // 2
-        way = beams.way[middle]
-        way = way[np.maximum.accumulate(np.where(way != 0, np.arange(way.size), 0))]  # standing, it goes on as it did
-        run = np.append(0, np.cumsum((np.diff(way) != 0) | (np.diff(beams.recording[middle]) != 0)))
+        direction = beams.direction[middle]
+        # at rest, the axis keeps the direction of its last motion
+        direction = direction[np.maximum.accumulate(np.where(direction != 0, np.arange(direction.size), 0))]
+        run = np.append(0, np.cumsum((np.diff(direction) != 0) | (np.diff(beams.recording[middle]) != 0)))
         bearing_rad = sense * (beams.bearing_rad - first_rad)
         return Scans(scan, run, beams.joint_rad[middle], bearing_rad, first_rad, sense, gap_rad)
 

@@ -87,7 +87,7 @@ def sums(
         kink: standard deviations beyond which a residual counts in proportion, not in square (Huber).
     """
     return _sums(
-        mount.plane(x), mount.along_m, x, beams.joint_rad, beams.speed_rad_s, beams.way, beams.bearing_rad,
+        mount.plane(x), mount.along_m, x, beams.joint_rad, beams.speed_rad_s, beams.direction, beams.bearing_rad,
         beams.range_m, tile, weight, q, kink,
     )  # fmt: skip
 
@@ -99,7 +99,7 @@ def _sums(
     x: Array,
     joint: Array,
     speed: Array,
-    way: Array,
+    direction: Array,
     bearing: Array,
     range_m: Array,
     tile: Ints,
@@ -113,7 +113,7 @@ def _sums(
     for i in range(range_m.size):
         c1, s1 = np.cos(joint[i]), np.sin(joint[i])
         c2, s2 = c1 * c1 - s1 * s1, 2.0 * c1 * s1
-        psi = joint[i] + x[5] * c1 + x[6] * s1 + x[7] * c2 + x[8] * s2 - 0.5 * x[10] * way[i]
+        psi = joint[i] + x[5] * c1 + x[6] * s1 + x[7] * c2 + x[8] * s2 - 0.5 * x[10] * direction[i]
         c, s = np.cos(psi), np.sin(psi)
         cb, sb = np.cos(bearing[i]), np.sin(bearing[i])
         a, b, n = q[tile[i], 0], q[tile[i], 1], q[tile[i], 2]
@@ -142,7 +142,7 @@ def _sums(
         row[7] = around * c2
         row[8] = around * s2
         row[9] = around * speed[i] * (1.0 - x[5] * s1 + x[6] * c1 - 2.0 * x[7] * s2 + 2.0 * x[8] * c2)
-        row[10] = -0.5 * around * way[i]
+        row[10] = -0.5 * around * direction[i]
         row[11] = (c * px - s * py) / slant
         row[12] = (s * px + c * py) / slant
         row[13] = pz / slant
@@ -184,8 +184,8 @@ def reduced(
     planes = surface[:, _Q : _Q + 3, _Q : _Q + 3]
     across = surface[:, _Q : _Q + 3][:, :, keep]
     rows = -np.linalg.pinv(planes, rcond=1e-12, hermitian=True) @ across
-    whole = (surface[:, keep][:, :, keep] + across.swapaxes(1, 2) @ rows).sum(axis=0)
-    return Reduced(whole[:-1, :-1], whole[:-1, -1], rows)
+    total = (surface[:, keep][:, :, keep] + across.swapaxes(1, 2) @ rows).sum(axis=0)
+    return Reduced(total[:-1, :-1], total[:-1, -1], rows)
 
 
 def _per_spot(grouping: Grouping, values: Floats) -> tuple[Floats, Ints]:
@@ -229,12 +229,12 @@ def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
     if np.isinf(spread).any():
         weak = np.abs(vectors[:, np.isinf(spread)]).max(axis=1) > 1e-3
         spread = np.where(np.isinf(spread), 0.0, spread)
-        found = (vectors * spread) @ vectors.T
-        found[weak, :] = found[:, weak] = 0.0
-        found[weak, weak] = np.inf
+        inverse = (vectors * spread) @ vectors.T
+        inverse[weak, :] = inverse[:, weak] = 0.0
+        inverse[weak, weak] = np.inf
     else:
-        found = (vectors * spread) @ vectors.T
-    return found * np.outer(scale, scale)
+        inverse = (vectors * spread) @ vectors.T
+    return inverse * np.outer(scale, scale)
 
 
 def moved_by_last(part: Reduced) -> Floats:

@@ -25,6 +25,7 @@ _MISFIT = 4.0  # standard deviations of a mean of squares
 _GRAZING = 0.08  # cosine: to a plane it grazes, a beam is near everywhere
 _SPOT_M = 1.0  # walls keep their height over their plane about as far as this
 _NEAREST_M = 0.1  # a plane this near the axis has no usable form q . p = 1
+_NO_PLANE = "no flat patches lie in one plane: a calibration needs walls, floors or other planes, densely scanned"
 _FEWEST = 3  # tiles: two looks at one place and one more, or three places
 
 
@@ -49,6 +50,8 @@ def group(
     rng = np.random.default_rng(0)
     left = tiles.normal_sd_rad < vague_rad
     seeds = np.flatnonzero(left)
+    if not seeds.size:
+        raise RecordingError(_NO_PLANE)
     some = rng.choice(seeds, min(_SAMPLE, seeds.size), replace=False, p=weight[seeds] / weight[seeds].sum())
     height = np.sum(normal * point, axis=1)
     agree = np.abs(normal[seeds] @ point[some].T - height[seeds, None]) < near_m
@@ -65,7 +68,7 @@ def group(
             planes.append(n / c)
         left &= ~mine
     if not planes:
-        raise RecordingError("no flat patches lie in one plane: a calibration needs walls, floors or other planes")
+        raise RecordingError(_NO_PLANE)
     cells = np.floor(point / _SPOT_M).astype(np.int64)
     _, spot = np.unique(np.column_stack([surface, cells]), axis=0, return_inverse=True)
     return Grouping(surface, spot.ravel(), np.array(planes))
@@ -158,7 +161,7 @@ def seen_twice(tiles: FlatTiles, grouping: Grouping) -> Ints:
     """Tiles whose spot both sides of the fan see."""
     used = grouping.used
     spots, inverse = np.unique(grouping.spot[used], return_inverse=True)
-    looks = np.zeros((spots.size, 2), bool)
-    looks[inverse, tiles.side[used]] = True
-    both = looks[:, 0] & looks[:, 1]
+    sides = np.zeros((spots.size, 2), bool)
+    sides[inverse, tiles.side[used]] = True
+    both = sides[:, 0] & sides[:, 1]
     return used[both[inverse]]

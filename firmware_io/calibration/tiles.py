@@ -90,25 +90,25 @@ def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " paramet
     side, turned_back = fan_side(beams, mount), _turned_back(beams)
     noise_m = _noise(beams, side, turned_back, mount, x)
     left = np.arange(beams.range_m.size)
-    found: list[tuple[Ints, _Flat]] = []
+    results: list[tuple[Ints, _Flat]] = []
     for window_rad in _WINDOWS_RAD:
         order, start = _windows(beams, side, turned_back, left, window_rad)
-        flat = _fit(beams.taken(order), start, mount, x)
+        flat = _fit(beams.select(order), start, mount, x)
         accepted = _is_flat(flat, noise_m)
         rows = np.repeat(accepted, np.diff(flat.start))
-        found.append((order[rows], _only(flat, accepted)))
+        results.append((order[rows], _only(flat, accepted)))
         left = order[~rows]
-    index = np.concatenate([order for order, _ in found])
+    index = np.concatenate([order for order, _ in results])
     if not index.size:
         raise RecordingError("no flat surface is in sight: a calibration needs walls, floors or other planes")
-    count = np.concatenate([np.diff(flat.start) for _, flat in found])
+    count = np.concatenate([np.diff(flat.start) for _, flat in results])
     start = np.append(0, np.cumsum(count))
-    q, information, rms_m = (np.concatenate([getattr(f, k) for _, f in found]) for k in ("q", "information", "rms_m"))
-    own = beams.taken(index)
+    q, information, rms_m = (np.concatenate([getattr(f, k) for _, f in results]) for k in ("q", "information", "rms_m"))
+    own = beams.select(index)
     middle = _middle(own, start, mount, x, q)
     length = np.linalg.norm(q, axis=1)
     sd = noise_m * np.sqrt(np.linalg.eigvalsh(np.linalg.inv(information))[:, -1]) / length
-    normal = -_turned(q / length[:, None], -axis_angle(x, middle.joint_rad, middle.way))
+    normal = -_turned(q / length[:, None], -axis_angle(x, middle.joint_rad, middle.direction))
     columns = mount.plane(x)[0]
     R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
     return FlatTiles(own, start, middle, normal @ R, sd, rms_m, side[index][start[:-1]], noise_m, left.size)
@@ -118,7 +118,7 @@ def normals(tiles: FlatTiles, mount: Mount, x: Float64[ndarray, " parameters"]) 
     """Normal of each tile where the axis stands still, shape (m, 3)."""
     columns = mount.plane(x)[0]
     R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
-    return _turned(tiles.normal_laser @ R.T, axis_angle(x, tiles.middle.under(x).joint_rad, tiles.middle.way))
+    return _turned(tiles.normal_laser @ R.T, axis_angle(x, tiles.middle.under(x).joint_rad, tiles.middle.direction))
 
 
 def fan_side(beams: ReturnedBeams, mount: Mount) -> Int64[ndarray, " beams"]:
@@ -130,7 +130,7 @@ def fan_side(beams: ReturnedBeams, mount: Mount) -> Int64[ndarray, " beams"]:
 
 def _windows(beams: ReturnedBeams, side: Ints, turned_back: Ints, which: Ints, window_rad: float) -> tuple[Ints, Ints]:
     """Beams sorted by window, and the first one of each window that holds enough beams; others are kept behind."""
-    mine = beams.taken(which)
+    mine = beams.select(which)
     keys = (
         mine.recording,
         turned_back[which],
@@ -157,16 +157,16 @@ def _turned_back(beams: ReturnedBeams) -> Int64[ndarray, " beams"]:
 
 def _reversals_ns(curve: AxisCurve) -> list[int]:
     """Times at which the axis was furthest before it came back by more than an encoder's flicker."""
-    found: list[int] = []
-    way, furthest, at_ns = 0, float(curve.coefficient[0, 0]), int(curve.knot_ns[0])
+    results: list[int] = []
+    direction, furthest, at_ns = 0, float(curve.coefficient[0, 0]), int(curve.knot_ns[0])
     for time_ns, angle_rad in zip(curve.knot_ns.tolist(), curve.angle_at(curve.knot_ns).tolist(), strict=True):
         ahead = angle_rad - furthest
-        if way * ahead > 0 or (way == 0 and abs(ahead) > _FLICKER_RAD):
-            way, furthest, at_ns = way or (1 if ahead > 0 else -1), angle_rad, time_ns
-        elif way and abs(ahead) > _FLICKER_RAD:
-            found.append(at_ns)
-            way, furthest, at_ns = -way, angle_rad, time_ns
-    return found
+        if direction * ahead > 0 or (direction == 0 and abs(ahead) > _FLICKER_RAD):
+            direction, furthest, at_ns = direction or (1 if ahead > 0 else -1), angle_rad, time_ns
+        elif direction and abs(ahead) > _FLICKER_RAD:
+            results.append(at_ns)
+            direction, furthest, at_ns = -direction, angle_rad, time_ns
+    return results
 
 
 def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
@@ -224,7 +224,7 @@ def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x:
     everything = np.arange(beams.range_m.size)
     for window_rad in reversed(_WINDOWS_RAD):
         order, start = _windows(beams, side, turned_back, everything, window_rad)
-        rough = _fit(beams.taken(order), start, mount, x).rms_m
+        rough = _fit(beams.select(order), start, mount, x).rms_m
         rough = rough[np.isfinite(rough)]
         if rough.size >= _FEWEST:
             return max(float(np.median(rough)), 1e-6)

@@ -85,9 +85,9 @@ class Cloud:
         valid = self.valid
         if valid.all():
             return Cloud(self.points_m, self.columns, (1, len(valid)), self.T_world_cloud, self.start_ns)
-        return self.taken(np.flatnonzero(valid))
+        return self.select(np.flatnonzero(valid))
 
-    def taken(self, rows: Int64[ndarray, " kept"]) -> Cloud:
+    def select(self, rows: Int64[ndarray, " kept"]) -> Cloud:
         """Some of the rows, as a flat cloud."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Cloud(self.points_m[rows], columns, (1, len(rows)), self.T_world_cloud, self.start_ns)
@@ -115,7 +115,7 @@ def check_pose(T: Pose) -> None:
         )
 
 
-def held(values: Column, kind: np.dtype[Any] | str) -> Column:
+def as_type(values: Column, kind: np.dtype[Any] | str) -> Column:
     """The values in another type.
 
     Raises:
@@ -123,15 +123,15 @@ def held(values: Column, kind: np.dtype[Any] | str) -> Column:
     """
     kind = np.dtype(kind)
     with np.errstate(all="ignore"):
-        found = values.astype(kind)
+        converted = values.astype(kind)
         if kind.kind == "f":
-            fits = np.isfinite(found) | ~np.isfinite(values) if values.dtype.kind == "f" else np.isfinite(found)
+            fits = np.isfinite(converted) | ~np.isfinite(values) if values.dtype.kind == "f" else np.isfinite(converted)
         else:
             # no type of whole numbers holds all of the others: compare on the wider one's ground
-            fits = (found == values) & ((found < 0) == (values < 0))
+            fits = (converted == values) & ((converted < 0) == (values < 0))
     if not fits.all():
         raise RecordingError(f"{values[np.argmin(fits)]} does not fit {kind.name}")
-    return found
+    return converted
 
 
 def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
@@ -158,7 +158,7 @@ def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
         raise RecordingError(f"the columns are {' '.join(names)}; a cloud has x y z")
     real = np.float32 if all(rows.dtype[axis].itemsize == 4 for axis in "xyz") else np.float64
     points_m: NDArray[np.floating] = np.stack([rows[axis] for axis in "xyz"], axis=1).astype(real)
-    return told(Cloud(points_m, {name: np.array(rows[name]) for name in names if name not in "xyz"}), lines)
+    return with_header(Cloud(points_m, {name: np.array(rows[name]) for name in names if name not in "xyz"}), lines)
 
 
 def headlines(cloud: Cloud) -> list[str]:
@@ -172,7 +172,7 @@ def headlines(cloud: Cloud) -> list[str]:
     return lines
 
 
-def told(cloud: Cloud, lines: Iterable[str]) -> Cloud:
+def with_header(cloud: Cloud, lines: Iterable[str]) -> Cloud:
     """The cloud with what `headlines` wrote.
 
     Raises:

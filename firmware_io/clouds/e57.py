@@ -16,18 +16,18 @@ import pye57
 from pye57 import libe57
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import (
     COLUMN_TYPES,
     Cloud,
     Column,
+    as_type,
     colour_bytes,
     headlines,
     pose_matrix,
     pose_numbers,
-    told,
+    with_header,
 )
-from scanwright.firmware_io.clouds.cloud import held as fitting
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
@@ -57,7 +57,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
 
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     """Write one scan for each cloud."""
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         foreign(f"{path}: cannot write", _write_scans, part, clouds, path.stem)
     return []
 
@@ -81,27 +81,27 @@ def _read_scan(e57: pye57.E57, number: int) -> Cloud:
     size = Path(e57.path).stat().st_size
     if not 0 < header.point_count <= _MOST_PACKED * size:
         raise RecordingError(f"{header.point_count:,} points announced, {size:,} bytes there")
-    held = _read_points(e57, header)
-    if all(name in held for name in _AXES):
-        points = np.stack([held.pop(name) for name in _AXES], axis=1)
+    values_of = _read_points(e57, header)
+    if all(name in values_of for name in _AXES):
+        points = np.stack([values_of.pop(name) for name in _AXES], axis=1)
     else:
-        r, azimuth, elevation = (held.pop(name) for name in _SPHERICAL)
+        r, azimuth, elevation = (values_of.pop(name) for name in _SPHERICAL)
         flat = r * np.cos(elevation)
         points = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), r * np.sin(elevation)], axis=1)
     for name in ("cartesianInvalidState", "sphericalInvalidState"):
-        if name in held:
-            points[held[name] != 0] = np.nan
-    row, column = held.get("rowIndex"), held.get("columnIndex")
+        if name in values_of:
+            points[values_of[name] != 0] = np.nan
+    row, column = values_of.get("rowIndex"), values_of.get("columnIndex")
     back = {own: name for name, own in _OWN_FIELD.items()}
     columns = {
         back.get(name, name.removeprefix(f"{_PREFIX}:")): values
-        for name, values in held.items()
+        for name, values in values_of.items()
         if name not in _STRUCTURE
     }
     columns |= {name: colour_bytes(columns[name]) for name in _COLOURS if name in columns}
     for name, values in columns.items():
         try:
-            columns[name] = fitting(values, COLUMN_TYPES.get(name, values.dtype))
+            columns[name] = as_type(values, COLUMN_TYPES.get(name, values.dtype))
         except RecordingError as error:
             raise RecordingError(f"column {name}: {error}") from error
     T = np.eye(4)
@@ -109,7 +109,7 @@ def _read_scan(e57: pye57.E57, number: int) -> Cloud:
         w, x, y, z = header.rotation
         T = pose_matrix([*header.translation, x, y, z, w])
     text = header["description"].value() if header.node.isDefined("description") else ""
-    start = told(Cloud(points), text.splitlines()).start_ns
+    start = with_header(Cloud(points), text.splitlines()).start_ns
     flat_cloud = Cloud(points, columns, (1, len(points)), T, start)
     return flat_cloud if row is None or column is None else _organised(flat_cloud, row, column)
 
@@ -132,8 +132,8 @@ def _organised(cloud: Cloud, row: Column, column: Column) -> Cloud:
 
 def _read_points(e57: pye57.E57, header: Any) -> dict[str, Column]:
     prototype = libe57.StructureNode(header.points.prototype())
-    held: dict[str, Column] = {}
-    whole = set()
+    values_of: dict[str, Column] = {}
+    integers = set()
     buffers = libe57.VectorSourceDestBuffer()
     for k in range(prototype.childCount()):
         node = prototype.get(k)
@@ -141,15 +141,15 @@ def _read_points(e57: pye57.E57, header: Any) -> dict[str, Column]:
         real = node.type() == libe57.NodeType.E57_FLOAT
         single = real and libe57.FloatNode(node).precision() == libe57.E57_SINGLE
         if node.type() == libe57.NodeType.E57_INTEGER:
-            whole.add(name)
-        held[name] = np.empty(header.point_count, np.float32 if single else np.float64)
-        buffers.append(libe57.SourceDestBuffer(e57.image_file, name, held[name], header.point_count, True, True))
+            integers.add(name)
+        values_of[name] = np.empty(header.point_count, np.float32 if single else np.float64)
+        buffers.append(libe57.SourceDestBuffer(e57.image_file, name, values_of[name], header.point_count, True, True))
     reader = header.points.reader(buffers)
     try:
         reader.read()
     finally:
         reader.close()
-    return {name: values.astype(np.int64) if name in whole else values for name, values in held.items()}
+    return {name: values.astype(np.int64) if name in integers else values for name, values in values_of.items()}
 
 
 def _write_scan(e57: pye57.E57, cloud: Cloud, name: str) -> None:
@@ -187,13 +187,13 @@ def _write_scan(e57: pye57.E57, cloud: Cloud, name: str) -> None:
         _set(file, scan, "colorLimits", limits)
     prototype = libe57.StructureNode(file)
     buffers = libe57.VectorSourceDestBuffer()
-    held = []
+    arrays = []
     for field, values in fields.items():
         prototype.set(field, _node(file, values))
         # The bindings take int64 for int32, and libe57 refuses an infinity on its way from double to single
         single = values.dtype == np.float32
-        held.append(np.ascontiguousarray(values, np.float32 if single else np.float64))
-        buffers.append(libe57.SourceDestBuffer(file, field, held[-1], len(values), True, True))
+        arrays.append(np.ascontiguousarray(values, np.float32 if single else np.float64))
+        buffers.append(libe57.SourceDestBuffer(file, field, arrays[-1], len(values), True, True))
     points = libe57.CompressedVectorNode(file, prototype, libe57.VectorNode(file, True))
     scan.set("points", points)
     e57.data3d.append(scan)

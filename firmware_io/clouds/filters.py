@@ -9,11 +9,10 @@ from jaxtyping import Bool, Float, Float32, Float64, Int64
 from numpy import ndarray
 
 from scanwright.design.arrays import Floats
-from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.voxels import voxel_of, voxel_sums
 
 NEIGHBOURS = 12
 _AT_ONCE = 1 << 16
-_CELLS = 2**20  # of a voxel grid along each axis, either way: three of them fit 63 bits
 
 
 def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = NEIGHBOURS) -> Bool[ndarray, " n"]:
@@ -39,18 +38,10 @@ def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = N
 def one_to_a_voxel(points_m: Float[ndarray, "n 3"], edge_m: float) -> Int64[ndarray, " kept"]:
     """Of the points in each voxel the one that lies nearest to their mean; indices in increasing order, shape (m,).
 
-    Points stay what was measured, with their time, beam and intensity.
-
-    Raises:
-        RecordingError: the cloud is more than a million voxels wide.
+    Points stay as measured, with their time, beam and intensity.
     """
-    cell = np.floor(np.asarray(points_m, float) / edge_m)
-    if not (np.abs(cell) < _CELLS).all():
-        far_m = np.abs(points_m).max()
-        raise RecordingError(f"voxels of {edge_m:g} m: a point lies {far_m:g} m from 0, more than {_CELLS:,} of them")
-    x, y, z = (cell + _CELLS).astype(np.int64).T
-    _, voxel, count = np.unique((x << 42) | (y << 21) | z, return_inverse=True, return_counts=True)
-    mean_m = np.stack([np.bincount(voxel, axis) / count for axis in points_m.T], axis=1)
+    voxel = voxel_of(np.asarray(points_m, float), edge_m)
+    mean_m = voxel_sums(voxel, points_m) / np.bincount(voxel)[:, None]
     off_m2 = np.sum((points_m - mean_m[voxel]) ** 2, axis=1)
     order = np.lexsort((off_m2, voxel))
     first = np.r_[True, np.diff(voxel[order]) > 0] if order.size else np.zeros(0, bool)
@@ -69,9 +60,9 @@ def normals(
         seen_from_m: shape (3,) or (n, 3).
         neighbours: that lie on one surface.
     """
-    found = np.full((len(points_m), 3), np.nan, np.float32)
+    normals = np.full((len(points_m), 3), np.nan, np.float32)
     if len(points_m) < 3:
-        return found
+        return normals
     points = np.asarray(points_m, float)
     begin = 0
     for _, index in _nearest(points, min(neighbours + 1, len(points))):
@@ -81,9 +72,9 @@ def normals(
         normal: Floats = axes[:, :, 0]
         towards = np.broadcast_to(seen_from_m, points.shape)[here] - points[here]
         away = np.sum(normal * towards, axis=1) < 0
-        found[here] = np.where(away[:, None], -normal, normal)
+        normals[here] = np.where(away[:, None], -normal, normal)
         begin += len(index)
-    return found
+    return normals
 
 
 def _nearest(

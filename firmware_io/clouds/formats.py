@@ -62,12 +62,12 @@ class Written:
     Attributes:
         paths: the files.
         rows: in all of them.
-        said: what they do not hold, one sentence each.
+        notes: what they do not hold, one sentence each.
     """
 
     paths: tuple[Path, ...]
     rows: int
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False) -> Written:
@@ -89,23 +89,23 @@ def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False
     suffix = path.suffix.lower()
     if organised:
         _check_organised(path, suffix, clouds)
-    said: list[str] = []
+    notes: list[str] = []
     for number, cloud in enumerate(clouds):
         if not cloud.valid.any():
             raise RecordingError(f"{path}: none of the {len(cloud.points_m)} rows of cloud {number + 1} is a point")
     formed = [cloud if cloud.organised and (organised or suffix in _SHAPED) else cloud.flat() for cloud in clouds]
     rows = sum(len(cloud.points_m) for cloud in formed)
     if lost := sum(len(cloud.points_m) for cloud in clouds) - rows:
-        said.append(f"left out {lost:,} rows without a point")
+        notes.append(f"left out {lost:,} rows without a point")
     if suffix not in _SHAPED and not organised and any(cloud.organised for cloud in clouds):
         shapes = ", ".join(f"{cloud.shape[0]} x {cloud.shape[1]}" for cloud in clouds if cloud.organised)
-        said.append(f"the shape {shapes} is lost (pcd, e57 and npz keep it)")
+        notes.append(f"the shape {shapes} is lost (pcd, e57 and npz keep it)")
     if suffix == ".e57":
-        return Written((path,), rows, (*said, *module.write(path, formed)))
+        return Written((path,), rows, (*notes, *module.write(path, formed)))
     paths = [path] if len(clouds) == 1 else [path.with_stem(f"{path.stem}_{k}") for k in range(1, len(clouds) + 1)]
     for one, cloud in zip(paths, formed, strict=True):
-        said += module.write(one, cloud)
-    return Written(tuple(paths), rows, tuple(dict.fromkeys(said)))
+        notes += module.write(one, cloud)
+    return Written(tuple(paths), rows, tuple(dict.fromkeys(notes)))
 
 
 def _check_organised(path: Path, suffix: str, clouds: Sequence[Cloud]) -> None:

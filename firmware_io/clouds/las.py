@@ -15,8 +15,8 @@ from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
-from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, told
+from scanwright.design.files.atomic_file import atomic_write
+from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, with_header
 from scanwright.firmware_io.foreign import foreign
 
 _STEPS_M = (1e-4, 1e-3, 1e-2)
@@ -26,7 +26,7 @@ _OURS = "scanwright"
 _EXACT = "intensity_exact"
 _OWN_FIELD = {"intensity": "intensity", "time_s": "gps_time"}
 _COLOURS = ("red", "green", "blue")  # 16 bits; ours are bytes
-_HELD = {"X", "Y", "Z", "intensity", "gps_time", *_COLOURS}
+_STANDARD = {"X", "Y", "Z", "intensity", "gps_time", *_COLOURS}
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
@@ -51,13 +51,13 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     unread = [
         name
         for name in las.point_format.standard_dimension_names
-        if name not in _HELD and np.ptp(np.asarray(las[name]).astype(float)) > 0
+        if name not in _STANDARD and np.ptp(np.asarray(las[name]).astype(float)) > 0
     ]
     world = np.stack([las.x, las.y, las.z], axis=1).astype(float)
-    cloud = told(Cloud(world, columns), lines)
+    cloud = with_header(Cloud(world, columns), lines)
     points_m = frames.apply(np.linalg.inv(cloud.T_world_cloud), world) if cloud.placed else world
-    said = [f"left out of {path}: {', '.join(unread)}"] if unread else []
-    return [Cloud(points_m, columns, (1, len(world)), cloud.T_world_cloud, cloud.start_ns)], said
+    notes = [f"left out of {path}: {', '.join(unread)}"] if unread else []
+    return [Cloud(points_m, columns, (1, len(world)), cloud.T_world_cloud, cloud.start_ns)], notes
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
@@ -71,29 +71,29 @@ def write(path: Path, cloud: Cloud) -> list[str]:
         header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
     columns = dict(cloud.columns)
     columns |= {name: columns[name].astype(np.uint16) * 257 for name in _COLOURS if name in columns}
-    said = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
+    notes = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
     if cloud.placed:
-        said.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
-    if "intensity" in columns and not _whole(columns["intensity"]):
+        notes.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
+    if "intensity" in columns and not _is_integer(columns["intensity"]):
         columns[_EXACT] = columns["intensity"]
         columns["intensity"] = np.clip(np.nan_to_num(columns["intensity"]).round(), 0, 65535)
-        said.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
+        notes.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
     if "time_s" in columns:
-        said.append("gps_time is seconds since the first beam, not the time of GPS")
+        notes.append("gps_time is seconds since the first beam, not the time of GPS")
     header.add_extra_dims(
         [
             laspy.ExtraBytesParams(name, column.dtype)
             for name, column in columns.items()
-            if name not in _HELD | set(_OWN_FIELD)
+            if name not in _STANDARD | set(_OWN_FIELD)
         ]
     )
     las = laspy.LasData(header)
     las.x, las.y, las.z = world.T
     for name, column in columns.items():
         las[_OWN_FIELD.get(name, name)] = column
-    with whole_file(path, RecordingError) as part, part.open("wb") as stream:
+    with atomic_write(path, RecordingError) as part, part.open("wb") as stream:
         foreign(f"{path}: cannot write", las.write, stream, do_compress=path.suffix.lower() == ".laz")
-    return said
+    return notes
 
 
 def _check_header(path: Path) -> None:
@@ -143,5 +143,5 @@ def _step_m(path: Path, world: Float64[ndarray, "n 3"]) -> float:
     raise RecordingError(f"{path}: the points are {across_m / 1000:.3g} km apart: LAS holds {most_km:,.0f} km")
 
 
-def _whole(intensity: Column) -> bool:
+def _is_integer(intensity: Column) -> bool:
     return bool(np.all((intensity == np.round(intensity)) & (intensity >= 0) & (intensity <= 65535)))

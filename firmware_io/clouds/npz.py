@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.numpy_files import read_npz
 from scanwright.firmware_io.clouds.cloud import Cloud
 
@@ -16,11 +16,11 @@ _COLUMN = "column."
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file such as `write` makes."""
-    held = read_npz(path, RecordingError)
-    if missing := {"points_m", "shape", "T_world_cloud"} - set(held):
+    arrays = read_npz(path, RecordingError)
+    if missing := {"points_m", "shape", "T_world_cloud"} - set(arrays):
         raise RecordingError(f"{path}: no array {', '.join(sorted(missing))}: not a cloud of ours")
-    columns = {name.removeprefix(_COLUMN): array for name, array in held.items() if name.startswith(_COLUMN)}
-    points_m, shape, T = held["points_m"], held["shape"], held["T_world_cloud"]
+    columns = {name.removeprefix(_COLUMN): array for name, array in arrays.items() if name.startswith(_COLUMN)}
+    points_m, shape, T = arrays["points_m"], arrays["shape"], arrays["T_world_cloud"]
     for name, array, wanted in (
         ("points_m", points_m, (len(points_m), 3) if points_m.ndim else ()),
         ("T_world_cloud", T, (4, 4)),
@@ -31,7 +31,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         raise RecordingError(
             f"{path}: shape = {str(shape.tolist())[:80]}: two whole numbers, {len(points_m)} rows in all"
         )
-    start = held.get("start_ns")
+    start = arrays.get("start_ns")
     if start is not None and (start.shape or start.dtype.kind not in "iu"):
         raise RecordingError(f"{path}: start_ns = {str(start.tolist())[:80]}: one whole number")
     height, width = (int(count) for count in shape)
@@ -43,7 +43,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud."""
     start = {} if cloud.start_ns is None else {"start_ns": np.int64(cloud.start_ns)}
     columns = {_COLUMN + name: column for name, column in cloud.columns.items()}
-    with whole_file(path, RecordingError) as part, part.open("wb") as stream:
+    with atomic_write(path, RecordingError) as part, part.open("wb") as stream:
         np.savez(
             stream,
             allow_pickle=False,

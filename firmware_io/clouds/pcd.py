@@ -14,7 +14,7 @@ from pypcd4.pypcd4 import Encoding, PointCloud
 
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
 from scanwright.firmware_io.foreign import foreign
 
@@ -59,25 +59,25 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     if end is None:
         raise RecordingError(f"{path}: not a PCD file: no line DATA ascii, binary or binary_compressed")
     lines = data[: end.start()].decode("ascii", "replace").splitlines()
-    told = {words[0]: words[1:] for line in lines if (words := line.split()) and not line.startswith("#")}
-    fields = told.get("FIELDS", [])
+    entries = {words[0]: words[1:] for line in lines if (words := line.split()) and not line.startswith("#")}
+    fields = entries.get("FIELDS", [])
     if len(set(fields)) != len(fields) or not {*"xyz"} <= set(fields):
         raise RecordingError(f"{path}: the fields are {' '.join(fields)[:200]}; a cloud has x y z, each field once")
-    counts = told.setdefault("COUNT", ["1"] * len(fields))
+    counts = entries.setdefault("COUNT", ["1"] * len(fields))
     for key in ("SIZE", "TYPE", "COUNT"):
-        if len(told.get(key, [])) != len(fields):
+        if len(entries.get(key, [])) != len(fields):
             raise RecordingError(
-                f"{path}: {key} {' '.join(told.get(key, []))[:80]}: one for each of {len(fields)} fields"
+                f"{path}: {key} {' '.join(entries.get(key, []))[:80]}: one for each of {len(fields)} fields"
             )
-    size = sum(_whole(path, told, "SIZE", k) * _whole(path, told, "COUNT", k) for k in range(len(fields)))
-    rows, height, width = (_whole(path, told, key, 0) for key in ("POINTS", "HEIGHT", "WIDTH"))
+    size = sum(_integer(path, entries, "SIZE", k) * _integer(path, entries, "COUNT", k) for k in range(len(fields)))
+    rows, height, width = (_integer(path, entries, key, 0) for key in ("POINTS", "HEIGHT", "WIDTH"))
     room = (len(data) - end.end()) * (_MOST_PACKED if end[1] == b"binary_compressed" else 1)
     if not 0 < rows == height * width or rows * (2 * sum(map(int, counts)) if end[1] == b"ascii" else size) > room + 1:
         raise RecordingError(
             f"{path}: POINTS {rows}, HEIGHT {height}, WIDTH {width} of {size} bytes each announced, "
             f"{len(data) - end.end()} bytes there"
         )
-    viewpoint = foreign(f"{path}: VIEWPOINT", lambda: [float(word) for word in told.get("VIEWPOINT", _AT_ORIGIN)])
+    viewpoint = foreign(f"{path}: VIEWPOINT", lambda: [float(word) for word in entries.get("VIEWPOINT", _AT_ORIGIN)])
     if len(viewpoint) != 7:
         raise RecordingError(f"{path}: VIEWPOINT of {len(viewpoint)} numbers: x y z qw qx qy qz")
     x, y, z, w, i, j, k = viewpoint
@@ -85,8 +85,8 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     return PcdHeader((height, width), pose_matrix([x, y, z, i, j, k, w]), comments)
 
 
-def _whole(path: Path, told: dict[str, list[str]], key: str, place: int) -> int:
-    words = told.get(key, [])
+def _integer(path: Path, entries: dict[str, list[str]], key: str, place: int) -> int:
+    words = entries.get(key, [])
     if place >= len(words) or not words[place].isdecimal() or not 0 < len(words[place]) < _DIGITS:
         raise RecordingError(f"{path}: {key} {' '.join(words)[:80]}: a whole number")
     return int(words[place])
@@ -103,7 +103,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     data = io.BytesIO()
     pcd.save(data, Encoding.BINARY)
     comments = [f"# {line}\n" for line in headlines(cloud) if line.startswith("time_s")]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_bytes("".join(comments).encode() + data.getvalue())
     return []
 
@@ -124,11 +124,11 @@ def _packed(rows: NDArray[np.void]) -> NDArray[np.void]:
 
 def _unpacked(rows: NDArray[np.void]) -> NDArray[np.void]:
     """Rows with a column for each colour; PCL's older rgb is a float of the same bits, without alpha."""
-    held = next((name for name in ("rgba", "rgb") if name in (rows.dtype.names or ())), None)
-    if held is None or rows.dtype[held].itemsize != 4:
+    packed = next((name for name in ("rgba", "rgb") if name in (rows.dtype.names or ())), None)
+    if packed is None or rows.dtype[packed].itemsize != 4:
         return rows
-    bits = np.ascontiguousarray(rows[held]).view(np.uint32)
-    names = _PACKED if held == "rgba" else _PACKED[:3]
+    bits = np.ascontiguousarray(rows[packed]).view(np.uint32)
+    names = _PACKED if packed == "rgba" else _PACKED[:3]
     colours = [((bits >> np.uint32(8 * place)) & np.uint32(255)).astype(np.uint8) for place in range(len(names))]
-    bare = recfunctions.drop_fields(rows, held, usemask=False)
+    bare = recfunctions.drop_fields(rows, packed, usemask=False)
     return recfunctions.append_fields(bare, list(names), colours, usemask=False)

@@ -19,7 +19,7 @@ from numpy import ndarray
 from numpy.typing import NDArray
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
 from scanwright.firmware_io.foreign import foreign
 
@@ -60,7 +60,7 @@ class PlyWriter:
 
     def __enter__(self) -> PlyWriter:
         with ExitStack() as stack:
-            part = stack.enter_context(whole_file(self._path, RecordingError))
+            part = stack.enter_context(atomic_write(self._path, RecordingError))
             self._stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
             self._stream.write(self._header())
             stack.push(self._finish)
@@ -138,8 +138,8 @@ class PlyHeader:
     @property
     def width(self) -> int:
         """Rows of a scan of an organised cloud, 0 of a flat one."""
-        told = dict(words for line in self.comments if len(words := line.split()) == 2 and words[1].isdigit())
-        width, height = int(told.get("width", 0)), int(told.get("height", 0))
+        sizes = dict(words for line in self.comments if len(words := line.split()) == 2 and words[1].isdigit())
+        width, height = int(sizes.get("width", 0)), int(sizes.get("height", 0))
         return width if height > 1 and width * height == self.rows else 0
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
-from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, held
+from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
 from scanwright.firmware_io.foreign import foreign
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
@@ -42,7 +42,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     rows = np.empty(len(values), list(zip(names, types, strict=True)))
     for k, name in enumerate(names):
         try:
-            rows[name] = held(values[:, k], types[k])
+            rows[name] = as_type(values[:, k], types[k])
         except RecordingError as error:
             raise RecordingError(f"{path}: column {name}: {error}") from error
     return [cloud_from_rows(rows, comments)], [] if named or count == 3 else [
@@ -56,6 +56,6 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     names = rows.dtype.names or ()
     kinds = [rows.dtype[name].str for name in names]
     header = [" ".join(names), "types " + " ".join(kinds), *headlines(cloud)]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         np.savetxt(part, rows, [_DIGITS.get(kind, "%d") for kind in kinds], header="\n".join(header))
     return []

@@ -62,8 +62,8 @@ def load_views(
     shots = list(_listed(listed)) if listed.suffix.lower() == ".csv" else [_Shot(listed)]
     if not shots:
         raise RecordingError(f"{listed}: no image in it")
-    curve = straight(recording.joint_log) if recording.held else axis_curve(recording.joint_log, held=False)[0]
-    found = []
+    curve = straight(recording.joint_log) if recording.at_rest else axis_curve(recording.joint_log, at_rest=False)[0]
+    views = []
     for shot in shots:
         with opened(shot.file, camera):  # what is wrong with an image is said before the work, not after
             pass
@@ -75,8 +75,8 @@ def load_views(
         T = T_cloud_world @ _T_world_frame(camera, angles, shot, curve, lag_s) @ camera.T_frame_camera()
         if not np.isfinite(T).all():
             raise RecordingError(f"{listed}: {shot.file.name}: its time_ns lies outside of the recording")
-        found.append(CameraView(shot.file, T))
-    return found
+        views.append(CameraView(shot.file, T))
+    return views
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +91,16 @@ def _listed(path: Path) -> Iterator[_Shot]:
     try:
         names = table.fieldnames or []
         if "file" not in names or not {"time_ns", "joint_deg"} & set(names):
-            told = ", ".join(names) or "nothing"
-            raise RecordingError(f"{path}: columns {told}: one is `file`, another `time_ns` or `joint_deg`")
+            available = ", ".join(names) or "nothing"
+            raise RecordingError(f"{path}: columns {available}: one is `file`, another `time_ns` or `joint_deg`")
         for number, row in enumerate(table, 2):
             time_ns = int(row["time_ns"]) if "time_ns" in names else None
             joint_rad = float(np.radians(float(row["joint_deg"]))) if "joint_deg" in names else None
             if not row["file"]:
                 raise RecordingError(f"{path}:{number}: no file named")
             yield _Shot(path.parent / row["file"], time_ns, joint_rad)
+    except RecordingError:
+        raise
     except (ValueError, TypeError) as error:
         raise RecordingError(f"{path}: not a number: {error}; time_ns is whole nanoseconds since 1970") from error
 
@@ -129,5 +131,7 @@ def opened(path: Path, camera: Camera) -> Iterator[Image.Image]:
                     "one size"
                 )
             yield image
+    except RecordingError:
+        raise
     except (OSError, ValueError) as error:  # pillow's own are OSErrors
         raise RecordingError(f"{path}: cannot read the image: {getattr(error, 'strerror', None) or error}") from error

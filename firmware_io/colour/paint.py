@@ -75,7 +75,7 @@ def painter(
     if camera is None:
         raise TaskError(f"{loaded.source}: camera: this task describes no camera; `scanwright schema` says how")
     views = load_views(camera, loaded.source.parent, angles, source, poses, lag_s)
-    spacing, from_m = spacing_of(source), stands_m(source, angles, poses)
+    spacing, from_m = spacing_of(source), origin_m(source, angles, poses)
     return lambda cloud: colour_cloud(cloud, camera, views, spacing, from_m, organised=organised)
 
 
@@ -238,14 +238,14 @@ def _draw(
 def _write(
     path: Path, rows: NDArray[np.void], rgb: UInt8[ndarray, "n 3"], coloured: Bool[ndarray, " n"], *, organised: bool
 ) -> None:
-    kept = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
-    fields = np.dtype([*kept, *((name, "|u1") for name in COLOURS)])
+    fields_kept = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
+    fields = np.dtype([*fields_kept, *((name, "|u1") for name in COLOURS)])
     comments = [line for line in read_header(path).comments if organised or line.split()[0] not in ("width", "height")]
     with PlyWriter(path, fields, comments) as cloud:
         for begin in range(0, rows.size, _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
             out = np.empty(rows[part].size, fields)
-            for name, _ in kept:
+            for name, _ in fields_kept:
                 out[name] = rows[part][name]
             for channel, name in enumerate(COLOURS[:3]):
                 out[name] = rgb[part, channel]
@@ -253,7 +253,7 @@ def _write(
             cloud.write(out if organised else out[np.isfinite(out["x"])])
 
 
-def stands_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Float64[ndarray, " 3"]:
+def origin_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Float64[ndarray, " 3"]:
     """Where the scanner stood in its cloud [m], in the middle of the recording, shape (3,)."""
     stood = np.array(angles.t_world_rot_mm) / 1000
     if poses is None:

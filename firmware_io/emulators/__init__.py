@@ -1,1 +1,1 @@
-"""Twins: devices made of software, on pseudo-terminals, that behave as the hardware does."""
+"""Emulators: devices made of software, on pseudo-terminals, that behave as the hardware does."""

@@ -78,8 +78,8 @@ class HornMotion:
             setpoint = walked_rad(t - last_s, start, last.goal, last.rate_rad_s) if walking else float(state[2])
             if drive.mode != "velocity" or last.mode != "velocity":
                 state[4] = drive.goal / self._plant.no_load_rad_s if drive.mode == "velocity" else 0.0
-            kept = bisect.bisect_left(self._ends, t) + 1
-            del self._ends[kept:], self._steps[kept:]
+            valid = bisect.bisect_left(self._ends, t) + 1
+            del self._ends[valid:], self._steps[valid:]
             if self._ends:
                 self._ends[-1] = min(self._ends[-1], t)
             self._begin(t, state, drive, setpoint)
@@ -99,9 +99,9 @@ class HornMotion:
         Raises:
             ValueError: a time lies before what is kept.
         """
-        asked_s = (np.asarray(time_ns, np.int64) - self._origin_ns) / 1e9
+        at_s = (np.asarray(time_ns, np.int64) - self._origin_ns) / 1e9
         with self._lock:
-            return self._states(asked_s.ravel())[2].reshape(asked_s.shape)
+            return self._states(at_s.ravel())[2].reshape(at_s.shape)
 
     def motion(self, time_ns: int) -> Motion:
         """Angle, rate and effort at one time."""
@@ -120,33 +120,33 @@ class HornMotion:
         return max(0, bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1)
 
     def _begin(self, t: float, state: Floats, drive: Actuation, setpoint: float) -> None:
-        held = self._drives[-1][3] if self._drives and self._drives[-1][1].blocked else float(state[2])
-        self._drives.append((t, drive, setpoint, held))
-        rhs = equations(self._plant, self._load, drive, t, setpoint, held)
+        hold_rad = self._drives[-1][3] if self._drives and self._drives[-1][1].blocked else float(state[2])
+        self._drives.append((t, drive, setpoint, hold_rad))
+        rhs = equations(self._plant, self._load, drive, t, setpoint, hold_rad)
         rtol = self._solver.rtol
         # No upper end: steps are taken as they are asked for. First steps are short, as a drive begins with a jump.
         self._integrator = _SOLVERS[self._solver.method](
             rhs, t, state, t + 1e9, rtol=rtol, atol=rtol / 1000, first_step=1e-6, max_step=1.0
         )
 
-    def _states(self, asked_s: Floats) -> Floats:
+    def _states(self, at_s: Floats) -> Floats:
         """States at given times, shape (6, n); integrates as far as needed."""
-        if asked_s.size == 0:
+        if at_s.size == 0:
             return np.empty((6, 0))
-        if asked_s.min() < self._first_s():
-            raise ValueError(f"the motion {asked_s.min() - self._first_s():.3f} s before what is kept is gone")
-        last = float(asked_s.max())
+        if at_s.min() < self._first_s():
+            raise ValueError(f"the motion {self._first_s() - at_s.min():.3f} s before the history")
+        last = float(at_s.max())
         while self._integrator.t < last:
             self._integrator.step()
             if self._integrator.status == "failed":
                 raise ArithmeticError(f"the solver gave up at {self._integrator.t:.6f} s")
             self._ends.append(self._integrator.t)
             self._steps.append(self._integrator.dense_output())
-        states = np.empty((6, asked_s.size))
-        which = np.searchsorted(self._ends, asked_s) if self._ends else np.zeros(asked_s.size, int)
+        states = np.empty((6, at_s.size))
+        which = np.searchsorted(self._ends, at_s) if self._ends else np.zeros(at_s.size, int)
         for step in np.unique(which):
             here = which == step
-            states[:, here] = self._steps[step](asked_s[here]) if self._ends else self._integrator.y[:, None]
+            states[:, here] = self._steps[step](at_s[here]) if self._ends else self._integrator.y[:, None]
         self._forget(last - self._history_s)
         return states
 
@@ -154,7 +154,7 @@ class HornMotion:
         return float(self._steps[0].t_old) if self._steps else self._drives[0][0]  # type: ignore[attr-defined]
 
     def _forget(self, before_s: float) -> None:
-        gone = bisect.bisect_left(self._ends, before_s)
-        if gone > 1000:  # in bulk, so that it costs nothing per step
-            del self._ends[:gone], self._steps[:gone]
+        outdated = bisect.bisect_left(self._ends, before_s)
+        if outdated > 1000:  # in bulk, so that it costs nothing per step
+            del self._ends[:outdated], self._steps[:outdated]
             del self._drives[: self._index(self._first_s())]

@@ -1,4 +1,4 @@
-"""Which Hokuyo a twin is: what it says of itself, and its clock.
+"""Which Hokuyo an emulator is: what it says of itself, and its clock.
 
 Texts and statuses are those of captured sensors, except where an entry says otherwise.
 """

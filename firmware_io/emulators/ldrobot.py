@@ -13,7 +13,7 @@ import numpy as np
 
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
-from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.world import turned_deg
 
 BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}
@@ -51,7 +51,7 @@ class LdrobotMachine:
 
     Attributes:
         lidar: of the catalogue.
-        sight: what it sees.
+        ranging: what it sees.
         began_ns: when its clock was 0.
         baud: of its line.
         rate_error: of its clock, 5e-5 is 50 ppm fast.
@@ -59,7 +59,7 @@ class LdrobotMachine:
     """
 
     lidar: Lidar
-    sight: Sight
+    ranging: Ranging
     began_ns: int
     baud: int
     rate_error: float = 0.0
@@ -92,7 +92,7 @@ class LdrobotMachine:
         since_ns = number * self.point_ns
         angle_deg, speed_deg_s = turned_deg(self.lidar.scan_rate_hz, since_ns / 1e9)
         time_ns = self.began_ns + np.rint(since_ns).astype(np.int64)
-        range_m, intensity = self.sight(time_ns, -np.radians(angle_deg % 360))  # clockwise
+        range_m, intensity = self.ranging(time_ns, -np.radians(angle_deg % 360))  # clockwise
         measured = np.isfinite(range_m) & (range_m > 0) & (range_m < 65.0)
         range_mm = np.where(measured, np.rint(np.where(measured, range_m, 0) * 1e3), 0).astype(int)
         level = np.where(measured, np.clip(np.nan_to_num(intensity) / 16, 1, 255), 0).astype(int)
@@ -120,7 +120,7 @@ class LdrobotMachine:
         return max(round(_CHUNK_NS / (_POINTS * self.point_ns)), 1)
 
 
-class LdrobotTwin(LidarLine):
+class LdrobotEmulator(LidarLine):
     """A lidar that talks all the time."""
 
     machine: LdrobotMachine
@@ -128,7 +128,7 @@ class LdrobotTwin(LidarLine):
     def __init__(
         self,
         lidar: Lidar,
-        sight: Sight,
+        ranging: Ranging,
         *,
         rate_error: float = 0.0,
         first_ms: int = 0,
@@ -139,26 +139,26 @@ class LdrobotTwin(LidarLine):
 
         Args:
             lidar: of the catalogue.
-            sight: what it sees.
+            ranging: what it sees.
             rate_error: of its clock.
             first_ms: what its clock shows first.
             jitter_s: packets arrive up to this much late.
             seed: of jitter and faults.
 
         Raises:
-            DeviceError: there is no twin of this model.
+            DeviceError: there is no emulator of this model.
         """
         if lidar.name not in BAUDS:
-            raise DeviceError(f"no LDROBOT twin of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
-        machine = LdrobotMachine(lidar, sight, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
+            raise DeviceError(f"no LDROBOT emulator of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
+        machine = LdrobotMachine(lidar, ranging, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
         # a line that nobody listens to keeps next to nothing
         super().__init__(lidar.name, machine, jitter_s=jitter_s, head=6, backlog=_BACKLOG, network=False, seed=seed)
 
 
-def ldrobot_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> LdrobotTwin:
-    """The twin of a sensor of the catalogue.
+def ldrobot_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LdrobotEmulator:
+    """The emulator of a sensor of the catalogue.
 
     Raises:
-        DeviceError: there is no twin of this model.
+        DeviceError: there is no emulator of this model.
     """
-    return LdrobotTwin(lidar, sight, seed=seed)
+    return LdrobotEmulator(lidar, ranging, seed=seed)

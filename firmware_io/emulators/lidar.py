@@ -7,14 +7,14 @@ import time
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
-from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.lidar_machine import LidarMachine, Look
 from scanwright.firmware_io.lidar.scip import measurement
 
 _HEAD = 32  # bytes of a scan before its ranges: echo, status, stamp
 
 
-class LidarTwin(LidarLine):
+class LidarEmulator(LidarLine):
     """A lidar that answers SCIP.
 
     Attributes:
@@ -51,10 +51,10 @@ class LidarTwin(LidarLine):
             seed: of the jitter.
 
         Raises:
-            DeviceError: there is no twin of this model.
+            DeviceError: there is no emulator of this model.
         """
         if model not in IDENTITIES:
-            raise DeviceError(f"no twin of the lidar '{model}'{suggest(model, IDENTITIES)}")
+            raise DeviceError(f"no emulator of the lidar '{model}'{suggest(model, IDENTITIES)}")
         quartz = Quartz(time.monotonic_ns(), clock_ms, rate_error)
         machine = LidarMachine(IDENTITIES[model], look, quartz, motor_error=motor_error, scip_1=scip_1)
         super().__init__(model, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
@@ -63,11 +63,11 @@ class LidarTwin(LidarLine):
             machine.answer(measurement.continuous(machine.identity.parameters.window), time.monotonic_ns())
 
 
-def scip_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> LidarTwin:
-    """The twin of a sensor of the catalogue.
+def scip_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarEmulator:
+    """The emulator of a sensor of the catalogue.
 
     Raises:
-        DeviceError: there is no twin of this model.
+        DeviceError: there is no emulator of this model.
     """
     bearing_rad = lidar.bearings_rad()
-    return LidarTwin(lidar.name, lambda time_ns: sight(time_ns, bearing_rad), seed=seed)
+    return LidarEmulator(lidar.name, lambda time_ns: ranging(time_ns, bearing_rad), seed=seed)

@@ -1,6 +1,6 @@
 """A lidar in software on its line: a pseudo-terminal, and TCP where the model has it, with the faults of real ones.
 
-What the sensor is and says is its `LidarMachine`'s, what it sees its `Sight`'s.
+What the sensor is and says is its `LidarMachine`'s, what it sees its `Ranging`'s.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 
 from scanwright.design.arrays import Floats, Times
 
-Sight = Callable[[Times, Floats], tuple[Floats, Floats]]
+Ranging = Callable[[Times, Floats], tuple[Floats, Floats]]
 """True times [ns, time.monotonic_ns] in order and bearings [rad] of beams, (n,) -> range [m] (inf or NaN: no return,
 -inf: too near) and intensity, both (n,)."""
 
@@ -122,12 +122,12 @@ class LidarLine:
         self._error: BaseException | None = None
 
     def __enter__(self) -> Self:
-        self._folder = tempfile.TemporaryDirectory(prefix="lidar-twin-")
+        self._folder = tempfile.TemporaryDirectory(prefix="lidar-emulator-")
         self.port = str(Path(self._folder.name, "lidar"))
         self._wake, self._woken = os.pipe()[::-1]
         self._running = True
         self.plug()
-        self._thread = threading.Thread(target=self._run, name=f"{self._name} twin")
+        self._thread = threading.Thread(target=self._run, name=f"{self._name} emulator")
         self._thread.start()
         return self
 
@@ -258,8 +258,8 @@ class LidarLine:
             self._drop(channel)
             return
         scanning = self.machine.scanning
-        told, channel.received = self.machine.hear(channel.received + received, time.monotonic_ns())
-        channel.waiting += told
+        answers, channel.received = self.machine.hear(channel.received + received, time.monotonic_ns())
+        channel.waiting += answers
         if self.machine.scanning is not scanning:  # began or ended
             self._scans_to = channel.fd
             self._sent.clear()
@@ -270,8 +270,8 @@ class LidarLine:
         over_ns = self.machine.next_ns()
         if over_ns - _AHEAD_NS <= time.monotonic_ns():
             late_ns = round(self._rng.uniform(0, self._jitter_ns)) if self._jitter_ns else 0
-            for sent_ns, whole in self.machine.next_packets():
-                packet = self._faults.popleft()(whole) if self._faults else whole
+            for sent_ns, packet_bytes in self.machine.next_packets():
+                packet = self._faults.popleft()(packet_bytes) if self._faults else packet_bytes
                 self._sent.append((max(sent_ns + late_ns, self._sent[-1][0] if self._sent else 0), packet))
         while self._sent and self._sent[0][0] <= time.monotonic_ns():
             packet = self._sent.popleft()[1]

@@ -1,4 +1,4 @@
-"""`scanwright emulate`: both twins at once, the lidar on the horn of the servo, in a room."""
+"""`scanwright emulate`: both emulators at once, the lidar on the horn of the servo, in a room."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.device_ports import Ports
 from scanwright.firmware_io.emulators.lidar_line import LidarLine
-from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.emulators.world import looking, range_model, rays
 from scanwright.firmware_io.lidar.families import family_of
@@ -30,7 +30,7 @@ class EmulatedScanner:
 
     ports: Ports
     lidar: LidarLine
-    servo: ServoTwin
+    servo: ServoEmulator
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def emulated_scanner(
     seed: int = 0,
     factory_servo: bool = False,
 ) -> Iterator[EmulatedScanner]:
-    """Run the twins of a scanner's devices while the body runs.
+    """Run the emulators of a scanner's devices while the body runs.
 
     Args:
         angles: angle set of the scanner.
@@ -59,10 +59,10 @@ def emulated_scanner(
     Raises:
         SceneError: the sensor would see nothing there.
         TaskError: sensor or servo are not in the catalogue.
-        DeviceError: there is no twin of one of them.
+        DeviceError: there is no emulator of one of them.
     """
     lidar = load_catalogue().get(angles.sensor, Lidar)
-    twin_of = resolve_name(family_of(lidar.name).twin)
+    make_emulator = resolve_name(family_of(lidar.name).emulator)
     model, bearing_rad = range_model(lidar, sigma_mm), lidar.bearings_rad()
     for turn_rad in np.linspace(0, 2 * np.pi, 12, endpoint=False):
         hits = cast(scene, *rays(angles, bearing_rad, np.full(bearing_rad.size, turn_rad)))
@@ -70,13 +70,12 @@ def emulated_scanner(
             break
     else:
         raise SceneError(
-            f"no surface within {model.range_max_m:g} m of the scanner: is the unit right (--unit-m 0.001 for mm), "
-            "and the place (--at)?"
+            f"no surface within {model.range_max_m:g} m of the scanner: check unit_m (0.001 for a mesh in mm) and at_m"
         )
     with ExitStack() as stack:
-        servo = stack.enter_context(ServoTwin(angles.servo, protocol, load=load, seed=seed))
+        servo = stack.enter_context(ServoEmulator(angles.servo, protocol, load=load, seed=seed))
         if not factory_servo:
             servo.set_up(spins=None if angles.motion is None else isinstance(angles.motion, Spin))
-        sight = looking(scene, angles, servo.axis.angle_rad, model, seed)
-        twin = stack.enter_context(twin_of(lidar, sight, seed))
-        yield EmulatedScanner(Ports(twin.port, servo.port, os.getpid()), twin, servo)
+        ranging = looking(scene, angles, servo.axis.angle_rad, model, seed)
+        emulator = stack.enter_context(make_emulator(lidar, ranging, seed))
+        yield EmulatedScanner(Ports(emulator.port, servo.port, os.getpid()), emulator, servo)

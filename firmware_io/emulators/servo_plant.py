@@ -87,9 +87,9 @@ def plant_of(model: str) -> Plant:
     """The plant of a model: torque, speed and play from its maker, loop gains from its control table's defaults."""
     ax = model == "AX-12A"
     servo = load_catalogue().get(model, Servo)
-    no_load_rad_s, play_deg = servo.no_load_rpm * RPM, servo.backlash_deg
-    if play_deg is None:
-        play_deg = 0.5 if ax else 0.333  # assumed
+    no_load_rad_s, backlash_deg = servo.no_load_rpm * RPM, servo.backlash_deg
+    if backlash_deg is None:
+        backlash_deg = 0.5 if ax else 0.333  # assumed
     # Assumed, mechanical time constants: rotors of 0.3 and 1 g cm2, geared 254:1 (AX-12A) and 200:1 (MX-64R).
     time_constant_s = 0.0082 if ax else 0.0044
     count_rad = math.radians(300 / 1024 if ax else 360 / 4096)
@@ -98,7 +98,7 @@ def plant_of(model: str) -> Plant:
         no_load_rad_s=no_load_rad_s,
         inertia_kg_m2=time_constant_s * servo.stall_torque_nm / no_load_rad_s,
         friction_nm=(0.015 if ax else 0.05) * servo.stall_torque_nm,  # assumed
-        backlash_rad=math.radians(play_deg),
+        backlash_rad=math.radians(backlash_deg),
         stiffness_nm_rad=100.0 if model in _PLASTIC_TEETH else 300.0,  # assumed
         impact_s_rad=20.0,  # assumed
         sensor_lag_s=0.030 if ax else 0.004,  # assumed: potentiometer with filter, encoder
@@ -140,8 +140,8 @@ def walked_rad(elapsed_s: float, start: float, goal: float, rate_rad_s: float) -
         goal: where it ends.
         rate_rad_s: of its walk.
     """
-    way = rate_rad_s * elapsed_s if elapsed_s > 0 else 0.0
-    return start + max(-way, min(way, goal - start))
+    most_rad = rate_rad_s * elapsed_s if elapsed_s > 0 else 0.0
+    return start + max(-most_rad, min(most_rad, goal - start))
 
 
 def effort(
@@ -166,11 +166,11 @@ def effort(
     """
     if drive.mode == "off":
         return 0.0, 0.0
-    duty = max(-drive.torque_limit, min(drive.torque_limit, _asked(plant, drive, setpoint, h, i, seen)))
+    duty = max(-drive.torque_limit, min(drive.torque_limit, _duty_wanted(plant, drive, setpoint, h, i, seen)))
     return duty, drive.supply * duty - m_rate / plant.no_load_rad_s
 
 
-def _asked(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, seen: float) -> float:
+def _duty_wanted(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, seen: float) -> float:
     """Duty that the loop asks for, whatever the limit."""
     if drive.mode == "share":
         return drive.goal
@@ -182,7 +182,7 @@ def _asked(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, 
 
 
 def equations(
-    plant: Plant, load: Load, drive: Actuation, start_s: float, setpoint: float, held: float
+    plant: Plant, load: Load, drive: Actuation, start_s: float, setpoint: float, hold_rad: float
 ) -> Callable[[float, Floats], list[float]]:
     """Right-hand side for one drive; states: motor angle and rate, horn angle and rate, integral, angle seen."""
     half = plant.backlash_rad / 2
@@ -201,13 +201,13 @@ def equations(
             h_rate / _SLOW_RAD_S
         )
         if drive.blocked:
-            on_horn -= 50 * plant.stall_torque_nm * (h - held) + 0.5 * plant.stall_torque_nm * h_rate
+            on_horn -= 50 * plant.stall_torque_nm * (h - hold_rad) + 0.5 * plant.stall_torque_nm * h_rate
         seen_rate = (h - seen) / plant.sensor_lag_s
         integral_rate = 0.0
         if drive.mode == "velocity":
             # What the limit cuts off flows back. An integral that just stops there would switch at every step, and the
             # solver would crawl along the switch for ever.
-            cut = duty - _asked(plant, drive, setpoint, h, i, seen)
+            cut = duty - _duty_wanted(plant, drive, setpoint, h, i, seen)
             integral_rate = plant.velocity_i * (drive.goal - seen_rate + cut / plant.velocity_p)
         return [
             m_rate,

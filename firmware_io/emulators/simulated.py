@@ -1,7 +1,6 @@
-"""A recording without devices, faster than time: what a scanner whose servo obeys to the letter measures in a scene.
+"""A recording without devices, faster than real time, of a scanner whose servo follows its motion exactly.
 
-The twins behind ports (`scanner.py`) are the whole of it, with their packets, clocks, ripple and faults; this is for
-arrays to try things on.
+The emulators behind ports (`scanner.py`) add packets, clocks, ripple and faults.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ def simulated_recording(
         TaskError: the sensor is not in the catalogue.
     """
     if angles.motion is None:
-        raise DeviceError(f"{angles.task}: motion = null: this angle set does not say how the servo moves")
+        raise DeviceError(f"{angles.task}: motion = null: this angle set has no motion of the servo")
     lidar = load_catalogue().get(angles.sensor, Lidar)
     bearing_rad, model, rng = lidar.bearings_rad(), range_model(lidar, sigma_mm), np.random.default_rng(seed)
     scans = int(np.ceil(turns * angles.motion.duration_s * lidar.scan_rate_hz))

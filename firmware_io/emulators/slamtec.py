@@ -15,7 +15,7 @@ import numpy as np
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
-from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.world import turned_deg
 
 _FIRMWARE = (1, 29)
@@ -56,14 +56,14 @@ class SlamtecMachine:
 
     Attributes:
         lidar: of the catalogue.
-        sight: what it sees.
+        ranging: what it sees.
         began_ns: when it got its power.
         points_error: it measures this part faster than it says.
         health: 0 good, 1 a warning, 2 a fault.
     """
 
     lidar: Lidar
-    sight: Sight
+    ranging: Ranging
     began_ns: int
     points_error: float = 0.0
     health: int = 0
@@ -82,24 +82,24 @@ class SlamtecMachine:
 
     def hear(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
         """Answers to whole requests; a sum that is wrong, or what is none, is not answered."""
-        told = b""
+        answers = b""
         while (at := received.find(b"\xa5")) >= 0 and len(received) >= at + 2:
             command, received = received[at + 1], received[at:]
             if not command & 0x80:
-                told += self._answer(command, b"", now_ns)
+                answers += self._answer(command, b"", now_ns)
                 received = received[2:]
                 continue
             if len(received) < 3 or len(received) < 4 + received[2]:
-                return told, received
+                return answers, received
             body, total = received[: 3 + received[2]], 0
             for byte in body:
                 total ^= byte
             if total == received[len(body)]:
-                told += self._answer(command, body[3:], now_ns)
+                answers += self._answer(command, body[3:], now_ns)
                 received = received[len(body) + 1 :]
             else:
                 received = received[1:]
-        return told, received if at >= 0 else b""
+        return answers, received if at >= 0 else b""
 
     def next_ns(self) -> int:
         """When the packets that it measures next are over."""
@@ -173,7 +173,7 @@ class SlamtecMachine:
         return reply(0x20, payload[:4] + values[key]) if key in values else b""
 
     def _seen_mm(self, time_ns: Times, angle_deg: Floats, most: int) -> Floats:
-        range_m = self.sight(time_ns, -np.radians(angle_deg % 360))[0]
+        range_m = self.ranging(time_ns, -np.radians(angle_deg % 360))[0]
         measured = np.isfinite(range_m) & (range_m > 0) & (range_m * 1e3 <= most)
         return np.where(measured, np.where(measured, range_m, 0.0) * 1e3, 0.0)
 
@@ -235,36 +235,36 @@ def summed(data: bytearray) -> bytes:
     return bytes([0xA0 | total & 15, 0x50 | total >> 4]) + bytes(data)
 
 
-class SlamtecTwin(LidarLine):
+class SlamtecEmulator(LidarLine):
     """A lidar that answers as an RPLIDAR."""
 
     machine: SlamtecMachine
 
     def __init__(
-        self, lidar: Lidar, sight: Sight, *, points_error: float = 2e-3, jitter_s: float = 0.0, seed: int = 0
+        self, lidar: Lidar, ranging: Ranging, *, points_error: float = 2e-3, jitter_s: float = 0.0, seed: int = 0
     ) -> None:
         """Nothing runs before `with`.
 
         Args:
             lidar: of the catalogue.
-            sight: what it sees.
+            ranging: what it sees.
             points_error: it measures this part faster than it says.
             jitter_s: packets arrive up to this much late.
             seed: of jitter and faults.
 
         Raises:
-            DeviceError: there is no twin of this model.
+            DeviceError: there is no emulator of this model.
         """
         if lidar.name not in IDENTITIES:
-            raise DeviceError(f"no RPLIDAR twin of the lidar '{lidar.name}'{suggest(lidar.name, IDENTITIES)}")
-        machine = SlamtecMachine(lidar, sight, time.monotonic_ns(), points_error)
+            raise DeviceError(f"no RPLIDAR emulator of the lidar '{lidar.name}'{suggest(lidar.name, IDENTITIES)}")
+        machine = SlamtecMachine(lidar, ranging, time.monotonic_ns(), points_error)
         super().__init__(lidar.name, machine, jitter_s=jitter_s, head=0, backlog=1 << 12, network=False, seed=seed)
 
 
-def slamtec_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> SlamtecTwin:
-    """The twin of a sensor of the catalogue.
+def slamtec_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> SlamtecEmulator:
+    """The emulator of a sensor of the catalogue.
 
     Raises:
-        DeviceError: there is no twin of this model.
+        DeviceError: there is no emulator of this model.
     """
-    return SlamtecTwin(lidar, sight, seed=seed)
+    return SlamtecEmulator(lidar, ranging, seed=seed)

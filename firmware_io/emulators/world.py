@@ -116,7 +116,7 @@ def looking(
     model: RangeModel,
     seed: int = 0,
 ) -> Callable[[Times, Floats], tuple[Floats, Floats]]:
-    """What a lidar twin asks: the true times and bearings of beams -> range [m] and intensity.
+    """What a lidar emulator asks: the true times and bearings of beams -> range [m] and intensity.
 
     `angle_at` is the true angle of the axis at given times.
     """

@@ -119,4 +119,4 @@ def open_stream(address: str) -> Stream:
         return SocketStream(host, int(port))
     except (OSError, ValueError, OverflowError) as error:
         why = "no answer in 2 s" if isinstance(error, TimeoutError) else getattr(error, "strerror", None) or error
-        raise DeviceError(f"{address}: cannot connect: {why}: look at address, cable and power") from error
+        raise DeviceError(f"{address}: cannot connect: {why}: check address, cable and power") from error

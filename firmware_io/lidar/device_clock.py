@@ -52,7 +52,7 @@ class ScanMoment:
 class Exchange:
     """One question for the sensor's time: when it was asked, what the sensor answered, when the answer was there."""
 
-    asked_ns: int
+    sent_ns: int
     stamp_ms: int
     answered_ns: int
 
@@ -77,9 +77,9 @@ def synchronised(exchanges: Sequence[Exchange]) -> TimeSync:
     """
     first = exchanges[0].stamp_ms
     since_ms = [exchange.stamp_ms - first for exchange in exchanges]
-    low = max(e.asked_ns - (ms + 1) * 1_000_000 for e, ms in zip(exchanges, since_ms, strict=True))
+    low = max(e.sent_ns - (ms + 1) * 1_000_000 for e, ms in zip(exchanges, since_ms, strict=True))
     high = min(e.answered_ns - ms * 1_000_000 for e, ms in zip(exchanges, since_ms, strict=True))
-    drift_ns = round(_RATE_MAX * max(e.answered_ns - exchanges[0].asked_ns for e in exchanges))
+    drift_ns = round(_RATE_MAX * max(e.answered_ns - exchanges[0].sent_ns for e in exchanges))
     if low > high + drift_ns:
         raise DeviceError("time synchronisation: the answers contradict each other; the sensor's clock began anew")
     return TimeSync(first, (low + high) // 2, max(high - low, 0) // 2 + drift_ns)
@@ -193,8 +193,8 @@ class DeviceClock:
         time_ns = self._origin[1] + round(turn_ms * 1e6 + line_ns) - self._delay_ns
         uncertainty_ns = math.hypot(chance_ns, self._reach_ns, _GRAIN_NS)
         if self._sync is not None:
-            told_ns, half_ns = self._allowed(self._sync, stamp_ms, turn_ms - since_ms)
-            time_ns = min(max(time_ns, told_ns - half_ns), told_ns + half_ns)
+            sync_ns, half_ns = self._allowed(self._sync, stamp_ms, turn_ms - since_ms)
+            time_ns = min(max(time_ns, sync_ns - half_ns), sync_ns + half_ns)
             uncertainty_ns = min(uncertainty_ns, half_ns)
         return ScanMoment(time_ns + self._first_beam_ns, round(uncertainty_ns))
 
@@ -215,7 +215,7 @@ class DeviceClock:
         """Keep the earliest arrival of each second, and the line below them."""
         if self._fits != self._stamps.fits:  # the same arrivals, their turns told anew
             self._fits = self._stamps.fits
-            self._earliest = deque((self._told_anew(early) for early in self._earliest), _BUCKETS)
+            self._earliest = deque((self._refitted(early) for early in self._earliest), _BUCKETS)
         elif turn_ms - self._bucket_ms < 1e3 and late_ns - self._slope * turn_ms >= self._earliest[-1].above(
             self._slope
         ):
@@ -240,7 +240,7 @@ class DeviceClock:
         near = max(round(_NEAR * self._period_ms / 1e3), 1)
         self._near_ns = min(above_ns[-near:]) - self._offset_ns
 
-    def _told_anew(self, early: _Early) -> _Early:
+    def _refitted(self, early: _Early) -> _Early:
         """An arrival, with the time of its turn by the present line where that holds for it."""
         if early.turn < self._stamps.first_turn:
             return early

@@ -23,11 +23,11 @@ _EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers 
 
 # If no model is named, they are tried in this order: first the one that only listens.
 FAMILIES = (
-    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, f"{_EMULATORS}.ldrobot:ldrobot_twin"),
-    LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, f"{_EMULATORS}.lidar:scip_twin", stamp_choice=True),
-    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, f"{_EMULATORS}.slamtec:slamtec_twin"),
-    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, f"{_EMULATORS}.sick.cola_twin:sick_twin"),
-    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, f"{_EMULATORS}.sick.lms_twin:lms_twin"),
+    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, f"{_EMULATORS}.ldrobot:ldrobot_emulator"),
+    LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, f"{_EMULATORS}.lidar:scip_emulator", stamp_choice=True),
+    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, f"{_EMULATORS}.slamtec:slamtec_emulator"),
+    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, f"{_EMULATORS}.sick.cola_emulator:sick_emulator"),
+    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, f"{_EMULATORS}.sick.lms_emulator:lms_emulator"),
 )
 
 
@@ -74,10 +74,10 @@ def open_lidar(address: str, model: str | None = None, stamp_at: StampAt = "step
         if stamp_at != "step_0" and not family.stamp_choice:
             raise DeviceError(f"stamp_at = '{stamp_at}': the stamps of a {model} ({family.title}) mean one thing only")
         return family.open(address, model, stamp_at)
-    heard = []
+    failures = []
     for family in all_families().values():
         try:
             return family.open(address, None, stamp_at)
         except DeviceError as error:
-            heard.append(str(error))
-    raise DeviceError("; ".join(dict.fromkeys(heard)))
+            failures.append(str(error))
+    raise DeviceError("; ".join(dict.fromkeys(failures)))

@@ -126,13 +126,13 @@ class LidarFamily:
         title: maker and protocol, in words.
         open: address, name of the model (None: whatever answers) and which moment its stamps mean -> the lidar;
             DeviceError if none of this family answers there.
-        twin: "package.module:function" of its twin: (catalogue record, `twins.lidar_line.Sight`, seed) -> a
-            `twins.lidar_line.LidarLine`; a text, since twins live a storey above drivers.
+        emulator: "package.module:function" that makes an emulated device of (catalogue record,
+            `emulators.lidar_line.Ranging`, seed) -> `emulators.lidar_line.LidarLine`; drivers import no emulators.
         stamp_choice: whether `stamp_at` changes anything: what the maker's documents say of the stamps differs.
     """
 
     name: str
     title: str
     open: Callable[[str, str | None, StampAt], LidarDriver]
-    twin: str
+    emulator: str
     stamp_choice: bool = False

@@ -18,9 +18,9 @@ from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
 _POLL_S = 0.05
 _LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
 _SETTLE_S = 0.03  # adapters and sensors that had to wait send the rest of their own buffers within this
-_LOOKS = 10_000  # without finding the port empty
+_READS = 10_000  # without finding the port empty
 
-Heard = TypeVar("Heard")
+Packet = TypeVar("Packet")
 
 
 class SensorLine:
@@ -30,7 +30,7 @@ class SensorLine:
         address: where it is: a serial port, or HOST:PORT.
         stream: its bytes.
         longest: bytes of what can be whole; so much that comes too late, and is nothing, ends the waiting.
-        heard: bytes that came, whatever they were: none tell that nobody listens at this speed.
+        received: count of bytes that came; 0 shows that nothing answers at this speed.
     """
 
     def __init__(self, address: str, longest: int) -> None:
@@ -39,7 +39,7 @@ class SensorLine:
         Raises:
             DeviceError: no such port or host, or it is in use.
         """
-        self.address, self.longest, self.heard = address, longest, 0
+        self.address, self.longest, self.received = address, longest, 0
         self._open(address)
 
     @property
@@ -58,12 +58,12 @@ class SensorLine:
         Raises:
             DeviceError: the connection broke.
         """
-        with self.told_when_gone():
+        with self.broken_line_as_error():
             self.stream.write(data)
 
     def hear(
-        self, feed: Callable[[bytes], list[Heard]], deadline_s: float, pause_s: float = math.inf
-    ) -> tuple[list[Heard], int]:
+        self, feed: Callable[[bytes], list[Packet]], deadline_s: float, pause_s: float = math.inf
+    ) -> tuple[list[Packet], int]:
         """What comes until something is whole, and when that came [ns, time.monotonic_ns].
 
         Args:
@@ -86,9 +86,9 @@ class SensorLine:
             if arrival_ns - read_ns > pause_s * 1e9:
                 self.drop_waiting()
                 return [], self._read_ns
-            found = feed(received)
-            if found:
-                return found, arrival_ns
+            packets = feed(received)
+            if packets:
+                return packets, arrival_ns
             late_bytes += len(received) if over else 0
             if over and (not received or late_bytes > self.longest):
                 raise DeviceTimeoutError(f"{self.name}: nothing came in time; check power and cable")
@@ -101,10 +101,10 @@ class SensorLine:
             DeviceError: the connection broke.
         """
         settled_s = time.monotonic() + _SETTLE_S
-        for _ in range(_LOOKS):
+        for _ in range(_READS):
             if not self._look(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
                 return
-        raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; is another program busy?")
+        raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
     def close(self) -> None:
         """Let go of the port; what is closed stays so."""
@@ -144,10 +144,10 @@ class SensorLine:
         self._read_ns = time.monotonic_ns()  # when the last read returned
 
     def _look(self, timeout_s: float) -> bytes:
-        with self.told_when_gone():
+        with self.broken_line_as_error():
             received = self.stream.read(timeout_s)
         self._read_ns = time.monotonic_ns()
-        self.heard += len(received)
+        self.received += len(received)
         return received
 
     @contextmanager
@@ -160,13 +160,13 @@ class SensorLine:
             raise
 
     @contextmanager
-    def told_when_gone(self) -> Iterator[None]:
+    def broken_line_as_error(self) -> Iterator[None]:
         """Turns what a vanished port raises into a DeviceError of one line."""
         try:
             yield
         # A port that we closed after it vanished is None to pyserial, and -1 to select.
         except (OSError, TypeError, ValueError) as error:
-            raise DeviceError(f"{self.name}: the connection broke ({error}); plug it in again") from error
+            raise DeviceError(f"{self.name}: connection lost ({error}); plug it in again") from error
 
 
 def until_back(name: str, timeout_s: float, connect: Callable[[], None]) -> None:

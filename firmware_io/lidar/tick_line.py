@@ -92,15 +92,15 @@ class StampLine:
 
 def half_hull(points: Sequence[Point], side: int) -> list[Point]:
     """Convex hull from below (side 1) or above (-1) of points that are sorted by their first number."""
-    found: list[Point] = []
+    hull: list[Point] = []
     for x, y in points:
-        while len(found) > 1:
-            (x0, y0), (x1, y1) = found[-2:]
+        while len(hull) > 1:
+            (x0, y0), (x1, y1) = hull[-2:]
             if side * ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) > 0:
                 break
-            found.pop()
-        found.append((x, y))
-    return found
+            hull.pop()
+        hull.append((x, y))
+    return hull
 
 
 def middle_slope(below: Sequence[Point]) -> float:

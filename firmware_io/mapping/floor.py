@@ -15,7 +15,7 @@ _THICK_M = 0.1  # of the layer that is taken for one level: three sigmas of the 
 _LEAST_M2 = 1.0
 _MOST_BELOW = 0.05  # of all points: reflections hang below a floor, a room does not
 _MOST_TILT_RAD = math.radians(1.0)  # a wall of 0.1 m, six metres away
-_GIVE_IT = "name its height: --floor-m"
+_GIVE_IT = "pass its height as floor_m"
 
 
 def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> float:
@@ -39,8 +39,8 @@ def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> 
     if not lowest.size:
         raise RecordingError(f"floor: no point lies below the scanner: {_GIVE_IT}")
     height_m = np.sort(points_m[lowest, 2])
-    held = np.searchsorted(height_m, height_m + _THICK_M, side="right") - np.arange(height_m.size)
-    low_m = float(height_m[np.argmax(held)])
+    counts = np.searchsorted(height_m, height_m + _THICK_M, side="right") - np.arange(height_m.size)
+    low_m = float(height_m[np.argmax(counts)])
     on_level = lowest[np.abs(points_m[lowest, 2] - low_m - _THICK_M / 2) <= _THICK_M / 2]
     area_m2 = _inner(squares[on_level]) * _CELL_M**2
     if area_m2 < _LEAST_M2:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Vector
 from scanwright.design.errors import RecordingError
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.mapping.floor import find_floor
@@ -40,7 +41,7 @@ class MapSummary:
         points: of all clouds that are in it.
         moved: left out, as another cloud was seen through them.
         wrote: YAML and image.
-        said: what a person should know, one sentence each.
+        notes: what a person should know, one sentence each.
     """
 
     grid: OccupancyGrid
@@ -48,19 +49,19 @@ class MapSummary:
     points: int
     moved: int
     wrote: tuple[Path, Path]
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
         """The same in words."""
         grid, heights = self.grid, self.heights
         rows, columns = grid.cells.shape
         kinds = (("occupied", OCCUPIED), ("free", FREE))
-        told = [f"{grid.count(kind):,} {word} ({grid.area_m2(kind):.2f} m2)" for word, kind in kinds]
+        areas = [f"{grid.count(kind):,} {word} ({grid.area_m2(kind):.2f} m2)" for word, kind in kinds]
         return [
-            *(f"note: {line}" for line in self.said),
+            *(f"note: {line}" for line in self.notes),
             *([f"left out {self.moved:,} points: another cloud was seen through them"] if self.moved else []),
             f"floor at z = {heights.floor_m:z.3f} m, obstacles from {heights.from_m:g} to {heights.to_m:g} m above it",
-            f"mapped {self.points:,} points: {columns} x {rows} cells of {grid.resolution_m:g} m, {', '.join(told)}",
+            f"mapped {self.points:,} points: {columns} x {rows} cells of {grid.resolution_m:g} m, {', '.join(areas)}",
             f"wrote {', '.join(str(path) for path in self.wrote)}",
         ]
 
@@ -75,7 +76,7 @@ def map_files(
     to_m: float,
     resolution_m: float,
     seen_through_m: float | None,
-    say: Callable[[str], None],
+    progress: Progress = no_progress,
 ) -> MapSummary:
     """Read clouds, find the floor, write the map.
 
@@ -90,7 +91,7 @@ def map_files(
         to_m: above the floor; what is higher is driven under.
         resolution_m: edge of a cell.
         seen_through_m: leave out points that another cloud was seen through, by more than this; None for none.
-        say: progress.
+        progress: callback.
 
     Raises:
         RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map.
@@ -98,64 +99,63 @@ def map_files(
     check_map_place(out)
     check_resolution(resolution_m)
     Heights(0.0 if floor_m is None else floor_m, from_m, to_m)
-    stands, said = _stands(paths, scanner, poses, say)
+    positions, notes = _positions(paths, scanner, poses, progress)
     moved = 0
     if seen_through_m is not None:
-        say("looking for what moved")
-        gone = seen_through(stands, seen_through_m)
-        moved = sum(int(one.sum()) for one in gone)
-        stands = [Stand(stand.points_m[~one], stand.eye_m) for stand, one in zip(stands, gone, strict=True)]
-    points_m = np.concatenate([stand.points_m for stand in stands])
-    eyes_m = np.repeat([stand.eye_m for stand in stands], [len(stand.points_m) for stand in stands], axis=0)
+        progress("searching for moving objects")
+        moving = seen_through(positions, seen_through_m)
+        moved = sum(int(one.sum()) for one in moving)
+        positions = [Stand(stand.points_m[~one], stand.eye_m) for stand, one in zip(positions, moving, strict=True)]
+    points_m = np.concatenate([stand.points_m for stand in positions])
+    eyes_m = np.repeat([stand.eye_m for stand in positions], [len(stand.points_m) for stand in positions], axis=0)
     if floor_m is None:
         floor_m = find_floor(points_m, float(np.nanmin(eyes_m[:, 2], initial=np.inf)))
     heights = Heights(floor_m, from_m, to_m)
-    say("mapping")
+    progress("marking occupied and free cells")
     grid = occupancy_grid(points_m, eyes_m, heights, resolution_m)
-    said += _about_eyes(stands)
-    return MapSummary(grid, heights, len(points_m), moved, write_map(out, grid), tuple(said))
+    notes += _about_eyes(positions)
+    return MapSummary(grid, heights, len(points_m), moved, write_map(out, grid), tuple(notes))
 
 
-def _stands(
-    paths: Sequence[Path], scanner: AngleSet | None, poses: Path | None, say: Callable[[str], None]
+def _positions(
+    paths: Sequence[Path], scanner: AngleSet | None, poses: Path | None, progress: Progress
 ) -> tuple[list[Stand], list[str]]:
     """All clouds of all files in the frame of the map, and lines about what was not read."""
     named: list[tuple[Path, Cloud]] = []
-    counts, said = [], []
+    counts, notes = [], []
     for path in paths:
         read, lines = read_clouds(path)
-        said += lines
+        notes += lines
         counts.append((path, len(read)))
         named += [(path, cloud) for cloud in read]
-    given = None if poses is None else read_poses(poses, cloud_names(counts))
-    stands = []
+    T_clouds = None if poses is None else read_poses(poses, cloud_names(counts))
+    positions = []
     for k, (path, cloud) in enumerate(named):
-        say(f"{path.name}: {len(cloud.points_m):,} points")
+        progress(f"reading {path.name}", k / len(named))
         if not cloud.valid.any():
             raise RecordingError(f"{path}: none of the {len(cloud.points_m)} rows is a point")
-        T = cloud.T_world_cloud if given is None else given[k]
-        eye_m = _eye(path, cloud, scanner, placed=given is not None or cloud.placed)
+        T = cloud.T_world_cloud if T_clouds is None else T_clouds[k]
+        eye_m = _eye(path, cloud, scanner, placed=T_clouds is not None or cloud.placed)
         points_m = cloud.flat().points_m.astype(float)
-        stands.append(Stand(frames.apply(T, points_m), frames.apply(T, eye_m[None])[0]))
-    return stands, said
+        positions.append(Stand(frames.apply(T, points_m), frames.apply(T, eye_m[None])[0]))
+    return positions, notes
 
 
 def _eye(path: Path, cloud: Cloud, scanner: AngleSet | None, *, placed: bool) -> Vector:
     """Where the scanner stood in the frame of its cloud."""
     if _COUNT in cloud.columns and (scanner is not None or placed):
         raise RecordingError(
-            f"{path}: its column {_COUNT} says that it is merged of several clouds, which no single place saw: name "
-            "those, with --poses of `scanwright register`"
+            f"{path}: merged from several clouds (column {_COUNT}): pass those clouds and the poses that register wrote"
         )
     if scanner is not None:
         return scanner.T_world_rot(0.0)[:3, 3]
     return np.zeros(3) if placed else np.full(3, np.nan)
 
 
-def _about_eyes(stands: Sequence[Stand]) -> list[str]:
-    unknown = sum(bool(np.isnan(stand.eye_m[0])) for stand in stands)
+def _about_eyes(positions: Sequence[Stand]) -> list[str]:
+    unknown = sum(bool(np.isnan(stand.eye_m[0])) for stand in positions)
     if not unknown:
         return []
-    who = "it" if len(stands) == 1 else "them" if unknown == len(stands) else f"{unknown} of them"
-    free = "no cell is free" if unknown == len(stands) else "these free no cell"
-    return [f"nobody knows where the scanner stood that saw {who}, so {free}: name --angles, or --poses"]
+    subject = "the cloud" if len(positions) == 1 else f"{unknown} of {len(positions)} clouds"
+    free = "no cell is free" if unknown == len(positions) else "these free no cell"
+    return [f"unknown scanner position of {subject}, so {free}: pass the angle set (`angles`) or `poses`"]

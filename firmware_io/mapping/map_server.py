@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 _SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}
@@ -16,7 +16,7 @@ _SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}
 _THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
 
 
-def image_beside(path: Path) -> Path:
+def image_path(path: Path) -> Path:
     """Where the PGM of a map stands."""
     return path.with_suffix(".pgm")
 
@@ -30,7 +30,7 @@ def check_map_place(path: Path) -> None:
     check_place(path, RecordingError)
     if path.suffix not in (".yaml", ".yml"):
         raise RecordingError(f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm beside it")
-    check_place(image_beside(path), RecordingError)
+    check_place(image_path(path), RecordingError)
 
 
 def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
@@ -43,12 +43,12 @@ def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
         RecordingError: it cannot be written there.
     """
     check_map_place(path)
-    image = image_beside(path)
+    image = image_path(path)
     rows, columns = grid.cells.shape
     shades = np.zeros(256, np.uint8)
     for value, shade in _SHADES.items():
         shades[value] = shade  # -1 is the last one
-    with whole_file(image, RecordingError) as part:
+    with atomic_write(image, RecordingError) as part:
         part.write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + shades[grid.cells[::-1]].tobytes())
     x, y = (round(float(value), 6) for value in grid.origin_m)
     lines = [
@@ -59,6 +59,6 @@ def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
         "negate: 0",
         *(f"{name}: {value}" for name, value in _THRESHOLDS.items()),
     ]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path, image

@@ -40,10 +40,10 @@ class Heights:
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.floor_m):
-            raise RecordingError(f"--floor-m = {self.floor_m}: a height in m")
+            raise RecordingError(f"floor_m = {self.floor_m}: must be finite")
         if not 0 < self.from_m < self.to_m <= _HIGHEST_M:
             raise RecordingError(
-                f"--from-m = {self.from_m}, --to-m = {self.to_m}: 0 < the one < the other <= {_HIGHEST_M:g}"
+                f"from_m = {self.from_m}, to_m = {self.to_m}: allowed 0 < from_m < to_m <= {_HIGHEST_M:g}"
             )
 
 
@@ -77,7 +77,7 @@ def check_resolution(resolution_m: float) -> None:
         RecordingError: so small or so large.
     """
     if not _FINEST_M <= resolution_m <= _COARSEST_M:
-        raise RecordingError(f"--resolution-m = {resolution_m}: {_FINEST_M:g} to {_COARSEST_M:g}")
+        raise RecordingError(f"resolution_m = {resolution_m}: allowed {_FINEST_M:g} to {_COARSEST_M:g}")
 
 
 def occupancy_grid(
@@ -110,31 +110,31 @@ def occupancy_grid(
     hits_m = points_m[(points_m[:, 2] >= low_m) & (points_m[:, 2] <= high_m), :2]
     # half the lower height at most: what looks straight down has its last piece below it left
     short_m = min(resolution_m, heights.from_m / 2)
-    ways_m = _ways_within(points_m, eyes_m, heights.floor_m - heights.from_m, low_m, short_m)
-    ends_m = np.concatenate([hits_m, ways_m[:, :2], ways_m[:, 2:]])
+    paths_m = _paths_within(points_m, eyes_m, heights.floor_m - heights.from_m, low_m, short_m)
+    ends_m = np.concatenate([hits_m, paths_m[:, :2], paths_m[:, 2:]])
     if not ends_m.size:
         raise RecordingError(
             f"no point and no beam between {heights.from_m:g} and {heights.to_m:g} m above the floor at "
-            f"z = {heights.floor_m:z.2f} m: set --floor-m, --from-m or --to-m"
+            f"z = {heights.floor_m:z.2f} m: set floor_m, from_m or to_m"
         )
     first = np.floor(ends_m.min(axis=0) / resolution_m) - 1
     columns, rows = (np.floor(ends_m.max(axis=0) / resolution_m) - first + 2).astype(np.int64)
     if columns * rows > _MOST_CELLS:
         raise RecordingError(
-            f"--resolution-m = {resolution_m:g}: {columns:,} x {rows:,} cells, at most {_MOST_CELLS:,} in all: take "
-            "larger ones, or leave strays out (`scanwright assemble --max-range-m`)"
+            f"resolution_m = {resolution_m:g}: {columns:,} x {rows:,} cells, maximum {_MOST_CELLS:,} in all: choose "
+            "larger cells, or assemble the cloud with a shorter max_range_m"
         )
     cells = np.full((rows, columns), UNKNOWN, np.int8)
-    _free(cells, ways_m / resolution_m - np.tile(first, 2))
+    _free(cells, paths_m / resolution_m - np.tile(first, 2))
     column, row = np.floor(hits_m / resolution_m - first).astype(np.int64).T
     cells[row, column] = OCCUPIED
     return OccupancyGrid(cells, resolution_m, first * resolution_m)
 
 
 @njit(cache=True)
-def _ways_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, short_m: float) -> Floats:
+def _paths_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, short_m: float) -> Floats:
     """Of each beam what lies between two heights and ends `short_m` before its point: (m, 4), x y from and x y to."""
-    ways = np.empty((points_m.shape[0], 4))
+    paths = np.empty((points_m.shape[0], 4))
     count = 0
     for i in range(points_m.shape[0]):
         x, y, z = eyes_m[i, 0], eyes_m[i, 1], eyes_m[i, 2]
@@ -150,22 +150,22 @@ def _ways_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, 
             a, b = (low_m - z) / dz, (high_m - z) / dz
             begin, end = max(begin, min(a, b)), min(end, max(a, b))
         if begin < end:
-            ways[count, 0], ways[count, 1] = x + begin * dx, y + begin * dy
-            ways[count, 2], ways[count, 3] = x + end * dx, y + end * dy
+            paths[count, 0], paths[count, 1] = x + begin * dx, y + begin * dy
+            paths[count, 2], paths[count, 3] = x + end * dx, y + end * dy
             count += 1
-    return ways[:count]
+    return paths[:count]
 
 
 @njit(cache=True)
-def _free(cells: NDArray[np.int8], ways: Floats) -> None:
+def _free(cells: NDArray[np.int8], paths: Floats) -> None:
     """Free every cell that a way crosses; ways of shape (m, 4) in cells, x y from and x y to."""
-    for i in range(ways.shape[0]):
-        x, y = int(np.floor(ways[i, 0])), int(np.floor(ways[i, 1]))
-        dx, dy = ways[i, 2] - ways[i, 0], ways[i, 3] - ways[i, 1]
+    for i in range(paths.shape[0]):
+        x, y = int(np.floor(paths[i, 0])), int(np.floor(paths[i, 1]))
+        dx, dy = paths[i, 2] - paths[i, 0], paths[i, 3] - paths[i, 1]
         step_x, step_y = (1 if dx > 0 else -1), (1 if dy > 0 else -1)
         per_x, per_y = (1 / abs(dx) if dx else np.inf), (1 / abs(dy) if dy else np.inf)
-        next_x = (x + (dx > 0) - ways[i, 0]) / dx if dx else np.inf
-        next_y = (y + (dy > 0) - ways[i, 1]) / dy if dy else np.inf
+        next_x = (x + (dx > 0) - paths[i, 0]) / dx if dx else np.inf
+        next_y = (y + (dy > 0) - paths[i, 1]) / dy if dy else np.inf
         cells[y, x] = 0
         while min(next_x, next_y) < 1.0:
             if next_x < next_y:

@@ -38,7 +38,7 @@ class Stand:
     eye_m: Vector
 
 
-def seen_through(stands: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool[ndarray, " n"]]:
+def seen_through(positions: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool[ndarray, " n"]]:
     """Points of each stand where another one looked through, shape (n,) each.
 
     A point is condemned where the ten beams of another stand that pass next to it all ended more than `beyond_m`
@@ -47,28 +47,28 @@ def seen_through(stands: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool[nd
     nothing. What stays within `beyond_m` of what stands still, such as the soles of a foot, stays.
 
     Args:
-        stands: at least two with a known eye, of one frame; others are left as they are.
+        positions: at least two with a known eye, of one frame; others are left as they are.
         beyond_m: more than three times the noise, and than what the poses are off by.
 
     Raises:
         RecordingError: `beyond_m` is none, or fewer than two stands have an eye.
     """
     if not 0 < beyond_m < np.inf:
-        raise RecordingError(f"--seen-through-m = {beyond_m}: a number above 0; 0.1 is usual")
-    known = [k for k, stand in enumerate(stands) if np.isfinite(stand.eye_m).all()]
+        raise RecordingError(f"seen_through_m = {beyond_m}: must be above 0 and finite; 0.1 is usual")
+    known = [k for k, stand in enumerate(positions) if np.isfinite(stand.eye_m).all()]
     if len(known) < 2:
         raise RecordingError(
-            f"--seen-through-m: {len(known)} clouds whose scanner's place is known, 2 at least: one tells what another "
-            "looked through (`scanwright assemble --per turn`, and --angles or --poses here)"
+            f"seen_through_m: {len(known)} clouds with a known scanner position, minimum 2: assemble one cloud per "
+            "turn, and pass the angle set (`angles`) or `poses`"
         )
-    gone = [np.zeros(len(stand.points_m), bool) for stand in stands]
+    moved = [np.zeros(len(stand.points_m), bool) for stand in positions]
     for k in known:
-        looked = _Looked(stands[k])
+        looked = _Looked(positions[k])
         for other in known:
             if other != k:
-                left = np.flatnonzero(~gone[other])
-                gone[other][left] = looked.through(stands[other].points_m[left], beyond_m)
-    return [_as_neighbours(stand.points_m, one) for stand, one in zip(stands, gone, strict=True)]
+                left = np.flatnonzero(~moved[other])
+                moved[other][left] = looked.through(positions[other].points_m[left], beyond_m)
+    return [_as_neighbours(stand.points_m, one) for stand, one in zip(positions, moved, strict=True)]
 
 
 class _Looked:
@@ -83,15 +83,15 @@ class _Looked:
 
     def through(self, points_m: Float64[ndarray, "n 3"], beyond_m: float) -> Bool[ndarray, " n"]:
         """Points that it looked through by more than `beyond_m`."""
-        found = np.zeros(len(points_m), bool)
+        marked = np.zeros(len(points_m), bool)
         if not np.isfinite(self._reach):
-            return found
+            return marked
         along, range_m = self._directions(points_m)
         for here, off, beam in _nearest(self._tree, along, _BEAMS, self._reach):
             there = np.isfinite(off).all(axis=1)
             ends_m = np.append(self._range_m, -np.inf)[beam].min(axis=1)
-            found[here] = there & (ends_m > range_m[here] + beyond_m)
-        return found
+            marked[here] = there & (ends_m > range_m[here] + beyond_m)
+        return marked
 
     def _directions(self, points_m: Float64[ndarray, "n 3"]) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, " n"]]:
         """Unit vectors from the eye, and ranges; a point at the eye has no direction, and is near none."""
@@ -100,15 +100,15 @@ class _Looked:
         return along / np.where(range_m > 0, range_m, 1.0)[:, None], range_m
 
 
-def _as_neighbours(points_m: Float64[ndarray, "n 3"], gone: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
+def _as_neighbours(points_m: Float64[ndarray, "n 3"], moved: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:
     """What more than half of the neighbours of each point are, itself among them."""
-    if not gone.any():
-        return gone
-    found = np.zeros_like(gone)
-    padded = np.append(gone, False)
+    if not moved.any():
+        return moved
+    marked = np.zeros_like(moved)
+    padded = np.append(moved, False)
     for here, off, index in _nearest(cKDTree(points_m), points_m, _NEIGHBOURS + 1, _NEAR_M):
-        found[here] = 2 * padded[index].sum(axis=1) > np.isfinite(off).sum(axis=1)
-    return found
+        marked[here] = 2 * padded[index].sum(axis=1) > np.isfinite(off).sum(axis=1)
+    return marked
 
 
 def _nearest(

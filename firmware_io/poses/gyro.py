@@ -67,16 +67,18 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
             otherwise than they do: other axes, another unit, another clock.
     """
     rate_rad_s = gyro.rate_rad_s @ R_platform_imu.T
-    told = _told(poses.time_ns, gyro.time_ns)
-    if not told.any():
+    informative = _informative(poses.time_ns, gyro.time_ns)
+    if not informative.any():
         raise RecordingError(
             f"gyro {_span(gyro.time_ns)}, poses {_span(poses.time_ns)}: no two neighbouring poses with gyro between"
         )
     known = (gyro.time_ns >= poses.time_ns[0]) & (gyro.time_ns <= poses.time_ns[-1])
     interval = np.searchsorted(poses.time_ns, gyro.time_ns, side="right") - 1
-    known &= told[interval.clip(0, told.size - 1)]
-    if np.sum(known) < 2 * np.sum(told):
-        raise RecordingError(f"gyro: {np.sum(known)} rates between {np.sum(told) + 1} poses: no denser than the poses")
+    known &= informative[interval.clip(0, informative.size - 1)]
+    if np.sum(known) < 2 * np.sum(informative):
+        raise RecordingError(
+            f"gyro: {np.sum(known)} rates between {np.sum(informative) + 1} poses: no denser than the poses"
+        )
     time_ns = np.union1d(poses.time_ns, gyro.time_ns[known])
     at = np.searchsorted(time_ns, poses.time_ns)
     turned = _integrated(time_ns, _at(time_ns, gyro.time_ns, rate_rad_s))
@@ -84,24 +86,27 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
     between = turned[at[:-1]].inv() * turned[at[1:]]
     step = pose[:-1].inv() * pose[1:]
     miss = (between.inv() * step).as_rotvec()
-    said = _fits(between.as_rotvec()[told], step.as_rotvec()[told], np.diff(poses.time_ns)[told] / 1e9)
-    behind = (np.searchsorted(at, np.arange(time_ns.size), side="right") - 1).clip(0, told.size - 1)
+    fits = _fits(
+        between.as_rotvec()[informative], step.as_rotvec()[informative], np.diff(poses.time_ns)[informative] / 1e9
+    )
+    behind = (np.searchsorted(at, np.arange(time_ns.size), side="right") - 1).clip(0, informative.size - 1)
     part = (time_ns - poses.time_ns[behind]) / np.diff(poses.time_ns)[behind]
     since = turned[at[behind]].inv() * turned
     quaternion = (pose[behind] * since * Rotation.from_rotvec(part[:, None] * miss[behind])).as_quat()
     quaternion[at] = poses.quaternion
     after_s, known_s = (time_ns - time_ns[0]) / 1e9, (poses.time_ns - time_ns[0]) / 1e9
     position_m = np.stack([np.interp(after_s, known_s, column) for column in poses.position_m.T], axis=1)
-    if not told.all():
-        said.append(
-            f"warning: {np.sum(~told)} of {told.size} ways from pose to pose have no gyro: one axis, as without"
+    if not informative.all():
+        fits.append(
+            f"warning: {np.sum(~informative)} of {informative.size} intervals between poses have no gyro rate: "
+            "interpolated about one axis"
         )
     if gyro.left_out:
-        said.append(f"left out {gyro.left_out} rates of the gyro: no numbers, or not later than the one before")
-    return Trajectory(time_ns, position_m, quaternion, poses.platform, measured=poses), said
+        fits.append(f"dropped {gyro.left_out} gyro rates: not finite, or not later than the one before")
+    return Trajectory(time_ns, position_m, quaternion, poses.platform, measured=poses), fits
 
 
-def _told(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
+def _informative(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
     """Whether the gyro says all the way from each pose to the next one."""
     gap_ns = np.diff(gyro_ns)
     long = np.append(0, np.cumsum(gap_ns > _LONG_GAP * np.median(gap_ns)))
@@ -113,8 +118,8 @@ def _told(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
 
 def _at(time_ns: Times, gyro_ns: Times, rate_rad_s: Floats) -> Floats:
     """Rates at each time, straight between samples, shape (n, 3)."""
-    asked_s, known_s = (time_ns - time_ns[0]) / 1e9, (gyro_ns - time_ns[0]) / 1e9
-    return np.stack([np.interp(asked_s, known_s, column) for column in rate_rad_s.T], axis=1)
+    query_s, known_s = (time_ns - time_ns[0]) / 1e9, (gyro_ns - time_ns[0]) / 1e9
+    return np.stack([np.interp(query_s, known_s, column) for column in rate_rad_s.T], axis=1)
 
 
 def _integrated(time_ns: Times, rate_rad_s: Floats) -> Rotation:

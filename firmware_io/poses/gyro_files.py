@@ -40,10 +40,10 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
     path = Path(spec)
     if path.is_file():
         return _sorted(spec, list(csv_rows(path, _COLUMNS)), "")
-    found = read_topics(recording)
-    if found.get(spec) != IMU:
-        known = {name for name, kind in found.items() if kind == IMU}
-        is_what = f"{found[spec]}, not {IMU}" if spec in found else f"neither a file nor a topic of {recording}"
+    topics = read_topics(recording)
+    if topics.get(spec) != IMU:
+        known = {name for name, kind in topics.items() if kind == IMU}
+        is_what = f"{topics[spec]}, not {IMU}" if spec in topics else f"neither a file nor a topic of {recording}"
         raise RecordingError(f"imu {spec}: {is_what}{suggest(spec, known) if known else ', which has no Imu'}")
     rows: list[tuple[int, tuple[float, ...]]] = []
     frames: set[str] = set()
@@ -75,17 +75,19 @@ def imu_mount(
     """
     if rpy_deg is not None:
         if not all(map(math.isfinite, rpy_deg)):
-            raise RecordingError(f"imu-rpy-deg {rpy_deg}: three numbers")
+            raise RecordingError(f"imu_rpy_deg = {rpy_deg}: must be three finite numbers")
         return Rotation.from_euler("xyz", rpy_deg, degrees=True).as_matrix()
     if gyro.frame and gyro.frame == platform:
         return np.eye(3)
-    ask = "say how it stands there by --imu-rpy-deg"
+    hint = "pass its orientation on the platform as imu_rpy_deg"
     if not gyro.frame or not platform:
-        who = "the IMU's frame" if platform else "the frame that the poses are of"
-        raise RecordingError(f"imu: {who} has no name, so nothing tells how the IMU stands on the platform: {ask}")
-    R = _way(_static(recording), platform, gyro.frame)
+        frame_name = "the IMU's frame" if platform else "the frame that the poses are of"
+        raise RecordingError(
+            f"imu: {frame_name} has no name, so the orientation of the IMU on the platform is unknown: {hint}"
+        )
+    R = _path(_static(recording), platform, gyro.frame)
     if R is None:
-        raise RecordingError(f"imu: no frames of {STATIC} join '{platform}' (the poses) and '{gyro.frame}': {ask}")
+        raise RecordingError(f"imu: no frames of {STATIC} join '{platform}' (the poses) and '{gyro.frame}': {hint}")
     return R.as_matrix()
 
 
@@ -102,9 +104,9 @@ def _sorted(what: str, rows: list[tuple[int, Any]], frame: str) -> Gyro:
 
 def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
     """Parent -> child -> `R_parent_child` of the frames that stand still, and the other way round."""
-    found: dict[str, dict[str, Rotation]] = {}
+    topics: dict[str, dict[str, Rotation]] = {}
     if read_topics(recording).get(STATIC) != ros_messages.TRANSFORMS:
-        return found
+        return topics
     for _, data in read_messages(recording, {STATIC}):
         what = f"{recording}: a message of {STATIC}"
         message = foreign(what, ros_messages.decode_message, data, ros_messages.TRANSFORMS)
@@ -112,12 +114,12 @@ def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
             q = one.transform.rotation
             parent, child = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
             R = foreign(f"{recording}: {STATIC}: {child}", Rotation.from_quat, [q.x, q.y, q.z, q.w])
-            found.setdefault(parent, {})[child] = R
-            found.setdefault(child, {})[parent] = R.inv()
-    return found
+            topics.setdefault(parent, {})[child] = R
+            topics.setdefault(child, {})[parent] = R.inv()
+    return topics
 
 
-def _way(frames: dict[str, dict[str, Rotation]], begin: str, end: str) -> Rotation | None:
+def _path(frames: dict[str, dict[str, Rotation]], begin: str, end: str) -> Rotation | None:
     """`R_begin_end` along the frames between; None where none lead there."""
     reached = {begin: Rotation.identity()}
     waiting = deque([begin])

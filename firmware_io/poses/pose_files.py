@@ -40,19 +40,19 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
         rows = list(csv_rows(path, _COLUMNS) if path.suffix == ".csv" else _tum(path))
         return _trajectory(spec, rows)
     topic, *frames = spec.split(":")
-    found = read_topics(recording)
-    if topic not in found:
-        known = {name for name, kind in found.items() if kind in _POSES}
+    topics = read_topics(recording)
+    if topic not in topics:
+        known = {name for name, kind in topics.items() if kind in _POSES}
         raise RecordingError(
             f"poses {spec}: neither a file nor a topic of {recording} with poses"
             f"{suggest(topic, known) if known else ', which has none'}"
         )
-    if found[topic] not in _POSES:
-        raise RecordingError(f"{recording}: {topic} is {found[topic]}; poses are {', '.join(sorted(_POSES))}")
+    if topics[topic] not in _POSES:
+        raise RecordingError(f"{recording}: {topic} is {topics[topic]}; poses are {', '.join(sorted(_POSES))}")
     if len(frames) not in (0, 2):
         raise RecordingError(f"poses {spec}: write TOPIC or TOPIC:PARENT:CHILD")
     seen: set[tuple[str, str]] = set()
-    by_time = dict(sorted(_topic(recording, topic, found[topic], tuple(frames), seen)))
+    by_time = dict(sorted(_topic(recording, topic, topics[topic], tuple(frames), seen)))
     platform = frames[1] if frames else next(iter(seen), ("", ""))[1]
     return _trajectory(f"{recording}: {topic}", list(by_time.items()), platform)
 

@@ -65,6 +65,8 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
         if when.adjusted() > _TIME_DIGITS or abs(when.scaleb(digits)) >= _EVER_NS:
             raise RecordingError(f"{path}:{number}: time {time[:40]}: a number of nanoseconds below 2^63")
         return int(when.scaleb(digits).to_integral_value()), [float(value) for value in values]
+    except RecordingError:
+        raise
     except (InvalidOperation, ValueError, OverflowError) as error:
         raise RecordingError(f"{path}:{number}: not a line of numbers: {time}, {', '.join(values)}") from error
 
@@ -79,9 +81,9 @@ def lines_of(path: Path) -> list[str]:
 
 
 def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
-    found = [column for column, heading in enumerate(names) if heading in known]
-    if len(found) != 1:
+    columns = [column for column, heading in enumerate(names) if heading in known]
+    if len(columns) != 1:
         raise RecordingError(
-            f"{path}: {len(found)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
+            f"{path}: {len(columns)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
         )
-    return found[0]
+    return columns[0]

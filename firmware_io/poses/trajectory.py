@@ -95,10 +95,10 @@ class Trajectory:
         # epoch nanoseconds do not fit a float64, differences do
         origin_ns = self.time_ns[0]
         known_s = (self.time_ns - origin_ns) / 1e9
-        asked_s = (np.where(inside, time_ns, origin_ns) - origin_ns) / 1e9
-        asked_s = asked_s.clip(0, known_s[-1])
-        R = Slerp(known_s, Rotation.from_quat(self.quaternion))(asked_s).as_matrix()
-        t = np.stack([np.interp(asked_s, known_s, column) for column in self.position_m.T], axis=1)
+        query_s = (np.where(inside, time_ns, origin_ns) - origin_ns) / 1e9
+        query_s = query_s.clip(0, known_s[-1])
+        R = Slerp(known_s, Rotation.from_quat(self.quaternion))(query_s).as_matrix()
+        t = np.stack([np.interp(query_s, known_s, column) for column in self.position_m.T], axis=1)
         T = frames.rigid(R, t)
         T[~inside] = np.nan
         return T

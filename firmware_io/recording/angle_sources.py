@@ -74,12 +74,12 @@ def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[
         return [((number,), stamp_ns)]
     if getattr(body, "__msgtype__", "") != TF:
         raise RecordingError(f"{bag}: {source}: {source.topic} holds no transforms; write TOPIC or TOPIC:FIELD")
-    found: list[tuple[tuple[float, ...], int]] = []
+    values: list[tuple[tuple[float, ...], int]] = []
     for one in body.transforms:
         if (one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")) == (source.parent, source.child):
             q = one.transform.rotation
-            found.append(((q.x, q.y, q.z, q.w), ros_messages.stamp_ns(one.header.stamp)))
-    return found
+            values.append(((q.x, q.y, q.z, q.w), ros_messages.stamp_ns(one.header.stamp)))
+    return values
 
 
 def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource) -> tuple[Floats, str]:
@@ -139,8 +139,8 @@ def read_table(text: str) -> tuple[Times, Floats]:
         except (IndexError, ValueError, OverflowError) as error:
             raise RecordingError(f"{path}:{number}: not a time and an angle: {', '.join(words)[:80]}") from error
         if not (abs(value) <= MOST_ANGLE and abs(time_ns[-1]) <= MOST_NS):
-            said = f"{', '.join(words)[:80]}: an angle of at most {MOST_ANGLE:g}, a time within 292 years of 1970"
-            raise RecordingError(f"{path}:{number}: {said}")
+            bounds = f"{', '.join(words)[:80]}: an angle of at most {MOST_ANGLE:g}, a time within 292 years of 1970"
+            raise RecordingError(f"{path}:{number}: {bounds}")
         values.append(value)
     if not values:
         raise RecordingError(f"{path}: no line with an angle")
@@ -177,7 +177,7 @@ def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: A
         yield f"angles jump by {np.median(wraps):.4g}, a whole turn in {other}: is the unit {other}?"
         return
     moved_rad, seconds = np.abs(np.diff(log.position_rad)), np.diff(log.time_ns) / 1e9
-    span_rad, back_rad = float(np.ptp(log.position_rad)), _way_back_rad(log.position_rad)
+    span_rad, back_rad = float(np.ptp(log.position_rad)), _return_rad(log.position_rad)
     fastest_rpm = float(np.median(moved_rad / seconds)) / (2 * math.pi) * 60 if seconds.size else 0.0
     if angle_unit == "rad" and fastest_rpm > FASTEST_RPM:
         yield f"the axis turns at {fastest_rpm:.0f} rpm, faster than any servo: is the unit deg?"
@@ -187,7 +187,7 @@ def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: A
         yield f"the axis moves over {math.degrees(span_rad):.2g} deg only: is the unit rad?"
 
 
-def _way_back_rad(position_rad: Floats) -> float:
+def _return_rad(position_rad: Floats) -> float:
     """How far the axis ever was behind where it had been, on the way that it goes on the whole; none if empty."""
     if not position_rad.size:
         return 0.0
@@ -196,16 +196,18 @@ def _way_back_rad(position_rad: Floats) -> float:
 
 
 def _nanoseconds(text: str, scale: int) -> int:
-    whole, _, part = text.partition(".")  # a float64 rounds the seconds of today to 256 ns
+    seconds, _, part = text.partition(".")  # a float64 rounds the seconds of today to 256 ns
     if scale == 1 or not part.isdigit():
         return round(float(text) * scale) if scale > 1 else int(text)
-    sign = -1 if whole.startswith("-") else 1
-    return int(whole or 0) * scale + sign * int(part[:9].ljust(9, "0"))
+    sign = -1 if seconds.startswith("-") else 1
+    return int(seconds or 0) * scale + sign * int(part[:9].ljust(9, "0"))
 
 
 def _column(path: Path, header: Sequence[str], known: Sequence[str], what: str) -> int:
-    found = [i for i, name in enumerate(header) if name in known]
-    if len(found) != 1:
+    values = [i for i, name in enumerate(header) if name in known]
+    if len(values) != 1:
         hint = suggest(known[0], header) if len(known) == 1 else ""
-        raise RecordingError(f"{path}: {len(found)} columns of {what}: the first line names {' or '.join(known)}{hint}")
-    return found[0]
+        raise RecordingError(
+            f"{path}: {len(values)} columns of {what}: the first line names {' or '.join(known)}{hint}"
+        )
+    return values[0]

@@ -42,11 +42,11 @@ class Stamps:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OneClock:
-    """Scan and angle times on one clock; `said` is "" where both are header stamps, else what a person must know."""
+    """Scan and angle times on one clock; `note` is "" where both are header stamps, else what a person must know."""
 
     scan_ns: Int64[ndarray, " scans"]
     angle_ns: Int64[ndarray, " angles"]
-    said: str
+    note: str
 
 
 def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
@@ -54,20 +54,20 @@ def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
     if scans.complete() and angles.complete() and _overlap(scans.stamp_ns, angles.stamp_ns):
         return OneClock(scans.stamp_ns, angles.stamp_ns, "")
     if scans.on_host_clock() and not angles.complete():
-        said = "angles carry no stamp: they take the time they were received, which is late by their transport"
-        return OneClock(scans.stamp_ns, angles.receive_ns, said)
+        note = "angles carry no stamp: they take the time they were received, which is late by their transport"
+        return OneClock(scans.stamp_ns, angles.receive_ns, note)
     if not angles.complete() or not scans.complete():
-        who = "angles" if scans.complete() else "scans" if angles.complete() else "scans and angles"
-        said = f"{who} carry no stamp"
+        missing = "angles" if scans.complete() else "scans" if angles.complete() else "scans and angles"
+        note = f"{missing} carry no stamp"
         if scans.complete():
-            said += f", and the scans' stamps are from another clock (they start at {scans.stamp_ns[0] / 1e9:.0f} s)"
+            note += f", and the scans' stamps are from another clock (they start at {scans.stamp_ns[0] / 1e9:.0f} s)"
     else:
-        said = (
+        note = (
             f"the stamps of scans (from {scans.stamp_ns[0] / 1e9:.0f} s) and angles (from "
             f"{angles.stamp_ns[0] / 1e9:.0f} s) have no time in common"
         )
-    said += ": both take the time they were received; a scan is received after its last beam, so expect a lag"
-    return OneClock(scans.receive_ns, angles.receive_ns, said)
+    note += ": both take the time they were received; a scan is received after its last beam, so expect a lag"
+    return OneClock(scans.receive_ns, angles.receive_ns, note)
 
 
 def unwrapped_log(time_ns: Int64[ndarray, " n"], angle_rad: Float64[ndarray, " n"]) -> JointLog:
@@ -76,7 +76,7 @@ def unwrapped_log(time_ns: Int64[ndarray, " n"], angle_rad: Float64[ndarray, " n
     return JointLog(one_per_time, np.unwrap(angle_rad[first]))
 
 
-def held_log(
+def log_at_rest(
     log: JointLog, begin_ns: Int64[ndarray, " scans"], arc_ns: Int64[ndarray, " scans"]
 ) -> tuple[JointLog, int]:
     """A log that stands still during each scan: two samples, at its first and at its last beam, with one angle.
@@ -97,8 +97,8 @@ def held_log(
     angle_rad = log.position_rad[np.searchsorted(log.time_ns, begin_ns, side="right") - 1]
     latest_ns = np.append(begin_ns[1:] - 1, end_ns[-1:])
     both_ns = np.stack([begin_ns, np.minimum(end_ns, latest_ns)], axis=1).ravel()
-    kept = np.append(True, np.diff(both_ns) > 0)  # a scan without time_increment begins and ends at once
-    return JointLog(both_ns[kept], np.repeat(angle_rad, 2)[kept]), int(np.sum(end_ns > latest_ns))
+    distinct = np.append(True, np.diff(both_ns) > 0)  # a scan without time_increment begins and ends at once
+    return JointLog(both_ns[distinct], np.repeat(angle_rad, 2)[distinct]), int(np.sum(end_ns > latest_ns))
 
 
 def times(values: Sequence[int]) -> Int64[ndarray, " n"]:

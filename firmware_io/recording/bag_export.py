@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.bags import Bag, Message, open_bag
 from scanwright.firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
@@ -62,7 +62,7 @@ def export_bag(recording: Path, out: Path) -> Exported:
             f"a folder ({out.stem})"
         )
     if out.suffix == ".bag":
-        with whole_file(out, RecordingError) as part:
+        with atomic_write(out, RecordingError) as part:
             return foreign(f"{out}: cannot write", _ros1, recording, part)
     if out.exists():
         raise RecordingError(f"{out}: exists; a ROS 2 bag is a new folder")

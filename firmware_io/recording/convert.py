@@ -28,5 +28,5 @@ def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]
     check_target(target)
     clouds, unread = read_clouds(source)
     wrote = write_clouds(target, clouds, organised=organised)
-    notes = [f"note: {line}" for line in (*unread, *wrote.said)]
+    notes = [f"note: {line}" for line in (*unread, *wrote.notes)]
     return [*notes, f"wrote {wrote.rows:,} rows to {', '.join(str(path) for path in wrote.paths)}"]

@@ -34,13 +34,13 @@ from scanwright.firmware_io.recording.bag_clocks import (
     OneClock,
     Stamps,
     gap_warnings,
-    held_log,
+    log_at_rest,
     one_clock,
     times,
     unwrapped_log,
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
-from scanwright.firmware_io.recording.metadata import held_by, note_in
+from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
     JOINT_TOPIC,
@@ -96,7 +96,7 @@ class _Survey:
     endless: int
     angle_stamps: Stamps
     angle: Floats
-    angle_said: str
+    angle_note: str
     left_out: Counter[str]
 
 
@@ -142,8 +142,8 @@ def import_bag(
     if angle_unit is None:
         raise RecordingError("angle unit: write deg or rad, as the bag has it")
     table = read_table(angle) if angle_source is None else None
-    if taken := {SCAN_TOPIC, JOINT_TOPIC, BEAMS_TOPIC}.intersection(also):
-        raise RecordingError(f"also {min(taken)}: the recording has a topic of its own under this name")
+    if reserved := {SCAN_TOPIC, JOINT_TOPIC, BEAMS_TOPIC}.intersection(also):
+        raise RecordingError(f"also {min(reserved)}: the recording has a topic of its own under this name")
     with open_bag(bag) as opened:
         opened.check({scan_source.topic, *([] if angle_source is None else [angle_source.topic]), *also})
         survey = _survey(opened, scan_source, angle_source, table)
@@ -155,20 +155,20 @@ def import_bag(
         log = unwrapped_log(clock.angle_ns, np.radians(survey.angle) if angle_unit == "deg" else survey.angle)
         doubled = clock.angle_ns.size - log.time_ns.size
         left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled})
-        warnings = [said for said in (clock.said, survey.angle_said) if said]
+        warnings = [note for note in (clock.note, survey.angle_note) if note]
         warnings += unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
         warnings += _scan_warnings(survey, clock)
-        if also and clock.said:
+        if also and clock.note:
             warnings.append(f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times")
         if not in_time.all():
             warnings.append(
                 f"{np.sum(~in_time)} scans begin before the first or after the last angle: no point of them"
             )
         if hold:
-            log, cut = held_log(log, clock.scan_ns, survey.arc_ns)
+            log, cut = log_at_rest(log, clock.scan_ns, survey.arc_ns)
             if cut:
                 warnings.append(f"{cut} scans end after the next one begins: their last beams take its angle")
-        still = hold or held_by(note_in(opened))
+        still = hold or rests_in_scans(note_in(opened))
         if not still:
             warnings += gap_warnings(log)
         note = {
@@ -220,15 +220,15 @@ def _survey(
                     angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, value))
                 else:
                     left_out["angle_not_a_number"] += 1
-    for source, found in ((scan_source, scans), (angle_source, angles)):
-        if not found:
+    for source, samples in ((scan_source, scans), (angle_source, angles)):
+        if not samples:
             why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "it has no such message"
             raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
     stamps, receives, arcs, widths, endless = zip(*scans, strict=True)
     angle_stamps, angle_receives, values = zip(*angles, strict=True)
-    numbers, said = np.array(values, dtype=float), ""
+    numbers, note = np.array(values, dtype=float), ""
     if isinstance(angle_source, FrameSource):
-        angle, said = turned_rad(numbers, angle_source)
+        angle, note = turned_rad(numbers, angle_source)
     else:
         angle = numbers[:, 0]
     return _Survey(
@@ -238,7 +238,7 @@ def _survey(
         endless=sum(endless),
         angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
         angle=angle,
-        angle_said=said,
+        angle_note=note,
         left_out=left_out,
     )
 

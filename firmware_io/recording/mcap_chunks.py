@@ -118,8 +118,8 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _summary(path: Path, stream: BinaryIO) -> Summary:
-    found = os.fstat(stream.fileno())
-    return _summary_of(path, found.st_size, found.st_mtime_ns)
+    status = os.fstat(stream.fileno())
+    return _summary_of(path, status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=1)  # of ten minutes it lists 2,400 chunks, and whoever opens a recording asks four times
@@ -151,7 +151,7 @@ def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: 
     stream.seek(index.chunk_start_offset + _RECORD.size)
     unpacked, size = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=summed)
     data = unpacked.read(size)
-    found = []
+    status = []
     at = 0
     while at < size:
         opcode, length = _RECORD.unpack_from(data, at)
@@ -160,13 +160,13 @@ def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: 
             channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
             if channel in wanted:
                 body = data[at + _MESSAGE_HEAD.size : at + length]
-                found.append((log_ns, index.chunk_start_offset, wanted[channel], body))
+                status.append((log_ns, index.chunk_start_offset, wanted[channel], body))
         at += length
-    return found
+    return status
 
 
 def _unchunked(stream: BinaryIO, topics: Collection[str]) -> list[_Timed]:
     """The messages of a file without chunks; such a file has no index, so all of it is held."""
     stream.seek(0)
-    found = NonSeekingReader(stream).iter_messages(topics=list(topics), log_time_order=True)
-    return [(message.log_time, 0, channel.topic, message.data) for _, channel, message in found]
+    status = NonSeekingReader(stream).iter_messages(topics=list(topics), log_time_order=True)
+    return [(message.log_time, 0, channel.topic, message.data) for _, channel, message in status]

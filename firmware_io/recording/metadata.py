@@ -21,7 +21,7 @@ NOTE_TOPIC: Final = "/scanwright/note"
 NOTE_TYPE: Final = "std_msgs/msg/String"
 
 
-def held_by(note: dict[str, str]) -> bool:
+def rests_in_scans(note: dict[str, str]) -> bool:
     """Whether the motor stood still during each scan."""
     return note.get("hold") == "true"
 
@@ -38,8 +38,8 @@ def note_in(bag: Bag) -> dict[str, str]:
         return {}
     what = f"{bag.path}: {NOTE_TOPIC}: not the note of a recording"
     for message in bag.messages({NOTE_TOPIC}):
-        found = foreign(what, json.loads, message.body.data)
-        if not isinstance(found, dict):
+        note = foreign(what, json.loads, message.body.data)
+        if not isinstance(note, dict):
             raise RecordingError(f"{what}: {message.body.data[:40]}")
-        return found
+        return note
     return {}

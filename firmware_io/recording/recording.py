@@ -28,13 +28,13 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError, suggest
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
 from scanwright.firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
-from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.recording.ros_messages import Beams
 from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
 
@@ -147,7 +147,7 @@ class RecordingWriter:
 
     def __enter__(self) -> MessageWriter:
         with ExitStack() as stack:
-            part = stack.enter_context(whole_file(self._path, RecordingError))
+            part = stack.enter_context(atomic_write(self._path, RecordingError))
             stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
             self._messages = MessageWriter(stream, self._path, self._note, {})
             stack.push(self._finish)
@@ -176,7 +176,7 @@ class Recording:
         beams: shape (scans,), number of beams in each scan.
         stamp_ns: shape (scans,), time of the first beam of each scan.
         has_intensity: whether any scan carries intensities.
-        held: whether the motor stood still during each scan (`scanwright import --hold`).
+        at_rest: whether the motor stood still during each scan (`scanwright import --hold`).
     """
 
     path: Path
@@ -184,7 +184,7 @@ class Recording:
     beams: Int64[ndarray, " scans"]
     stamp_ns: Int64[ndarray, " scans"]
     has_intensity: bool
-    held: bool
+    at_rest: bool
 
     @property
     def start_ns(self) -> int:
@@ -245,7 +245,7 @@ def open_recording(path: Path) -> Recording:
         beams=np.array(beams),
         stamp_ns=np.concatenate(stamps),
         has_intensity=has_intensity,
-        held=held_by(read_note(path, NOTE)),
+        at_rest=rests_in_scans(read_note(path, NOTE)),
     )
 
 
@@ -258,12 +258,12 @@ def _sorted_log(path: Path, time_ns: Times, position_rad: Floats) -> JointLog:
 
 
 def _check_topics(path: Path) -> None:
-    found = read_topics(path)
+    types = read_topics(path)
     for topic, message_type in _TYPES.items():
-        if topic not in found:
-            raise RecordingError(f"{path}: no topic {topic}{suggest(topic, found)} (`scanwright import` converts bags)")
-        if found[topic] != message_type:
-            raise RecordingError(f"{path}: {topic} is {found[topic]}, not {message_type}")
+        if topic not in types:
+            raise RecordingError(f"{path}: no topic {topic}{suggest(topic, types)} (`scanwright import` converts bags)")
+        if types[topic] != message_type:
+            raise RecordingError(f"{path}: {topic} is {types[topic]}, not {message_type}")
 
 
 def _decoded_scan(path: Path, data: bytes) -> Scan:

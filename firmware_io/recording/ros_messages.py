@@ -90,11 +90,11 @@ class ScanPlaces(NamedTuple):
         ranges = _floats(data, order, at + 28)
         intensities = _floats(data, order, ranges.stop)
         # of the seven the largest bearing says nothing new, and the time from scan to scan may wander
-        told = slice(1, 2), slice(12, at + 4), slice(at + 8, at + 16), slice(at + 20, ranges.start)
-        shared = (*told, slice(intensities.start - 4, intensities.start))
+        shared = slice(1, 2), slice(12, at + 4), slice(at + 8, at + 16), slice(at + 20, ranges.start)
+        lit = slice(intensities.start - 4, intensities.start)
         if intensities.stop - intensities.start != ranges.stop - ranges.start:
             intensities = slice(intensities.start, intensities.start)
-        return cls(order, slice(at, at + 28), ranges, intensities, shared)
+        return cls(order, slice(at, at + 28), ranges, intensities, (*shared, lit))
 
 
 def decode_scan(data: bytes) -> Scan:
@@ -196,19 +196,19 @@ def beams_in(message: Any) -> tuple[int, Beams]:
 def encode_transforms(poses: Iterable[tuple[str, str, Pose]], time_ns: int) -> bytes:
     """One `tf2_msgs/msg/TFMessage` in CDR of parent, child and `T_parent_child`, shape (4, 4)."""
     types = _store().types
-    told = []
+    shared = []
     for parent, child, T in poses:
         x, y, z, qx, qy, qz, qw = pose_numbers(T).tolist()
         transform = types["geometry_msgs/msg/Transform"](
             translation=types["geometry_msgs/msg/Vector3"](x=x, y=y, z=z),
             rotation=types["geometry_msgs/msg/Quaternion"](x=qx, y=qy, z=qz, w=qw),
         )
-        told.append(
+        shared.append(
             types["geometry_msgs/msg/TransformStamped"](
                 header=_header(time_ns, parent), child_frame_id=child, transform=transform
             )
         )
-    return bytes(_store().serialize_cdr(types[TRANSFORMS](transforms=told), TRANSFORMS))
+    return bytes(_store().serialize_cdr(types[TRANSFORMS](transforms=shared), TRANSFORMS))
 
 
 def encode_text(text: str) -> bytes:

@@ -57,19 +57,19 @@ def solve_graph(T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]) -> Gr
     Raises:
         ValueError: the edges do not connect all poses.
     """
-    kept, left_out = list(edges), []
+    edges_kept, left_out = list(edges), []
     while True:
-        if not connected(len(T_world), kept):
+        if not connected(len(T_world), edges_kept):
             raise ValueError("the edges do not connect all poses")
-        poses, covariance, chi2 = _least_squares(T_world, kept)
+        poses, covariance, chi2 = _least_squares(T_world, edges_kept)
         limit = _OUTLIER * max(1.0, float(np.median(chi2)) / _MEDIAN_CHI2)
         worst = int(np.argmax(chi2))
-        rest = kept[:worst] + kept[worst + 1 :]
+        rest = edges_kept[:worst] + edges_kept[worst + 1 :]
         if chi2[worst] <= limit or not connected(len(T_world), rest):
             break
-        left_out.append(kept[worst])
-        kept = rest
-    freedom = 6 * (len(kept) - len(T_world) + 1)
+        left_out.append(edges_kept[worst])
+        edges_kept = rest
+    freedom = 6 * (len(edges_kept) - len(T_world) + 1)
     scale = max(1.0, float(np.sqrt(chi2.sum() / freedom))) if freedom else 1.0
     return Graph(poses, scale**2 * covariance, tuple(left_out), scale)
 

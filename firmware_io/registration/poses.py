@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix, pose_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
@@ -25,7 +25,7 @@ def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_wor
     for number, (name, cloud, T) in enumerate(zip(names, clouds, T_world, strict=True)):
         time = str(number) if cloud.start_ns is None else f"{cloud.start_ns // 10**9}.{cloud.start_ns % 10**9:09d}"
         lines += [f"# {name}", f"{time} " + " ".join(f"{value:.9f}" for value in pose_numbers(T))]
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -38,7 +38,7 @@ def write_covariances(path: Path, names: Sequence[str], covariance: Float64[ndar
     lines = [",".join(["cloud", *(f"{_AXES[i]}_{_AXES[j]}" for i, j in upper)])]
     for name, matrix in zip(names, covariance, strict=True):
         lines.append(",".join([name, *(f"{matrix[i, j]:.6e}" for i, j in upper)]))
-    with whole_file(path, RecordingError) as part:
+    with atomic_write(path, RecordingError) as part:
         part.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -59,24 +59,24 @@ def read_poses(path: Path, names: Sequence[str]) -> list[Pose]:
         RecordingError: the file does not hold that, or its comments name other clouds.
     """
     text = foreign(f"{path}: cannot read", read_text, path)
-    lines, said = [], []
+    lines, notes = [], []
     above = ""
     for line in map(str.strip, text.splitlines()):
         if line and not line.startswith("#"):
             lines.append(line)
-            said.append(above)
+            notes.append(above)
         above = line[1:].strip() if line.startswith("#") and "qw" not in line.split() else ""
     if len(lines) != len(names):
         raise RecordingError(f"{path}: {len(lines)} poses for {len(names)} clouds; one line for each, in their order")
     rows = foreign(f"{path}: a line is time x y z qx qy qz qw", np.loadtxt, lines, ndmin=2)
     if rows.shape != (len(names), 8) or not np.isfinite(rows).all():
         raise RecordingError(f"{path}: a line is time x y z qx qy qz qw, all numbers")
-    if all(said):
-        if sorted(said) != sorted(names):
+    if all(notes):
+        if sorted(notes) != sorted(names):
             raise RecordingError(
-                f"{path}: its comments name {', '.join(said)}, the clouds are {', '.join(names)}: "
+                f"{path}: its comments name {', '.join(notes)}, the clouds are {', '.join(names)}: "
                 "leave the comments out where the order is the same"
             )
-        rows = rows[[said.index(name) for name in names]]
+        rows = rows[[notes.index(name) for name in names]]
     with of_file(path):
         return [pose_matrix(row[1:]) for row in rows]

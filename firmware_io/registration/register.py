@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -11,11 +12,13 @@ from jaxtyping import Float64
 from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Pose
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.registration.graph import Edge, Graph, solve_graph
 from scanwright.firmware_io.registration.pairwise import Pair, align, near_share, refused
 from scanwright.firmware_io.registration.sensor_view import SensorView
 from scanwright.firmware_io.registration.start import find_start
 
+_LOG = logging.getLogger(__name__)
 _WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
 _ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach
 
@@ -42,16 +45,16 @@ class Registration:
         return bool(np.isfinite(self.T_world).all())
 
 
-def register(views: Sequence[SensorView], given: Sequence[Pose], say: Callable[[str], None]) -> Registration:
+def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Progress) -> Registration:
     """Find all poses.
 
     Args:
         views: the clouds; the frame of the first one becomes the world, unless its pose is given.
-        given: start poses in the world, one for each view, shape (4, 4) each; empty where nobody knows.
-        say: progress.
+        starts: start poses in the world, one for each view, shape (4, 4) each; empty where nobody knows.
+        progress: callback.
     """
     pairs: dict[tuple[int, int], Pair] = {}
-    poses = _chain(views, given, pairs, say)
+    poses = _chain(views, starts, pairs, progress)
     order = sorted(poses)
     sure = {pair for pair in pairs if not pairs[pair].why_not}
     scale = 1.0
@@ -60,7 +63,7 @@ def register(views: Sequence[SensorView], given: Sequence[Pose], say: Callable[[
     for _ in range(_ROUNDS):
         near = [pair for pair in combinations(order, 2) if pair not in sure and _in_reach(views, poses, *pair)]
         for i, j in near:
-            say(f"{views[i].name} and {views[j].name} overlap")
+            progress(f"aligning {views[i].name} and {views[j].name}")
             pairs[i, j] = align(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j])
         sure.update(near)
         if not near and np.isfinite(covariance[order]).all():
@@ -74,41 +77,42 @@ def register(views: Sequence[SensorView], given: Sequence[Pose], say: Callable[[
 
 def _chain(
     views: Sequence[SensorView],
-    given: Sequence[Floats],
+    starts: Sequence[Floats],
     pairs: dict[tuple[int, int], Pair],
-    say: Callable[[str], None],
+    progress: Progress,
 ) -> dict[int, Floats]:
     """A first pose for every cloud that can be joined to one that has a pose; neighbours in the row are tried first."""
-    poses = {0: given[0] if given else np.eye(4)}
-    while joined := _next_joined(views, given, poses, pairs, say):
+    poses = {0: starts[0] if starts else np.eye(4)}
+    while joined := _next_joined(views, starts, poses, pairs, progress):
         poses.update(joined)
     return poses
 
 
 def _next_joined(
     views: Sequence[SensorView],
-    given: Sequence[Floats],
+    starts: Sequence[Floats],
     poses: dict[int, Floats],
     pairs: dict[tuple[int, int], Pair],
-    say: Callable[[str], None],
+    progress: Progress,
 ) -> dict[int, Floats]:
     """One more cloud and its pose; nothing when no pair is left to try."""
     missing = [k for k in range(len(views)) if k not in poses]
     untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
     for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
         low, high = min(i, k), max(i, k)
-        pair = _pair(views[low], views[high], [given[low], given[high]] if given else [])
+        progress(f"aligning {views[low].name} and {views[high].name}")
+        pair = _pair(views[low], views[high], [starts[low], starts[high]] if starts else [])
         pairs[low, high] = pair
-        say(f"{pair.a} and {pair.b}: {'; '.join(pair.why_not) or f'{pair.overlap:.0%} overlap'}")
+        _LOG.info("%s and %s: %s", pair.a, pair.b, "; ".join(pair.why_not) or f"{pair.overlap:.0%} overlap")
         if not pair.why_not:
             return {k: poses[i] @ (pair.T_a_b if i == low else np.linalg.inv(pair.T_a_b))}
     return {}
 
 
-def _pair(a: SensorView, b: SensorView, given: Sequence[Floats]) -> Pair:
+def _pair(a: SensorView, b: SensorView, starts: Sequence[Floats]) -> Pair:
     """From the given poses if they lead anywhere, else from none."""
-    if given:
-        pair = align(a, b, np.linalg.inv(given[0]) @ given[1])
+    if starts:
+        pair = align(a, b, np.linalg.inv(starts[0]) @ starts[1])
         if not pair.why_not:
             return pair
     return find_start(a, b)

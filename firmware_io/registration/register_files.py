@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from scanwright.firmware_io.registration.merge import merge
 from scanwright.firmware_io.registration.overlap_picture import overlap_picture
@@ -26,40 +27,40 @@ class RegisteredFiles:
 
     Attributes:
         names: of the clouds.
-        found: their poses and pairs.
+        registration: their poses and pairs.
         points: of the map; 0 where there is none, as a cloud found no place.
         wrote: all files.
-        said: what the files could not hold, or what was not read.
+        notes: what the files could not hold, or what was not read.
     """
 
     names: tuple[str, ...]
-    found: Registration
+    registration: Registration
     points: int
     wrote: tuple[Path, ...]
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
 
     @property
     def complete(self) -> bool:
         """Whether every cloud found its place; else nothing was written."""
-        return self.found.complete
+        return self.registration.complete
 
     @property
     def refused(self) -> list[Pair]:
         """The pairs that were not believed."""
-        return [pair for pair in self.found.pairs if pair.why_not]
+        return [pair for pair in self.registration.pairs if pair.why_not]
 
     def lines(self) -> list[str]:
         """The same in words."""
-        lines = [f"note: {line}" for line in self.said]
-        for pair in self.found.pairs:
+        lines = [f"note: {line}" for line in self.notes]
+        for pair in self.registration.pairs:
             if not pair.why_not:
                 lines.append(f"{pair.a} - {pair.b}: {pair.overlap:.0%} overlap, {pair.contradiction:.1%} contradicted")
         lines += [f"{pair.a} - {pair.b}: not used: {'; '.join(pair.why_not)}" for pair in self.refused]
-        stands = list(zip(self.names, self.found.T_world, self.found.covariance, strict=True))
-        if not self.found.complete:
-            lost = [name for name, T, _ in stands if np.isnan(T[0, 0])]
+        positions = list(zip(self.names, self.registration.T_world, self.registration.covariance, strict=True))
+        if not self.registration.complete:
+            lost = [name for name, T, _ in positions if np.isnan(T[0, 0])]
             return [*lines, f"no place was found for {', '.join(lost)}: nothing is written"]
-        for name, T, covariance in stands:
+        for name, T, covariance in positions:
             x, y, z = T[:3, 3]
             sigma_mm = 1e3 * np.sqrt(covariance[3:, 3:].trace())
             sigma_deg = np.degrees(np.sqrt(covariance[:3, :3].trace()))
@@ -76,7 +77,7 @@ def register_files(
     spacing_m: float,
     map_spacing_m: float,
     scanner: AngleSet | None,
-    say: Callable[[str], None],
+    progress: Progress = no_progress,
 ) -> RegisteredFiles:
     """Register clouds, write map, poses, covariances and picture; nothing at all unless every cloud found its place.
 
@@ -90,55 +91,53 @@ def register_files(
         map_spacing_m: edge of the voxels of the map.
         scanner: angle set that all clouds were assembled with: what its covariance means for the poses is part of
             theirs. None takes the calibration to be right.
-        say: progress.
+        progress: callback.
 
     Raises:
         RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
             covariance.
     """
-    for name, value in (("spacing", spacing_m), ("map spacing", map_spacing_m)):
+    for name, value in (("spacing_m", spacing_m), ("map_spacing_m", map_spacing_m)):
         if not (np.isfinite(value) and value > 0):
-            raise RecordingError(f"{name} {value} m: must be above 0")
+            raise RecordingError(f"{name} = {value}: must be above 0")
     check_target(out)
     check_place(poses, RecordingError)
-    counts, clouds, said = [], [], []
+    counts, clouds, notes = [], [], []
     for k, path in enumerate(paths):
         if path.resolve() in [other.resolve() for other in paths[:k]]:
-            raise RecordingError(f"{path}: named twice; a cloud tells nothing of its own place")
+            raise RecordingError(f"{path}: given twice; register needs different clouds")
         read, lines = read_clouds(path)
         counts.append(len(read))
         clouds += read
-        said += lines
+        notes += lines
     names = cloud_names(list(zip(paths, counts, strict=True)))
     if len(clouds) < 2:
-        raise RecordingError(f"{len(clouds)} cloud: registering takes two at least")
+        raise RecordingError(f"{len(clouds)} cloud: register needs at least two")
     if scanner is None and all("joint_rad" in cloud.columns for cloud in clouds):
-        said.append("the sigmas take the scanner's angles as true: --angles adds what its calibration left open")
+        notes.append("sigmas assume exact scanner angles: pass the angle set (`angles`) to add its uncertainty")
     for k, cloud in enumerate(clouds):
         for i in range(k):
             if np.array_equal(cloud.points_m, clouds[i].points_m, equal_nan=True):
-                raise RecordingError(
-                    f"{names[k]}: the very points of {names[i]}; a cloud tells nothing of its own place"
-                )
+                raise RecordingError(f"{names[k]}: same points as {names[i]}; register needs different clouds")
     if start is not None:
-        given = read_poses(start, names)
+        starts = read_poses(start, names)
     else:
-        given = [cloud.T_world_cloud for cloud in clouds] if any(cloud.placed for cloud in clouds) else []
+        starts = [cloud.T_world_cloud for cloud in clouds] if any(cloud.placed for cloud in clouds) else []
     views = []
-    for name, cloud in zip(names, clouds, strict=True):
-        say(f"{name}: {len(cloud.points_m):,} points")
+    for k, (name, cloud) in enumerate(zip(names, clouds, strict=True)):
+        progress(f"preparing {name}", k / len(clouds))
         joint = cloud.columns.get("joint_rad") if scanner else None
         joint_rad = None if joint is None else joint.astype(float)
         views.append(make_view(name, cloud.points_m.astype(float), spacing_m, scanner, joint_rad))
-    found = register(views, given, say)
-    if not found.complete:
-        return RegisteredFiles(tuple(names), found, 0, (), tuple(said))
-    say("merging")
-    merged = merge(clouds, found.T_world, map_spacing_m)
+    registration = register(views, starts, progress)
+    if not registration.complete:
+        return RegisteredFiles(tuple(names), registration, 0, (), tuple(notes))
+    progress("merging the clouds")
+    merged = merge(clouds, registration.T_world, map_spacing_m)
     wrote = write_clouds(out, [merged])
     covariances, png = poses.with_suffix(".cov.csv"), out.with_suffix(".png")
-    write_poses(poses, names, clouds, found.T_world)
-    write_covariances(covariances, names, found.covariance)
-    overlap_picture(png, views, found)
+    write_poses(poses, names, clouds, registration.T_world)
+    write_covariances(covariances, names, registration.covariance)
+    overlap_picture(png, views, registration)
     files = (*wrote.paths, poses, covariances, png)
-    return RegisteredFiles(tuple(names), found, wrote.rows, files, (*said, *wrote.said))
+    return RegisteredFiles(tuple(names), registration, wrote.rows, files, (*notes, *wrote.notes))

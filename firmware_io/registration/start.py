@@ -81,17 +81,17 @@ def starts(a: SensorView, b: SensorView, count: int) -> list[Start]:
         match = scipy.fft.ifft2(spectrum * scipy.fft.fft2(moving).conj()).real
         best = np.argpartition(match.ravel(), -_PEAKS)[-_PEAKS:]
         peaks += [(float(match.flat[k]) / norm, float(heading), *divmod(int(k), size)) for k in best]
-    found: list[Start] = []
+    starts: list[Start] = []
     for score, heading, row, column in sorted(peaks, reverse=True):
         shift_m = cell_m * (np.array([row, column]) - size * (np.array([row, column]) > size // 2))
         T = frames.rigid(frames.Rz(heading), [*shift_m, 0.0])
-        if all(_distinct(T, other.T_a_b) for other in found):
-            found.append(Start(T, score))
-        if len(found) == count:
+        if all(_distinct(T, other.T_a_b) for other in starts):
+            starts.append(Start(T, score))
+        if len(starts) == count:
             break
     lift = frames.rigid(np.eye(3), [0.0, 0.0, _height_m(*plans)])
     down = np.linalg.inv(plans[0].T_level_view)
-    return [Start(down @ lift @ start.T_a_b @ plans[1].T_level_view, start.score) for start in found]
+    return [Start(down @ lift @ start.T_a_b @ plans[1].T_level_view, start.score) for start in starts]
 
 
 def find_start(a: SensorView, b: SensorView) -> Pair:
@@ -105,7 +105,7 @@ def find_start(a: SensorView, b: SensorView) -> Pair:
         T = align_coarsely(a, b, guess.T_a_b)
         if all(_distinct(T, other) for _, other in settled):
             settled.append((coarse_merit(a, b, T), T))
-    settled.sort(key=lambda found: found[0], reverse=True)
+    settled.sort(key=lambda starts: starts[0], reverse=True)
     likely = [T for merit, T in settled if merit >= _WORTH * settled[0][0]][:_TRIED]
     best, *rivals = sorted((align(a, b, T) for T in likely), key=lambda pair: pair.merit, reverse=True)
     for rival in rivals:

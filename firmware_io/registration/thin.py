@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float64, Int64
-from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
 
 from scanwright.design.arrays import Floats
+from scanwright.firmware_io.clouds.voxels import voxel_of, voxel_sums
 from scanwright.firmware_io.registration.cube_map import cells_of, solid_angles_sr
 
 _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds
@@ -69,56 +69,16 @@ def beam_step_rad(points_m: Float64[ndarray, "n 3"]) -> float:
 def voxel_means(
     points_m: Floats, values: Floats, spacing_m: float, level: NDArray[np.uint8]
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Mean of `values`, shape (n, k), in each occupied voxel, shape (m, k), and how many points each holds, shape (m,).
+    """Return the mean of `values`, shape (n, k), in each occupied voxel, shape (m, k), and its points, shape (m,).
 
     Voxels have the edge `spacing_m * 2**level`, and come in the order in which their first points do.
     """
-    means, counts = _accumulate(points_m, values, spacing_m, level)
-    return means / counts[:, None], counts
+    return joined_means(points_m, values, np.ones(len(points_m), np.int64), spacing_m, level)
 
 
 def joined_means(
     points_m: Floats, values: Floats, counts: NDArray[np.int64], spacing_m: float, level: NDArray[np.uint8]
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """`voxel_means` of what are means already, of `counts` points each."""
-    weighted = np.column_stack([values * counts[:, None], counts])
-    sums, _ = _accumulate(points_m, weighted, spacing_m, level)
+    """Return `voxel_means` of values that are means themselves, of `counts` points each."""
+    sums = voxel_sums(voxel_of(points_m, spacing_m, level), np.column_stack([values * counts[:, None], counts]))
     return sums[:, :-1] / sums[:, -1:], sums[:, -1].astype(np.int64)
-
-
-@njit(cache=True)
-def _accumulate(
-    points_m: Floats, values: Floats, spacing_m: float, level: NDArray[np.uint8]
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Sums and counts by an open hash table: one pass, whatever the extent of the cloud."""
-    n, k = values.shape
-    size = 1
-    while size < 2 * n:
-        size *= 2
-    slot = np.full(size, -1, np.int64)
-    key = np.empty((n, 4), np.int64)
-    sums = np.zeros((n, k))
-    counts = np.zeros(n, np.int64)
-    used = 0
-    for i in range(n):
-        edge = spacing_m * 2.0 ** level[i]
-        a = np.int64(np.floor(points_m[i, 0] / edge))
-        b = np.int64(np.floor(points_m[i, 1] / edge))
-        c = np.int64(np.floor(points_m[i, 2] / edge))
-        # Teschner et al., "Optimized spatial hashing for collision detection of deformable objects" (2003)
-        h = ((a * 73856093) ^ (b * 19349663) ^ (c * 83492791) ^ np.int64(level[i]) * 2654435761) & (size - 1)
-        while True:
-            j = slot[h]
-            if j < 0:
-                j = used
-                slot[h] = j
-                key[j, 0], key[j, 1], key[j, 2], key[j, 3] = a, b, c, level[i]
-                used += 1
-                break
-            if key[j, 0] == a and key[j, 1] == b and key[j, 2] == c and key[j, 3] == level[i]:
-                break
-            h = (h + 1) & (size - 1)
-        counts[j] += 1
-        for d in range(k):
-            sums[j, d] += values[i, d]
-    return sums[:used], counts[:used]

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
 from dataclasses import replace
 from typing import Protocol
 
 from scanwright.design.errors import DeviceError
 from scanwright.design.motion import Motion, Spin
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.scan.acquire import acquire
-from scanwright.firmware_io.scan.live_feed import NOBODY, Both, Watch
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Both, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
 from scanwright.firmware_io.servo.fitness import ServoSetupError
 
+_log = logging.getLogger(__name__)
+
 AGAIN_S = 3.0
-_ASKED_S = 1.0
+_POLL_S = 1.0
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error
@@ -42,14 +45,14 @@ class Steered(Watch, Protocol):
         """Until something else is wanted, at most so long."""
 
 
-def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None], viewer: Watch = NOBODY) -> None:
+def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = UNWATCHED) -> None:
     """Scan until something else than a device ends it, such as Ctrl-C; the devices are stopped on every way out.
 
     Args:
         plan: endless.
         steered: is told of the scan, and says what shall happen.
-        say: is told what is going on.
-        viewer: is told of the scan too.
+        progress: gets each step.
+        viewer: gets the scan too.
 
     Raises:
         ServoSetupError: settings of the servo that outlast the power must change first.
@@ -57,19 +60,19 @@ def drive(plan: ScanPlan, steered: Steered, say: Callable[[str], None], viewer: 
     watch = Both(steered, viewer)
     while True:
         if not steered.running:
-            steered.wait(_ASKED_S)
+            steered.wait(_POLL_S)
             continue
         steered.begin()
         try:
-            acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), say, watch)
+            acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), progress, watch)
         except Interrupted:
-            say("stopped, as a parameter asks")
+            progress("stopped by a parameter")
         except ServoSetupError:  # trying again would not help: somebody must agree
             raise
         except DeviceError as error:
             line = f"{error}; trying again in {AGAIN_S:g} s"
             steered.failed(line)
-            say(line)
+            _log.error("%s", line)
             steered.wait(AGAIN_S)
 
 

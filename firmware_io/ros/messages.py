@@ -76,6 +76,6 @@ def diagnostics(level: int, message: str, values: Mapping[str, object], stamp_ns
 
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     status = DiagnosticStatus(level=bytes([level]), name="scanwright: scanner", message=message, values=pairs)
-    found = DiagnosticArray(status=[status])
-    found.header.stamp = time_of(stamp_ns)
-    return found
+    array = DiagnosticArray(status=[status])
+    array.header.stamp = time_of(stamp_ns)
+    return array

@@ -50,9 +50,9 @@ from scanwright.firmware_io.samples import JointSample, Scan
 PointsFrame = Literal["world", "rot"]
 _DIAGNOSED_S = 1.0
 _SILENT_S = 2.0  # without a scan the diagnostics call the scanner stale
-_FOUND_S = 1.0  # without a further subscription
+_SETTLED_S = 1.0  # without a further subscription
 _FLUSHED_S = 5.0
-_KEPT = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,7 +95,7 @@ class ScannerNode:
         self.node = rclpy.create_node("scanwright")
         self.running, self.period_s, self.scans = True, 0.0, 0
         self._changed = Event()
-        self._beams, self._said, self._failed = 0, "waiting for the devices", False
+        self._beams, self._status, self._failed = 0, "waiting for the devices", False
         self._scanned_s = self._diagnosed_s = time.monotonic()
         self.begin()
         make = self.node.create_publisher
@@ -106,7 +106,7 @@ class ScannerNode:
         self._tf = self._tf_publisher() if scanner.publish_tf and find_spec("tf2_msgs") else None
         self._diagnostics = self._diagnostics_publisher() if find_spec("diagnostic_msgs") else None
         if scanner.urdf is not None:
-            self._description = make(String, "robot_description", _KEPT)
+            self._description = make(String, "robot_description", _LATCHED)
             self._description.publish(String(data=scanner.urdf))
         self.node.declare_parameter("running", True)
         self.node.declare_parameter("period_s", 0.0)
@@ -139,14 +139,14 @@ class ScannerNode:
         self._scanned_s = time.monotonic()
         self._push(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """See `Watch`."""
         self._check()
-        self._said = line
+        self._status = line
 
     def failed(self, line: str) -> None:
         """The devices failed; the diagnostics say so until the next scan."""
-        self._said, self._failed = line, True
+        self._status, self._failed = line, True
         self.node.get_logger().error(line)
 
     def close(self) -> None:
@@ -157,11 +157,11 @@ class ScannerNode:
 
     def await_subscriber(self) -> None:
         """Wait until somebody listens, and has found all the topics: what is published before is lost to them."""
-        found, since_s = 0, time.monotonic()
-        while not found or time.monotonic() - since_s < _FOUND_S:
+        count, since_s = 0, time.monotonic()
+        while not count or time.monotonic() - since_s < _SETTLED_S:
             now = sum(publisher.get_subscription_count() for publisher in (self._scan, self._joint, self._points))
-            if now != found:
-                found, since_s = now, time.monotonic()
+            if now != count:
+                count, since_s = now, time.monotonic()
             time.sleep(0.02)
 
     def flush(self) -> None:
@@ -187,7 +187,7 @@ class ScannerNode:
         left_out = {f"left out: {reason}": count for reason, count in self._assembler.left_out.items()}
         values = {"scans": self.scans, "beams": self._beams, "running": self.running, **left_out}
         stamp_ns = time.time_ns()
-        self._diagnostics.publish(messages.diagnostics(level, self._said, values, stamp_ns))
+        self._diagnostics.publish(messages.diagnostics(level, self._status, values, stamp_ns))
 
     def _check(self) -> None:
         if self._changed.is_set():
@@ -228,11 +228,11 @@ class ScannerNode:
         """Publish the frames that stand still, and return what publishes the one that turns."""
         from tf2_msgs.msg import TFMessage
 
-        self._tf_static = self.node.create_publisher(TFMessage, "/tf_static", _KEPT)
+        self._tf_static = self.node.create_publisher(TFMessage, "/tf_static", _LATCHED)
         stamp_ns = time.time_ns()
         fixed = fixed_frames(self._scanner.angles)
-        told = [messages.transform(one.parent, one.child, one.T_parent_child, stamp_ns) for one in fixed]
-        self._tf_static.publish(TFMessage(transforms=told))
+        transforms = [messages.transform(one.parent, one.child, one.T_parent_child, stamp_ns) for one in fixed]
+        self._tf_static.publish(TFMessage(transforms=transforms))
         turning = self.node.create_publisher(TFMessage, "/tf", 100)
 
         def publish(stamp_ns: int, position_rad: float) -> None:

@@ -27,13 +27,13 @@ def replay(
         wait_until: waits until so many seconds after the start; None for the clock of this computer.
 
     Returns:
-        How many scans and how many angles were told.
+        Number of scans and number of angles published.
 
     Raises:
         RecordingError: the recording is unreadable, or the rate is none.
     """
     if not 0 < rate < math.inf:
-        raise RecordingError(f"--rate = {rate}: a number above 0")
+        raise RecordingError(f"rate = {rate}: must be above 0 and finite")
     wait = wait_until or _clock()
     waiting: deque[Scan] = deque()
     scans = angles = 0

@@ -20,7 +20,7 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array, Pose
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 
 URDF = "scanner.urdf"
@@ -125,7 +125,7 @@ def write_calibrated_urdf(designed: Path, out: Path, angles: AngleSet) -> None:
         if "://" not in name and not Path(name).is_absolute():
             mesh.set("filename", Path(os.path.relpath(designed.parent / name, out.parent)).as_posix())
     text = ElementTree.tostring(robot, encoding="unicode", xml_declaration=False)
-    with whole_file(out, RecordingError) as part:
+    with atomic_write(out, RecordingError) as part:
         part.write_text(f'<?xml version="1.0"?>\n{text}\n', encoding="utf-8")
 
 

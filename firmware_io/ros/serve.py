@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.design.angles import angles_in_use
 from scanwright.design.errors import RecordingError
-from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.design.progress import Progress
+from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.ros.drive import drive
 from scanwright.firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
-from scanwright.firmware_io.scan.live_feed import NOBODY, Watch
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +41,18 @@ class Publishing:
 
     def __post_init__(self) -> None:
         if self.per_turn and self.frame == "rot":
-            raise RecordingError("--points-in rot: a turn has no place in a frame that turns; say --points-per scan")
+            raise RecordingError(
+                "frame = rot, per_turn: a frame that rotates cannot hold the points of a turn; publish per scan"
+            )
 
 
 def serve_devices(
-    out: Path, plan: ScanPlan, ros_args: Sequence[str], say: Say, points: Publishing, viewer: Watch = NOBODY
+    out: Path,
+    plan: ScanPlan,
+    ros_args: Sequence[str],
+    progress: Progress,
+    points: Publishing,
+    viewer: Watch = UNWATCHED,
 ) -> None:
     """Publish what the devices say until Ctrl-C; they are stopped on every way out.
 
@@ -54,44 +60,44 @@ def serve_devices(
         out: build folder.
         plan: endless.
         ros_args: as nodes of ROS 2 take them, `--ros-args -r scan:=front/scan` and the like.
-        say: is told what is going on.
+        progress: callback.
         points: how they are published.
-        viewer: is told of the scan too.
+        viewer: gets the scan too.
 
     Raises:
         TaskError: the folder has no angle set.
         RecordingError: its URDF is none of ours.
     """
-    held = plan.motion.mode == "stop_and_go"
-    with running_node(_scanner(out, points, held), ros_args, replayed=False) as node:
-        drive(plan, node, say, viewer)
+    at_rest = plan.motion.mode == "stop_and_go"
+    with running_node(_scanner(out, points, at_rest), ros_args, replayed=False) as node:
+        drive(plan, node, progress, viewer)
 
 
 def serve_recording(
-    out: Path, recording: Path, ros_args: Sequence[str], say: Say, points: Publishing, *, rate: float = 1.0
+    out: Path, recording: Path, ros_args: Sequence[str], progress: Progress, points: Publishing, *, rate: float = 1.0
 ) -> None:
     """Publish a recording at its own pace, with its clock on /clock; the other arguments as for `serve_devices`.
 
     Raises:
         RecordingError: the recording is unreadable, or the rate is none.
     """
-    held = held_by(read_note(recording, NOTE))
-    with running_node(_scanner(out, points, held), ros_args, replayed=True) as node:
-        say("waiting for somebody to listen to scan, joint_states or points")
+    at_rest = rests_in_scans(read_note(recording, NOTE))
+    with running_node(_scanner(out, points, at_rest), ros_args, replayed=True) as node:
+        progress("waiting for a subscriber to scan, joint_states or points")
         node.await_subscriber()
         scans, angles = replay(recording, node, rate=rate)
         node.close()
-        say(f"published {scans:,} scans and {angles:,} angles of {recording}")
+        progress(f"published {scans:,} scans and {angles:,} angles of {recording}")
         node.flush()
 
 
-def _scanner(out: Path, points: Publishing, held: bool) -> PublishedScanner:
+def _scanner(out: Path, points: Publishing, at_rest: bool) -> PublishedScanner:
     in_use = angles_in_use(out)
     return PublishedScanner(
         angles=in_use.angles,
-        own_body=own_body_beside(in_use.path),
+        own_body=own_body_of(in_use.path),
         urdf=description(out, in_use.angles),
-        smooth=points.smooth and not held,
+        smooth=points.smooth and not at_rest,
         publish_tf=points.publish_tf,
         per_turn=points.per_turn,
         points_frame=points.frame,

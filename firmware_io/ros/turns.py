@@ -22,7 +22,7 @@ class Turns:
         """Begin with the first scan."""
         self._lines: list[ScanPoints] = []
         self._beams = 0
-        self._way = 0
+        self._sense = 0
         self._begin_rad = self._extreme_rad = math.nan
         self._extreme = 0  # place in the turn of the scan that went farthest
 
@@ -33,12 +33,12 @@ class Turns:
         if not math.isnan(joint_rad):
             if back := self._turned_back(joint_rad):
                 done.append(self._cut(self._extreme + 1, self._extreme_rad))
-                self._way = -back
+                self._sense = -back
             if math.isnan(self._begin_rad):
                 self._begin_rad = self._extreme_rad = joint_rad
-            whole, turned_rad = 2 * math.pi, abs(joint_rad - self._begin_rad)
-            if turned_rad >= whole:
-                turns = math.copysign(whole * (turned_rad // whole), joint_rad - self._begin_rad)
+            turn_rad, turned_rad = 2 * math.pi, abs(joint_rad - self._begin_rad)
+            if turned_rad >= turn_rad:
+                turns = math.copysign(turn_rad * (turned_rad // turn_rad), joint_rad - self._begin_rad)
                 done.append(self._cut(len(self._lines), self._begin_rad + turns))
             self._follow(joint_rad)
         if self._lines and self._beams + line.scan.range_m.size > MOST_BEAMS:
@@ -54,13 +54,13 @@ class Turns:
 
     def _turned_back(self, joint_rad: float) -> int:
         """The way (1 or -1) that the axis went until it turned back, as this angle shows; 0 where it did not."""
-        return self._way if self._way and (self._extreme_rad - joint_rad) * self._way > BACK_RAD else 0
+        return self._sense if self._sense and (self._extreme_rad - joint_rad) * self._sense > BACK_RAD else 0
 
     def _follow(self, joint_rad: float) -> None:
         ahead_rad = joint_rad - self._extreme_rad
-        if not self._way and abs(ahead_rad) > BACK_RAD:
-            self._way = 1 if ahead_rad > 0 else -1
-        if self._way and ahead_rad * self._way >= 0:
+        if not self._sense and abs(ahead_rad) > BACK_RAD:
+            self._sense = 1 if ahead_rad > 0 else -1
+        if self._sense and ahead_rad * self._sense >= 0:
             self._extreme, self._extreme_rad = len(self._lines), joint_rad
 
     def _cut(self, count: int, begin_rad: float) -> list[ScanPoints]:

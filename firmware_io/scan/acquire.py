@@ -1,4 +1,4 @@
-"""`scanwright scan`: turn the lidar, record what both devices say, and stop them whatever happens.
+"""Scan: turn the lidar, record both devices, and stop them on every exit.
 
 The order of a run: open and check both devices; the laser on, until the sensor's clock is known on the host's; the
 servo turns, until it turns steadily; then, and only then, the recording begins, and lasts for the turns that were asked
@@ -21,38 +21,41 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError
 from scanwright.design.motion import Motion, Spin, StopAndGo
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lidar import LidarDriver
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread, turning_servo
-from scanwright.firmware_io.scan.lidar_scans import LidarScans, Say, settle_clock
-from scanwright.firmware_io.scan.live_feed import NOBODY, Watch
+from scanwright.firmware_io.scan.lidar_scans import LidarScans, settle_clock
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
 from scanwright.firmware_io.scan.recorder import recorder_of
-from scanwright.firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
+from scanwright.firmware_io.scan.reporter import Reporter
+from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
 
 _STEADY_PATIENCE_S = 15.0
-_MOST_SPEEDS = 3600  # an hour of them, from which the mean is told
+_MOST_SPEEDS = 3600  # an hour of them, for the mean
 
 
-def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
-    """Do it. Both devices are told to stop and the recording is closed on every way out.
+def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNWATCHED) -> ScanSummary:
+    """Record a scan; stop both devices and close the recording on every exit.
 
-    What ends it early carries as notes what the devices answered to that.
+    An exception that ends it early has notes with the state that the devices reported when they were stopped.
+
+    Args:
+        plan: of the scan.
+        progress: gets each step; the fraction is the share of the recording that is done.
+        watch: gets scans, angles and messages.
 
     Raises:
         ServoSetupError: settings of the servo that outlast the power must change first; nothing was moved.
         DeviceError: a device is absent, another one than the angle set names, or fails.
         RecordingError: the recording cannot be written.
     """
-
-    def tell(line: str) -> None:
-        say(line)
-        watch.told(line)
-
+    reporter = Reporter(progress, watch)
     ros_messages.definition(
         ros_messages.LASER_SCAN
     )  # loads the message types: half a second that must not fall into the recording
@@ -63,16 +66,16 @@ def acquire(plan: ScanPlan, say: Say, watch: Watch = NOBODY) -> ScanSummary:
         )
         opened.set()
         check_model(plan.angles, lidar)
-        tell(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
+        reporter.step(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():
-            tell(f"warning: {servo.model}: {warning}")
-        scans = LidarScans(lidar, tell)
+            reporter.warn(f"{servo.model}: {warning}")
+        scans = LidarScans(lidar, reporter)
         lidar.start(intensity=plan.intensity, cluster=plan.cluster, skip=plan.every - 1)
-        settle_clock(scans, tell)
+        settle_clock(scans, reporter)
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
-        tell("starting the servo")
-        _wait_until_steady(scans, axis, plan.motion, tell)
-        return _record(plan, scans, axis, tell, watch)
+        reporter.step("starting the servo")
+        _wait_until_steady(scans, axis, plan.motion, reporter)
+        return _record(plan, scans, axis, reporter)
 
 
 @contextmanager
@@ -83,7 +86,7 @@ def _unturned_until_opened() -> Iterator[Event]:
         yield opened
     except KeyboardInterrupt as stop:
         if not opened.is_set():
-            stop.add_note("the servo had not been told to turn")
+            stop.add_note("the servo was not started")
         raise
 
 
@@ -97,19 +100,24 @@ def check_model(angles: AngleSet, lidar: LidarDriver) -> None:
         raise DeviceError(f"{lidar.address}: this is a {lidar.model}, but the angle set is for a {angles.sensor}")
 
 
-def _progress(taken: float, plan: ScanPlan) -> str:
-    """How much is done, or where nobody knows how much that will be, how many full scans."""
-    if plan.endless:
-        return f"{taken % 1:4.0%} of full scan {math.floor(taken) + 1:,}"
-    return f"{min(taken / plan.turns, 1):4.0%}"
-
-
 def _wait_until_steady(
-    scans: LidarScans, axis: AxisThread, motion: Motion, say: Say, keep: Callable[[ServoState], None] = lambda _: None
+    scans: LidarScans,
+    axis: AxisThread,
+    motion: Motion,
+    reporter: Reporter,
+    keep: Callable[[ServoState], None] = lambda _: None,
 ) -> int:
-    """Read scans until the servo is where the motion begins, and a spin turns evenly at its speed; how many it read.
+    """Read scans until the servo is at the start of the motion, and a spin is even and at its speed.
 
-    `keep` gets the angles meanwhile.
+    Args:
+        scans: of the lidar.
+        axis: of the servo.
+        motion: to begin.
+        reporter: of the scan.
+        keep: gets the angles meanwhile.
+
+    Returns:
+        The number of scans that were read.
     """
     read = 0
 
@@ -125,7 +133,7 @@ def _wait_until_steady(
 
     while time.monotonic_ns() < axis.begins_ns or math.isnan(axis.turning()[0]):
         if time.monotonic() > patience_s():
-            raise DeviceError("the servo tells no angle: is it in its dead sector all the time?")
+            raise DeviceError("the servo reports no angle: it may be in its dead sector all the time")
         wait()
     if not isinstance(motion, Spin):
         return read
@@ -138,21 +146,22 @@ def _wait_until_steady(
         if time.monotonic() > patience_s():
             break
         wait()
-    said = f"the servo turns at {speed:.1f} deg/s with a ripple of {ripple:.2f} deg, asked for were {goal:.1f} deg/s"
+    uneven = f"speed of the servo: {speed:.1f} deg/s (goal {goal:.1f}), rms deviation {ripple:.2f} deg"
     if not reached:
-        raise DeviceError(f"{said}: look at its supply, and at the friction of the head")
-    say(f"warning: {said}: look at the balance of the head")
+        raise DeviceError(f"{uneven}: check its supply and the friction of the head")
+    reporter.warn(f"{uneven}: check the balance of the head")
     return read
 
 
-def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, say: Say, watch: Watch) -> ScanSummary:
+def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Reporter) -> ScanSummary:
     """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
-    say("scanning until it is ended" if plan.endless else f"recording {plan.duration_s:g} s")
+    reporter.step("scanning until Ctrl-C" if plan.endless else f"recording {plan.duration_s:g} s")
+    watch = reporter.watch
     wanted = math.inf if plan.endless else plan.turns
     lidar, dropped, bad = scans.lidar, scans.lidar.dropped, scans.lidar.bad_packets
     axis.left_out.clear()
-    recorded_s = said_s = time.monotonic()
-    whole, taken, away = 0, 0.0, scans.away  # full scans: before the lidar was lost last, until now; its losses
+    recorded_s = reported_s = time.monotonic()
+    earlier, done, away = 0, 0.0, scans.away  # full scans: before the lidar was lost last, until now; its losses
     begin_s, from_rad = recorded_s, axis.window[-1].position_rad
     turned = deque([axis.turning()], maxlen=_MOST_SPEEDS)
     waiting: deque[Scan] = deque()
@@ -168,22 +177,22 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, say: Say, watch
 
         for state in axis.window:
             keep(state)
-        while taken < wanted or waiting:
+        while done < wanted or waiting:
             scan = scans.next()
             if scans.away > away:
-                resting = 1 + _wait_until_steady(scans, axis, plan.motion, say, keep)
+                resting = 1 + _wait_until_steady(scans, axis, plan.motion, reporter, keep)
                 axis.left_out["scans until the servo turned again"] += resting
-                whole, away = math.floor(taken), scans.away
+                earlier, away = math.floor(done), scans.away
                 begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
                 continue
-            if taken < wanted:
+            if done < wanted:
                 waiting.append(scan)
             for state in axis.hear():
                 keep(state)
             while waiting and waiting[0].time_ns[-1] <= axis.window[-1].time_ns:
                 ready = waiting.popleft()
                 if isinstance(plan.motion, StopAndGo) and axis.moved(ready):
-                    axis.left_out[ON_THE_WAY] += 1
+                    axis.left_out[BETWEEN_STOPS] += 1
                     continue
                 recorder.scan(ready)
                 watch.scan(ready)
@@ -192,21 +201,23 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, say: Say, watch
                 last_ns = int(ready.time_ns[-1])
             if isinstance(plan.motion, Spin):
                 turns = abs(axis.window[-1].position_rad - from_rad) / (2 * math.pi)
-                taken = whole + max(turns - scan.scan_time_s / plan.motion.period_s, 0.0)
+                done = earlier + max(turns - scan.scan_time_s / plan.motion.period_s, 0.0)
             else:
-                taken = whole + (time.monotonic() - begin_s) / plan.motion.duration_s
-            if time.monotonic() - said_s > 1:
-                said_s = time.monotonic()
+                done = earlier + (time.monotonic() - begin_s) / plan.motion.duration_s
+            if time.monotonic() - reported_s > 1:
+                reported_s = time.monotonic()
                 turned.append(axis.turning())
-                rate_hz = recorded / (said_s - recorded_s)
-                even = f", {turned[-1][0]:.1f} deg/s, ripple {turned[-1][1]:.2f} deg"
-                say(
-                    f"{_progress(taken, plan)}  {rate_hz:.1f} scans/s, {lidar.dropped - dropped} dropped, "
-                    f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else "")
+                rate_hz = recorded / (reported_s - recorded_s)
+                even = f", {turned[-1][0]:.1f} deg/s, rms deviation {turned[-1][1]:.2f} deg"
+                step = f"full scan {math.floor(done) + 1:,}" if plan.endless else "recording"
+                reporter.step(
+                    f"{step}: {rate_hz:.1f} scans/s, {lidar.dropped - dropped} dropped, "
+                    f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else ""),
+                    done % 1 if plan.endless else min(done / plan.turns, 1),
                 )
     if not recorded:
         raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
-    dropped_why = "scans that the sensor dropped, or that waited while this computer was held up"
+    dropped_why = "scans that the sensor lost, or that waited because this computer was busy"
     lost = {dropped_why: lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
     even_turning = np.array(turned) if isinstance(plan.motion, Spin) else np.zeros((1, 2))
     return ScanSummary(

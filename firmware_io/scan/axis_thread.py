@@ -27,11 +27,11 @@ from scanwright.firmware_io.servo.servo import ServoDriver
 
 SERVO_HZ = 100.0
 
-_HELD_S = 5.0  # three tries of two orders take 1.5 s
+_STOP_ANSWER_S = 5.0  # three tries of two orders take 1.5 s
 _DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that
 _WINDOW = 50  # samples: half a second
 _STILL_RAD = math.radians(0.2)  # two steps of the encoder
-_DOUBT_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is about as good as any other
+_UNCERTAIN_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is about as good as any other
 _GAP_NS = 1_000_000_000  # beyond it a doubtful angle beats none
 _GAP_BOUNDS = 4  # unless its time is as uncertain as the gap is long: one transaction in which this process was stopped
 
@@ -42,29 +42,29 @@ class AxisThread:
     Attributes:
         begins_ns: when the motion proper begins; before it the axis is on its way to the start.
         orders: courses for the thread, None where the axis shall stand.
-        told: states and errors from the thread.
-        held: from the thread, whether the servo answered the order to stand; False from one that has failed.
+        received: states and errors from the thread.
+        stop_answers: from the thread, whether the servo answered the order to stand; False from one that has failed.
         window: the good angles of the last half second.
         left_out: angles that are not recorded, reason -> count.
     """
 
-    def __init__(self, motion: Motion, stands_rad: float, step_rad: float) -> None:
+    def __init__(self, motion: Motion, start_rad: float, step_rad: float) -> None:
         self.orders: SimpleQueue[Iterator[Move] | None] = SimpleQueue()
-        self.told: SimpleQueue[ServoState | Exception] = SimpleQueue()
+        self.received: SimpleQueue[ServoState | Exception] = SimpleQueue()
         self.window: deque[ServoState] = deque(maxlen=_WINDOW)
         self.left_out: Counter[str] = Counter()
         self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
-        self._kept: list[ServoState] = []  # heard by `go`, for the next who hears
+        self._unread: list[ServoState] = []  # heard by `go`, for the next who hears
         self._motion = motion
-        self._doubt_rad = _DOUBT_STEPS * step_rad
-        self.held: SimpleQueue[bool] = SimpleQueue()
-        self._order(stands_rad)
+        self._uncertain_rad = _UNCERTAIN_STEPS * step_rad
+        self.stop_answers: SimpleQueue[bool] = SimpleQueue()
+        self._order(start_rad)
 
     def stop(self) -> bool:
         """Stand, with torque on, until `go`; whether the servo has answered that it was told so."""
         self.orders.put(None)
         try:
-            return self.held.get(timeout=_HELD_S)
+            return self.stop_answers.get(timeout=_STOP_ANSWER_S)
         except Empty:
             return False
 
@@ -74,7 +74,7 @@ class AxisThread:
         Raises:
             DeviceError: the servo failed meanwhile.
         """
-        self._kept = self.hear()
+        self._unread = self.hear()
         self._order(self.window[-1].position_rad if self.window else 0.0)
 
     def _order(self, from_rad: float) -> None:
@@ -88,9 +88,9 @@ class AxisThread:
         Raises:
             DeviceError: the servo failed.
         """
-        good, self._kept = self._kept, []
-        while not self.told.empty():
-            state = self.told.get()
+        good, self._unread = self._unread, []
+        while not self.received.empty():
+            state = self.received.get()
             if isinstance(state, Exception):
                 raise state
             self._bounds_ns.append(state.time_bound_ns)
@@ -98,11 +98,11 @@ class AxisThread:
                 self.left_out["servo angles in the dead sector"] += 1
             elif (  # where the axis turns back it is slow, and no angle is in doubt
                 state.time_bound_ns > 2 * sorted(self._bounds_ns)[len(self._bounds_ns) // 10]
-                and abs(state.velocity_rad_s) * state.time_bound_ns > self._doubt_rad * 1e9
+                and abs(state.velocity_rad_s) * state.time_bound_ns > self._uncertain_rad * 1e9
                 and self.window
                 and state.time_ns - self.window[-1].time_ns < max(_GAP_NS, _GAP_BOUNDS * state.time_bound_ns)
             ):
-                self.left_out["servo angles of uncertain time"] += 1  # the host was busy during the transaction
+                self.left_out["servo angles with uncertain timestamp"] += 1  # the host was busy during the transaction
             else:
                 self.window.append(state)
                 good.append(state)
@@ -133,12 +133,12 @@ def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
     Raises:
         DeviceError: it stands where it cannot tell its angle.
     """
-    stands_rad = servo.read().position_rad
-    if math.isnan(stands_rad):
+    start_rad = servo.read().position_rad
+    if math.isnan(start_rad):
         raise DeviceError(
-            f"{servo}: it stands in its dead sector and knows no angle: turn the head to the front by hand"
+            f"{servo}: it is in its dead sector and reports no angle: turn the head to the front manually"
         )
-    axis, done = AxisThread(motion, stands_rad, servo.step_rad), Event()
+    axis, done = AxisThread(motion, start_rad, servo.step_rad), Event()
     thread = Thread(target=_follow, args=(servo, axis, done), name="servo", daemon=True)
     thread.start()
     try:
@@ -162,7 +162,7 @@ def _join(thread: Thread) -> None:
 
 def _follow(servo: ServoDriver, axis: AxisThread, done: Event) -> None:
     """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
-    began_s = due_s = heard_s = time.monotonic()
+    began_s = due_s = answered_s = time.monotonic()
     moves: Iterator[Move] = iter(())
     move, to_hold = None, False
     try:
@@ -178,18 +178,18 @@ def _follow(servo: ServoDriver, axis: AxisThread, done: Event) -> None:
                 if to_hold:
                     servo.hold()
                     to_hold = False
-                    axis.held.put(True)
+                    axis.stop_answers.put(True)
                 if move is not None and now_s - began_s >= move.at_s:
                     if math.isinf(move.goal_rad):
                         servo.spin(move.rate_rad_s)
                     else:
                         servo.sweep_to(move.goal_rad, move.rate_rad_s)
                     move = next(moves, None)
-                axis.told.put(servo.read())
-                heard_s = now_s
+                axis.received.put(servo.read())
+                answered_s = now_s
             except (DeviceTimeoutError, ProtocolError):
-                if now_s - heard_s > _DEAF_S:
+                if now_s - answered_s > _DEAF_S:
                     raise
     except Exception as error:  # whatever it is, the thread that waits for it raises it
-        axis.told.put(error)
-        axis.held.put(False)
+        axis.received.put(error)
+        axis.stop_answers.put(False)

@@ -1,8 +1,7 @@
-"""`scanwright doctor`: what is plugged in, how well it answers, what is wrong and what to do about it.
+"""Diagnosis of the devices: what is plugged in, how well it answers, what is wrong and what to do about it.
 
-It reads. Only ports that were named, or whose USB ids are in the catalogue, are opened. A servo is listened to first,
-then asked, and told nothing: whoever drives it goes on, and what it holds stays held. A lidar measures for a few
-seconds, its laser on, and keeps no setting of that. What is to be set is set by `fix` alone, and `restore` undoes it.
+It only reads. It opens the ports that are named, and those whose USB ids are in the catalogue. A servo is listened to
+first, then read; whoever drives it goes on. A lidar measures for a few seconds, its laser on, and keeps no setting.
 """
 
 from __future__ import annotations
@@ -10,14 +9,13 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from scanwright.design.angles import AngleSet, load_angles
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import DeviceError, notes_of
+from scanwright.design.findings import Finding
 from scanwright.design.motion import Spin
 from scanwright.firmware_io.device_ports import emulated, lidar_ports, servo_ports
 from scanwright.firmware_io.lidar.families import open_lidar
@@ -29,28 +27,16 @@ from scanwright.firmware_io.servo import settings
 from scanwright.firmware_io.servo.examine import examine_servo
 from scanwright.firmware_io.servo.fitness import ServoSetupError
 
-_LOOK_S = 4.0
-_BOUND_MS = 2.0
+SERVO_SETTING = "servo_setting"  # code of a finding that a set-up of the servo at port `subject` solves
+
+_MEASURED_S = 4.0  # 40 turns of the slowest lidar: a rate to a fortieth
+_RATE_WITHIN = 0.02  # data sheets allow a motor 1 to 2 %
+_RETURNS_LEAST = 0.1  # of the beams; fewer come back from outdoors only
+_BOUND_MS = 2.0  # 0.12 deg at 60 deg/s
+_READS_HZ = 1.2 * SERVO_HZ  # with some reserve
 
 
-@dataclass(frozen=True, slots=True)
-class DeviceFinding:
-    """One line of the diagnosis.
-
-    Attributes:
-        verdict: whether something must be done.
-        says: what was seen; ends with the remedy if something is wrong.
-        set_up: port of the servo whose set-up is the remedy, or was made; None if there is no such servo.
-        undo: file from which that set-up can be undone; None if it was not made.
-    """
-
-    verdict: Literal["ok", "warning", "wrong"]
-    says: str
-    set_up: str | None = None
-    undo: Path | None = None
-
-
-def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
+def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: int | None) -> Iterator[Finding]:
     """Examine the named ports, else the emulated scanner of the build folder, else what the catalogue knows by USB ids.
 
     Args:
@@ -59,147 +45,129 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
         servo: port.
         servo_id: number of the servo on its bus; None if it is alone.
     """
-    yield DeviceFinding("ok", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
+    yield _ok("system", "", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
     angles = None if out is None else load_angles(out / "angles.json")
-    twins = None if out is None else emulated(out)
+    emulators = None if out is None else emulated(out)
     lidars, servos = [lidar] if lidar else lidar_ports(), [servo] if servo else servo_ports()
-    if twins is not None and lidar is None and servo is None:
-        yield DeviceFinding("ok", f"the scanner of {out} is emulated by process {twins.pid}")
-        lidars, servos = [twins.lidar], [twins.servo]
+    if emulators is not None and lidar is None and servo is None:
+        yield _ok("emulated", str(out), f"the scanner of {out} is emulated by process {emulators.pid}")
+        lidars, servos = [emulators.lidar], [emulators.servo]
     model, spins = _servo_of(angles)
-    examinations = [_guarded(_examine_lidar(port, angles)) for port in lidars]
-    examinations += [_guarded(_examine_servo(port, model, servo_id, spins=spins)) for port in servos]
-    with ThreadPoolExecutor(max(len(examinations), 1)) as side_by_side:  # as a scan asks them
-        for findings in side_by_side.map(list[DeviceFinding], examinations):
+    examinations = [_guarded(port, _examine_lidar(port, angles)) for port in lidars]
+    examinations += [_guarded(port, _examine_servo(port, model, servo_id, spins=spins)) for port in servos]
+    with ThreadPoolExecutor(max(len(examinations), 1)) as together:  # as a scan reads them
+        for findings in together.map(list[Finding], examinations):
             yield from findings
     if not lidars:
-        yield DeviceFinding(
-            "wrong",
-            "no lidar that is known by its USB ids: plug it in, give it power, or name it: --lidar /dev/ttyUSB0 or "
-            "--lidar 192.168.0.10:10940",
-        )
+        hint = "plug it in, power it, or name its port or HOST:PORT"
+        yield Finding("lidar_absent", "error", "lidar", "no lidar with a USB id of the catalogue", hint=hint)
     if not servos:
-        yield DeviceFinding(
-            "wrong",
-            "no adapter of a servo on USB: plug in its U2D2 or USB2Dynamixel, or name another with --servo PORT",
-        )
+        hint = "plug in its U2D2 or USB2Dynamixel, or name the port of another adapter"
+        yield Finding("servo_absent", "error", "servo", "no adapter of a servo on USB", hint=hint)
 
 
-def fix(out: Path | None, servo: str | None, servo_id: int | None) -> Iterator[DeviceFinding]:
+def fix(out: Path | None, servo: str | None, servo_id: int | None) -> tuple[str, Iterator[str | Path]]:
     """Set what keeps a servo from working well; only on a port that was named, or of an emulated scanner.
 
     Args:
         out: build folder, which gets the file of the old settings; None for the working folder.
         servo: port.
         servo_id: number of the servo on its bus; None if it is alone.
+
+    Returns:
+        The port, and the steps of `settings.set_up`.
+
+    Raises:
+        DeviceError: no port was named.
     """
-    twins = None if out is None else emulated(out)
-    port = servo or (twins.servo if twins else None)
+    emulators = None if out is None else emulated(out)
+    port = servo or (emulators.servo if emulators else None)
     if port is None:
-        yield DeviceFinding("wrong", "a servo is set up only on a port that was named: name it with --servo PORT")
-        return
+        raise DeviceError("servo: no port given; a servo is set up only on a port that is named")
     model, spins = _servo_of(None if out is None else load_angles(out / "angles.json"))
-    yield from _told(settings.set_up(port, model, servo_id, Path() if out is None else out, spins=spins), port)
-
-
-def restore(file: Path, servo: str | None) -> Iterator[DeviceFinding]:
-    """Set a servo back to what `fix` found; `servo` is its port where that has another name now."""
-    yield from _told(settings.restore(file, servo), servo)
+    return port, settings.set_up(port, model, servo_id, Path() if out is None else out, spins=spins)
 
 
 def _servo_of(angles: AngleSet | None) -> tuple[str | None, bool | None]:
-    """Model of the servo, and whether it spins, as far as an angle set says so."""
+    """Model of the servo, and whether it spins, as far as an angle set specifies it."""
     if angles is None:
         return None, None
     return angles.servo, None if angles.motion is None else isinstance(angles.motion, Spin)
 
 
-def _told(steps: Iterator[str | Path], port: str | None) -> Iterator[DeviceFinding]:
-    yield from _guarded(
-        DeviceFinding("ok", f"the old settings are kept in {step}", port, step)
-        if isinstance(step, Path)
-        else DeviceFinding("ok", step)
-        for step in steps
-    )
-
-
-def _guarded(examination: Iterator[DeviceFinding]) -> Iterator[DeviceFinding]:
+def _guarded(port: str, examination: Iterator[Finding]) -> Iterator[Finding]:
     """A device that fails ends its own examination only."""
     try:
         yield from examination
     except ServoSetupError as error:
         for change in error.changes:
-            yield DeviceFinding("wrong", f"{error.port}: servo {error.servo_id}: {change}", set_up=error.port)
+            yield Finding(SERVO_SETTING, "error", port, f"{port}: servo {error.servo_id}: {change}")
     except DeviceError as error:
-        for line in (str(error), *getattr(error, "__notes__", ())):
-            yield DeviceFinding("wrong", line)
+        for line in (str(error), *notes_of(error)):
+            yield Finding("device_failed", "error", port, line)
 
 
-def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[DeviceFinding]:
+def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[Finding]:
     with open_lidar(port, angles.sensor if angles else None) as lidar:
-        told = {"serial number": lidar.serial_number, "firmware": lidar.firmware}
-        yield DeviceFinding("ok", ", ".join([f"{port}: {lidar.model}", *(f"{k} {v}" for k, v in told.items() if v)]))
+        identity = {"serial number": lidar.serial_number, "firmware": lidar.firmware}
+        known = [f"{name} {value}" for name, value in identity.items() if value]
+        yield _ok("lidar_identity", port, ", ".join([f"{port}: {lidar.model}", *known]))
         if angles is not None:
             check_model(angles, lidar)
-        for says in lidar.condition():
-            yield DeviceFinding("ok", f"{port}: {says}")
+        for condition in lidar.condition():
+            yield _ok("lidar_condition", port, f"{port}: {condition}")
         lidar.start()
         began_ns = lidar.read().arrival_ns
         late_ns: list[int] = []
         while True:
             timed = lidar.read()
             late_ns.append(timed.arrival_ns - timed.scan.stamp_ns)
-            if timed.arrival_ns - began_ns > _LOOK_S * 1e9:
+            if timed.arrival_ns - began_ns > _MEASURED_S * 1e9:
                 break
         rate_hz = len(late_ns) / ((timed.arrival_ns - began_ns) / 1e9)
         lidar.stop()
-    yield _judged(
-        abs(rate_hz / lidar.scan_rate_hz - 1) < 0.02,
-        f"{port}: {rate_hz:.1f} scans/s of {lidar.scan_rate_hz:.1f}",
-        "scans are lost: try another cable or USB port, no hub, and look at the slip ring",
-    )
-    yield _judged(
-        not lidar.bad_packets,
-        f"{port}: {lidar.bad_packets} bad packets",
-        "bits are lost on the way: look at cable and slip ring, lead the servo's supply apart from them",
-    )
-    jitter_ms = (max(late_ns) - min(late_ns)) / 1e6
-    yield _judged(
-        timed.uncertainty_ns < CLOCK_GOOD_NS,
-        f"{port}: its clock is known to {timed.uncertainty_ns / 1e6:.2f} ms, scans come up to {jitter_ms:.1f} ms late",
-        "this computer is busy: end other programs, or take another USB port",
-    )
-    if timed.warning:
-        yield DeviceFinding("wrong", f"{port}: {timed.warning}")
+    jitter_ms, uncertainty_ms = (max(late_ns) - min(late_ns)) / 1e6, timed.uncertainty_ns / 1e6
     share = float(np.isfinite(timed.scan.range_m).mean())
-    yield _judged(share > 0.1, f"{port}: {share:.0%} of the beams come back", "is the window covered or dirty?")
+    rate = f"scan rate: {rate_hz:.1f} Hz (nominal {lidar.scan_rate_hz:.1f})"
+    time = f"timestamp uncertainty: {uncertainty_ms:.2f} ms; scans arrive up to {jitter_ms:.1f} ms late"
+    slip_ring = "check cable and slip ring, and route the servo's supply apart from them"
+    even = abs(rate_hz / lidar.scan_rate_hz - 1) < _RATE_WITHIN
+    yield _judged(even, "scan_rate", port, rate, rate_hz, lidar.scan_rate_hz, "Hz", f"no USB hub; {slip_ring}")
+    bad = lidar.bad_packets
+    yield _judged(not bad, "bad_packets", port, f"bad packets: {bad}", bad, 0, "", slip_ring)
+    exact = timed.uncertainty_ns < CLOCK_GOOD_NS
+    yield _judged(exact, "timestamp", port, time, uncertainty_ms, CLOCK_GOOD_NS / 1e6, "ms", "end other programs")
+    if timed.warning:
+        yield Finding("lidar_warning", "error", port, f"{port}: {timed.warning}")
+    returns, window = f"beams with a return: {share:.0%}", "check whether the window is covered or dirty"
+    yield _judged(share > _RETURNS_LEAST, "returns", port, returns, share, _RETURNS_LEAST, "", window)
 
 
-def _examine_servo(
-    port: str, model: str | None, servo_id: int | None, *, spins: bool | None
-) -> Iterator[DeviceFinding]:
-    found = examine_servo(port, model, servo_id, spins=spins)
-    yield DeviceFinding("ok", f"{found.who} ({found.model}), {found.speaks}")
-    if found.reports:
-        says = f"{found.who} reports {found.reports}: find out why before it turns again; `scan` resets it"
-        yield DeviceFinding("warning", says)
-    if found.has_torque:
-        yield DeviceFinding("warning", f"{found.who} has its torque on: something has driven it, and it may move")
-    for unfit in found.unfit:
-        yield DeviceFinding("warning", f"{found.who}: {unfit}", set_up=port)
-    if found.slow_adapter:
-        yield DeviceFinding("warning", f"{port}: {found.slow_adapter}")
-    yield DeviceFinding("ok", f"{port}: {found.voltage_V:.1f} V, {found.temperature_degC:.0f} deg C")
-    remedy = "set the latency timer of the adapter to 1 ms" if latency_timer(port) else "end other programs"
-    yield _judged(
-        found.reads_hz > 1.2 * SERVO_HZ,
-        f"{port}: {found.reads_hz:.0f} reads/s, {SERVO_HZ:.0f} are needed",
-        f"{remedy}, and mind the servo's settings above",
-    )
-    yield _judged(
-        found.bound_ms < _BOUND_MS, f"{port}: the time of an angle is known to {found.bound_ms:.2f} ms", remedy
-    )
+def _examine_servo(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> Iterator[Finding]:
+    servo = examine_servo(port, model, servo_id, spins=spins)
+    yield _ok("servo_identity", port, f"{servo.name} ({servo.model}), {servo.protocol}")
+    if servo.reports:
+        hint = "find the cause before it turns again; a scan resets it"
+        yield Finding("servo_fault", "warning", port, f"{servo.name} reports {servo.reports}", hint=hint)
+    if servo.has_torque:
+        moving = f"{servo.name} has its torque on: a program drives it, and it may move"
+        yield Finding("servo_torque", "warning", port, moving)
+    for change in servo.unfit:
+        yield Finding(SERVO_SETTING, "warning", port, f"{servo.name}: {change}")
+    if servo.slow_adapter:
+        yield Finding("adapter_latency", "warning", port, f"{port}: {servo.slow_adapter}")
+    yield _ok("servo_supply", port, f"{port}: {servo.voltage_V:.1f} V, {servo.temperature_degC:.0f} deg C")
+    hint = "set the latency timer of the adapter to 1 ms" if latency_timer(port) else "end other programs"
+    reads = f"read rate: {servo.reads_hz:.0f} Hz (required {SERVO_HZ:.0f})"
+    time = f"timestamp uncertainty of an angle: {servo.bound_ms:.2f} ms"
+    yield _judged(servo.reads_hz > _READS_HZ, "read_rate", port, reads, servo.reads_hz, _READS_HZ, "Hz", hint)
+    yield _judged(servo.bound_ms < _BOUND_MS, "angle_time", port, time, servo.bound_ms, _BOUND_MS, "ms", hint)
 
 
-def _judged(good: bool, says: str, remedy: str) -> DeviceFinding:
-    return DeviceFinding("ok", says) if good else DeviceFinding("warning", f"{says}: {remedy}")
+def _ok(code: str, subject: str, message: str) -> Finding:
+    return Finding(code, "ok", subject, message)
+
+
+def _judged(good: bool, code: str, port: str, text: str, value: float, limit: float, unit: str, hint: str) -> Finding:
+    """A finding that is ok, or a warning with a hint."""
+    return Finding(code, "ok" if good else "warning", port, f"{port}: {text}", value, limit, unit, "" if good else hint)

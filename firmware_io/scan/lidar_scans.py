@@ -7,37 +7,36 @@ seconds are granted) it turns on. One that says of itself that it has a fault is
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 from scanwright.design.errors import DeviceError, DeviceFaultError
 from scanwright.firmware_io.lidar.lidar import LidarDriver, TimedScan
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread
+from scanwright.firmware_io.scan.reporter import Reporter
 
-Say = Callable[[str], None]
 CLOCK_GOOD_NS = 500_000
 _CLOCK_LEAST_S = 3.0
 _CLOCK_PATIENCE_S = 10.0
 _AWAY_S = 10.0
-_UNHEARD = "the servo has not answered that it stands: look, and cut its power if it turns"
+_SERVO_UNKNOWN = "the servo has not answered that it stands: look, and cut its power if it turns"
 
 
 class LidarScans:
     """Scans with the host's times, as they come; goes on after the sensor was away for a while.
 
     Attributes:
-        axis: what stands still while the sensor is away; None before it turns.
+        axis: stops while the sensor is away; None before the servo turns.
         clock_ns: standard uncertainty of the last scan's time.
         away: how often the sensor was.
     """
 
-    def __init__(self, lidar: LidarDriver, say: Say) -> None:
+    def __init__(self, lidar: LidarDriver, reporter: Reporter) -> None:
         self.lidar = lidar
         self.axis: AxisThread | None = None
         self.clock_ns = 0
         self.away = 0
         self._warned = ""
-        self._say = say
+        self._reporter = reporter
 
     def next(self) -> Scan:
         """The next one, however long the sensor was away before it.
@@ -51,22 +50,22 @@ class LidarScans:
         except DeviceFaultError:
             raise
         except DeviceError as error:
-            stands = ""
+            servo_state = ""
             if self.axis is not None:
-                held = self.axis.stop()
-                stands = "the servo has answered that it holds, " if held else f"{_UNHEARD}, "
-            self._say(f"{error}; {stands}waiting {_AWAY_S:g} s for the lidar to come back")
+                stopped = self.axis.stop()
+                servo_state = "the servo has answered that it holds, " if stopped else f"{_SERVO_UNKNOWN}, "
+            self._reporter.warn(f"{error}; {servo_state}waiting {_AWAY_S:g} s for the lidar to come back")
             self.away += 1
-            timed = self._found_again()
+            timed = self._read_again()
             if self.axis is not None:
                 self.axis.go()
         self.clock_ns = timed.uncertainty_ns
         if timed.warning and timed.warning != self._warned:
-            self._say(f"warning: {self.lidar.model}: {timed.warning}")
+            self._reporter.warn(f"{self.lidar.model}: {timed.warning}")
             self._warned = timed.warning
         return timed.scan
 
-    def _found_again(self) -> TimedScan:
+    def _read_again(self) -> TimedScan:
         deadline_s = time.monotonic() + _AWAY_S
         while True:
             self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
@@ -77,16 +76,17 @@ class LidarScans:
                     raise
 
 
-def settle_clock(scans: LidarScans, say: Say) -> None:
+def settle_clock(scans: LidarScans, reporter: Reporter) -> None:
     """Read scans until the sensor's clock is known, or for so long that it will not be.
 
     Raises:
         DeviceError: as `LidarScans.next`.
     """
-    say("learning the sensor's clock")
+    reporter.step("estimating the sensor's clock")
     began_s = time.monotonic()
     while (waited_s := time.monotonic() - began_s) < _CLOCK_LEAST_S or scans.clock_ns > CLOCK_GOOD_NS:
         scans.next()
         if waited_s > _CLOCK_PATIENCE_S:
-            say(f"warning: the sensor's clock is known to {scans.clock_ns / 1e6:.1f} ms only: is this computer busy?")
+            uncertainty_ms = scans.clock_ns / 1e6
+            reporter.warn(f"timestamp uncertainty: {uncertainty_ms:.1f} ms; is this computer busy?")
             return

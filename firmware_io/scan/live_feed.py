@@ -1,4 +1,4 @@
-"""A scan on its way to somebody who watches: handed over without waiting, placed as `assemble` places it.
+"""Scans for a live view: handed over without waiting, placed as `assemble` places them.
 
 The thread that reads the devices only appends to two short queues. Another thread empties them five times a second into
 a pipe; at its other end, in a process of its own, scans meet the servo's angles and become points. A viewer that
@@ -31,7 +31,7 @@ EVERY_S = 0.2
 
 
 class Watch(Protocol):
-    """Who looks on while a recording is made; none of these may wait."""
+    """Receives a recording while it is made; none of these may wait."""
 
     def joint(self, time_ns: int, position_rad: float) -> None:
         """An angle of the servo."""
@@ -39,8 +39,8 @@ class Watch(Protocol):
     def scan(self, scan: Scan) -> None:
         """A scan whose last beam is not later than the last angle."""
 
-    def told(self, line: str) -> None:
-        """A line of progress."""
+    def message(self, line: str) -> None:
+        """A line of progress, or a warning."""
 
     def close(self) -> None:
         """The recording has ended."""
@@ -53,8 +53,8 @@ class Viewer(Watch, Protocol):
         """How the scan ended; the last call before `close`."""
 
 
-class Nobody:
-    """The `Viewer` of a recording that nobody watches."""
+class Unwatched:
+    """The `Viewer` of a recording without viewers."""
 
     def joint(self, time_ns: int, position_rad: float) -> None:
         """Nothing."""
@@ -62,7 +62,7 @@ class Nobody:
     def scan(self, scan: Scan) -> None:
         """Nothing."""
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """Nothing."""
 
     def ended(self, end: ScanEnd) -> None:
@@ -72,12 +72,12 @@ class Nobody:
         """Nothing."""
 
 
-NOBODY = Nobody()
+UNWATCHED = Unwatched()
 
 
 @dataclass(frozen=True, slots=True)
 class Both:
-    """The `Watch` of two; where the first raises, the second is told nothing."""
+    """The `Watch` of two; if the first raises, the second receives nothing."""
 
     first: Watch
     second: Watch
@@ -92,10 +92,10 @@ class Both:
         self.first.scan(scan)
         self.second.scan(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """See `Watch`."""
-        self.first.told(line)
-        self.second.told(line)
+        self.first.message(line)
+        self.second.message(line)
 
     def close(self) -> None:
         """See `Watch`."""
@@ -140,7 +140,7 @@ class Feed:
             self.lost += len(self._scans) == MOST_SCANS
             self._scans.append(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """See `Watch`."""
         with self._lock:
             self._lines.append(line)
@@ -183,7 +183,7 @@ class CloudGrowth:
         points_m: in the world, shape (n, 3).
         intensity: shape (n,), 0 from a sensor that measures none.
         time_s: of the scan that each belongs to, since the first one, shape (n,).
-        lines: what the scan said meanwhile.
+        lines: messages of the scan since the last one.
         lost: scans that the view left out so far.
         end: how the scan ended; None while it runs.
     """
@@ -215,8 +215,8 @@ class Placing:
                 self._first_ns = line.scan.stamp_ns
             there = line.verdict == Verdict.POINT
             points.append(line.points_m[there])
-            told = line.scan.intensity if line.scan.intensity.size else np.zeros_like(line.scan.range_m)
-            intensity.append(told[there])
+            measured = line.scan.intensity if line.scan.intensity.size else np.zeros_like(line.scan.range_m)
+            intensity.append(measured[there])
             after_s = np.float32((line.scan.stamp_ns - self._first_ns) / 1e9)
             seconds.append(np.full(len(points[-1]), after_s))
         return CloudGrowth(

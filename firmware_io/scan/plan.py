@@ -1,4 +1,4 @@
-"""What `scanwright scan` is going to do: read, checked and said before any device is touched."""
+"""Plan of a scan: read, checked and printed before any device is touched."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ _LONGEST_S = 7 * 24 * 3600.0
 
 @dataclass(frozen=True, slots=True)
 class ScanPlan:
-    """What one scan is going to do.
+    """Plan of one scan.
 
     Attributes:
         angles: angle set of the scanner, calibrated if it has been.
         angles_path: its file.
-        frames: in words, which one that is.
+        frames: description of it.
         motion: of its servo.
         turns: full scans.
-        intensity: whether the sensor is asked for intensities.
+        intensity: whether intensities are recorded.
         cluster: steps that share one range, the least of theirs.
-        every: one scan of so many is taken.
+        every: one scan of so many is recorded.
         stamp_at: which moment of a turn the sensor's stamps mean.
         ports: where the devices are.
         servo_id: number of the servo on its bus; None if it is alone there.
@@ -60,7 +60,7 @@ class ScanPlan:
         return self.turns * self.motion.duration_s
 
     def lines(self) -> list[str]:
-        """The plan in words."""
+        """Describe the plan."""
         emulated = f" (emulated by process {self.ports.pid})" if self.ports.pid else ""
         each = f"{self.motion.mode} of {self.motion.duration_s:g} s"
         recorded = [f"{self.turns} x {each}: {self.duration_s:g} s of recording", f"recording {self.recording}"]
@@ -86,7 +86,7 @@ def plan_scan(
     stamp_at: StampAt = "step_0",
     endless: bool = False,
 ) -> ScanPlan:
-    """What a scan with the scanner of a build folder will do; touches no device and writes nothing.
+    """Plan a scan with the scanner of a build folder; touch no device and write nothing.
 
     Args:
         out: build folder; its `angles.json` is all that is needed.
@@ -95,11 +95,11 @@ def plan_scan(
         servo: port.
         servo_id: its number on the bus; None if it is alone there.
         recording: None for one in `out`, named by date and time.
-        intensity: ask for intensities.
+        intensity: record intensities.
         cluster: steps that share one range.
-        every: one scan of so many is taken.
+        every: one scan of so many is recorded.
         stamp_at: which moment of a turn the sensor's stamps mean.
-        endless: record nothing, and go on until it is ended; `turns` and `recording` say nothing then.
+        endless: record nothing, and go on until it is ended; `turns` and `recording` have no effect then.
 
     Raises:
         ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an unusable file name.
@@ -107,25 +107,25 @@ def plan_scan(
     in_use = angles_in_use(out)
     angles = in_use.angles
     if turns < 1:
-        raise DeviceError(f"--turns = {turns}: at least 1")
+        raise DeviceError(f"turns = {turns}: at least 1")
     if angles.motion is None:
-        raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set does not say how the servo moves")
+        raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set has no motion of the servo")
     if turns * angles.motion.duration_s > _LONGEST_S:
         most = int(_LONGEST_S / angles.motion.duration_s)
-        raise DeviceError(f"--turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
+        raise DeviceError(f"turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
     product = load_catalogue().products.get(angles.servo)
     if isinstance(angles.motion, Spin) and isinstance(product, Servo) and product.position_feedback_deg < 360:
         raise DeviceError(
             f"{out / 'angles.json'}: motion.mode = 'spin': {angles.servo} measures its angle in "
-            f"{product.position_feedback_deg:g} of 360 deg only: make it a 'sweep', or take a servo such as MX-64R"
+            f"{product.position_feedback_deg:g} of 360 deg only: make it a 'sweep', or choose a servo such as MX-64R"
         )
     if recording is not None:
         _check_name(recording)
-    kept = [path for name in ("angles.json", CALIBRATED, "task.toml") if (path := out / name).is_file()]
+    files = [path for name in ("angles.json", CALIBRATED, "task.toml") if (path := out / name).is_file()]
     return ScanPlan(
         angles=angles,
         angles_path=in_use.path,
-        frames=in_use.said,
+        frames=in_use.description,
         motion=angles.motion,
         turns=turns,
         intensity=intensity,
@@ -135,7 +135,7 @@ def plan_scan(
         ports=find_ports(out, lidar, servo),
         servo_id=servo_id,
         recording=recording or place_in(out, f"recordings/{datetime.now():%Y%m%d-%H%M%S}.mcap", RecordingError),
-        attached={path.name: path.read_text(encoding="utf-8") for path in kept},
+        attached={path.name: path.read_text(encoding="utf-8") for path in files},
         endless=endless,
     )
 
@@ -145,4 +145,4 @@ def _check_name(recording: Path) -> None:
     if recording.suffix != ".mcap":
         raise RecordingError(f"{recording}: recordings are MCAP files; name it {recording.with_suffix('.mcap').name}")
     if recording.exists():
-        raise RecordingError(f"{recording}: exists already, and a recording is never written over")
+        raise RecordingError(f"{recording}: exists; a recording is never overwritten")

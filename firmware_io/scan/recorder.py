@@ -48,7 +48,7 @@ class Recorder:
 
     def __enter__(self) -> Recorder:
         try:
-            self._file = _WholeWrites(self._path)
+            self._file = _AtomicWrites(self._path)
         except OSError as error:
             raise self._error(error, "") from error
         self._messages = MessageWriter(self._file, self._path, self._note, self._attached, Writer)
@@ -99,7 +99,9 @@ class Recorder:
             raise self._failure
 
     def _lost(self, error: OSError) -> RecordingError:
-        return self._error(error, f"; what came before is safe: make room, then `scanwright repair {self._path}`")
+        return self._error(
+            error, f"; what came before is on the disk: free space, then `scanwright repair {self._path}`"
+        )
 
     def _error(self, error: OSError, advice: str) -> RecordingError:
         return RecordingError(f"{self._path}: cannot write: {error.strerror or error}{advice}")
@@ -125,7 +127,7 @@ def recorder_of(
     return Recorder(path, note, attached)
 
 
-class _WholeWrites:
+class _AtomicWrites:
     """A new file that grows by what was written between two flushes, or not at all."""
 
     def __init__(self, path: Path) -> None:

@@ -11,7 +11,7 @@ from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 Outcome = Literal["done", "lossy", "stopped", "failed", "unsafe"]
 
-_UNHEARD = "what the servo does was not heard: look, and cut its power if it turns"
+_SERVO_UNKNOWN = "state of the servo unknown: look, and cut its power if it turns"
 _HEADINGS: dict[Outcome, str] = {
     "done": "The scan is done.",
     "lossy": "The scan is done, but data were lost.",
@@ -64,7 +64,7 @@ def stopped(stop: KeyboardInterrupt) -> ScanEnd:
     """Return the end of a scan that a person stopped; unsafe without an answer of the servo."""
     notes = notes_of(stop)
     unsafe = not notes or _has_unsafe_note(stop)
-    return ScanEnd("unsafe" if unsafe else "stopped", ("stopped", *(notes or [_UNHEARD])))
+    return ScanEnd("unsafe" if unsafe else "stopped", ("stopped", *(notes or [_SERVO_UNKNOWN])))
 
 
 def _has_unsafe_note(error: BaseException) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-ON_THE_WAY = "scans taken on the way"  # between two stops: left out by design
+BETWEEN_STOPS = "scans between two stops"  # between two stops: left out by design
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,18 +37,18 @@ class ScanSummary:
     @property
     def lost_data(self) -> bool:
         """Whether data are missing that the motion does not leave out by design."""
-        return bool(self.reconnects or set(self.left_out) - {ON_THE_WAY})
+        return bool(self.reconnects or set(self.left_out) - {BETWEEN_STOPS})
 
     def lines(self) -> list[str]:
         """The same in words."""
-        lines = [f"left out {count:,}: {reason}" for reason, count in self.left_out.items()]
+        lines = [f"dropped {count:,}: {reason}" for reason, count in self.left_out.items()]
         if self.reconnects:
-            lines.append(f"the lidar was away {self.reconnects} times")
+            lines.append(f"lidar reconnects: {self.reconnects}")
         if self.speed_deg_s:
-            lines.append(f"servo turned at {self.speed_deg_s:.2f} deg/s, ripple {self.ripple_deg:.3f} deg")
+            lines.append(f"servo speed: {self.speed_deg_s:.2f} deg/s, rms deviation {self.ripple_deg:.3f} deg")
         return [
             *lines,
-            f"beams are timed to {self.clock_ns / 1e6:.2f} ms",
+            f"timestamp uncertainty: {self.clock_ns / 1e6:.2f} ms per beam",
             f"recorded {self.scans:,} scans and {self.joint_samples:,} angles, {self.duration_s:.1f} s, "
             f"to {self.recording}",
         ]

@@ -35,9 +35,9 @@ def set_address(
             file cannot be written. But for the last two nothing was changed.
     """
     if new_id is None and new_baud is None:
-        raise DeviceError(f"{port}: nothing to set: give --id, --baud or both")
+        raise DeviceError(f"{port}: nothing to set: give new_id, new_baud or both")
     if new_id is not None and new_id not in _IDS:
-        raise DeviceError(f"--id = {new_id}: servos have numbers from 0 to {_IDS[-1]}")
+        raise DeviceError(f"new_id = {new_id}: servos have numbers from 0 to {_IDS[-1]}")
     with closing(open_bus(port)) as bus:
         unit = _only(bus, from_id, from_baud)
         table = unit.table
@@ -48,14 +48,14 @@ def set_address(
         }
         changes = [(one, was, count) for one, count in wanted.items() if (was := unit.count(one)) != count]
         if not changes:
-            yield f"{unit}: it has that number and speed already"
+            yield f"{unit}: number and speed are right already"
             return
         check_torque(unit)
         _refuse_collision(unit, wanted)
         yield keep_settings(folder, unit, changes)
         for register, was, count in changes:
-            unit, said = changed(unit, register, was, count)
-            yield said
+            unit, line = changed(unit, register, was, count)
+            yield line
 
 
 def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUnit:
@@ -70,8 +70,8 @@ def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUni
         if len(there) > 1:
             seen = ", ".join(f"{number} at {baud} baud" for baud, number in there)
             raise DeviceError(
-                f"{bus.port}: several servos answer ({seen}): leave one on the cable, or say which with --from-id "
-                "and --from-baud; nothing was changed"
+                f"{bus.port}: several servos answer ({seen}): leave one on the cable, or give from_id and "
+                "from_baud; nothing was changed"
             )
     return find_servo(bus, None, from_id, baud=from_baud)
 
@@ -86,7 +86,7 @@ def _refuse_collision(unit: ServoUnit, wanted: dict[Register, int]) -> None:
     new_id, new_baud = wanted[table.id], table.bauds[wanted[table.baud]]
     if not bus.set_baud(new_baud):
         raise DeviceError(f"{bus.port}: this adapter cannot do {new_baud} baud; nothing was changed")
-    taken = bus.ping(new_id, PING_S)  # it is not the servo itself: number or speed are others
+    answering = bus.ping(new_id, PING_S)  # it is not the servo itself: number or speed are others
     bus.set_baud(before)
-    if taken:
+    if answering:
         raise DeviceError(f"{bus.port}: a servo {new_id} answers at {new_baud} baud already; nothing was changed")

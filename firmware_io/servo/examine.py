@@ -18,9 +18,9 @@ class ServoExamination:
     """A servo as it was found.
 
     Attributes:
-        who: port and number.
+        name: port and number.
         model: name, as in the catalogue.
-        speaks: protocol and speed, in words.
+        protocol: protocol and speed, in words.
         reports: what it says is wrong with it; None where it is well.
         has_torque: something has driven it.
         unfit: settings that are not as the driver wants them.
@@ -31,9 +31,9 @@ class ServoExamination:
         temperature_degC: inside.
     """
 
-    who: str
+    name: str
     model: str
-    speaks: str
+    protocol: str
     reports: str | None
     has_torque: bool
     unfit: tuple[SettingChange, ...]
@@ -60,16 +60,16 @@ def examine_servo(port: str, model: str | None, servo_id: int | None, *, spins: 
         listen_first(bus)
         unit = find_servo(bus, model, servo_id)
         table = unit.table
-        reports, has_torque = unit.told(unit.present()), unit.has_torque()
+        reports, has_torque = unit.reported_fault(unit.present()), unit.has_torque()
         unfit = tuple(unfit_settings(unit, spins=spins))
         bus.return_delay_ns = unit.value(table.return_delay_ns)
         began_s = time.monotonic()
         answers = [unit.present() for _ in range(_READS)]
         reads_hz = _READS / (time.monotonic() - began_s)
         return ServoExamination(
-            who=str(unit),
+            name=str(unit),
             model=table.model,
-            speaks=f"protocol {table.protocol} at {bus.baud} baud",
+            protocol=f"protocol {table.protocol} at {bus.baud} baud",
             reports=reports,
             has_torque=has_torque,
             unfit=unfit,

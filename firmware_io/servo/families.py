@@ -25,14 +25,14 @@ class ServoFamily:
         name: of the family.
         tables: of its models.
         bauds: bits per second, those first that servos are set to most.
-        twin: "package.module:Class" of its `firmware_io.emulators.servo.machine.ServoMachine`, made of (control table,
-            load on the horn, time in ns, angle of the horn); a text, since drivers must not import emulators.
+        emulator: "package.module:Class" of its `emulators.servo.machine.ServoMachine`, made of (control table, load on
+            the horn, time in ns, angle of the horn); drivers import no emulators.
     """
 
     name: str
     tables: tuple[ControlTable, ...]
     bauds: tuple[int, ...]
-    twin: str
+    emulator: str
 
     def formats(self, model: str | None) -> tuple[PacketFormat, ...]:
         """How the servos of that name, or all of them, pack what they say."""

@@ -48,25 +48,25 @@ def find_servo(
     """
     if model is not None and model not in {table.model for table in all_tables()}:
         known = f"known: {', '.join(sorted({table.model for table in all_tables()}))}"
-        raise DeviceError(f"{bus.port}: model = {model!r}: not one this program can drive; {removal(model) or known}")
+        raise DeviceError(f"{bus.port}: model = {model!r}: no driver for this model; {removal(model) or known}")
     bus.find_echo()
     mute: tuple[int, str, int] | None = None
     met: set[str] = set()
     for wait_s in (PING_S, _PATIENT_PING_S):  # adapter or servo may still be starting, or this computer be busy
         strangers = []
         for unit in _answering(bus, model, servo_id, baud, wait_s):
-            found = _identity(unit)
-            if was_mute := found is None and _may_unmute(unit.table, unmute):
+            identity = _identity(unit)
+            if was_mute := identity is None and _may_unmute(unit.table, unmute):
                 unit.answer_everything()
-                found = _identity(unit)
-            if isinstance(found, ControlTable):
-                if model not in (None, found.model):
-                    wrong = f"the model of servo {unit.id} is {found.model}, not {model}"
-                    raise DeviceError(f"{bus.port}: {wrong}: look at cable and task")
-                return ServoUnit(bus, found, unit.id, was_mute)
+                identity = _identity(unit)
+            if isinstance(identity, ControlTable):
+                if model not in (None, identity.model):
+                    wrong = f"the model of servo {unit.id} is {identity.model}, not {model}"
+                    raise DeviceError(f"{bus.port}: {wrong}: check cable and task")
+                return ServoUnit(bus, identity, unit.id, was_mute)
             here = bus.baud, bus.packets.protocol, unit.id
-            if found is not None:
-                strangers.append(f"servo {unit.id} has model number {found} in protocol {bus.packets.protocol}")
+            if identity is not None:
+                strangers.append(f"servo {unit.id} has model number {identity} in protocol {bus.packets.protocol}")
             elif unit.table.can_be_mute and mute == here:
                 if (
                     unmute == "until power-off"
@@ -79,16 +79,16 @@ def find_servo(
             known = ", ".join(f"{table.number} {table.model}" for table in all_tables())
             raise DeviceError(f"{bus.port}: {', '.join(strangers)}, which is unknown; known: {known}")
         met |= set(strangers)
-    who = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
-    speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _ways(model, baud)))
-    raise DeviceTimeoutError(f"{bus.port}: {who} at {speeds} baud: look at its power, its cable, its id")
+    missing = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
+    speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _line_settings(model, baud)))
+    raise DeviceTimeoutError(f"{bus.port}: {missing} at {speeds} baud: check its power, cable and number")
 
 
 def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
     level = table.status_return
     if not table.can_be_mute:
         return False
-    return unmute == "for good" or (unmute == "until power-off" and not table.is_kept(level))
+    return unmute == "for good" or (unmute == "until power-off" and not table.is_permanent(level))
 
 
 def listen_first(bus: ServoBus) -> None:
@@ -97,36 +97,36 @@ def listen_first(bus: ServoBus) -> None:
     Raises:
         DeviceError: somebody does.
     """
-    if heard := bus.listen(_LISTEN_S):
+    if noise := bus.listen(_LISTEN_S):
         raise DeviceError(
-            f"{bus.port}: {len(heard)} bytes came unasked, and a servo never speaks first: another program drives "
-            "this bus, or something else hangs on this port; nothing was sent to it"
+            f"{bus.port}: {len(noise)} bytes came before any request: another program drives this bus, or no "
+            "servo is on this port; nothing was sent"
         )
 
 
 def all_answering(bus: ServoBus, baud: int | None) -> list[tuple[int, int]]:
     """Speed and number of every servo that answers a ping, at one speed or at all that are known."""
     bus.find_echo()
-    found = set()
-    for speed, packets in _ways(None, baud):
+    answering = set()
+    for speed, packets in _line_settings(None, baud):
         bus.packets = packets
         if bus.set_baud(speed):
-            found |= {(speed, number) for number in bus.ping(packets.everyone, PING_S)}
-    return sorted(found)
+            answering |= {(speed, number) for number in bus.ping(packets.everyone, PING_S)}
+    return sorted(answering)
 
 
-def _ways(model: str | None, baud: int | None) -> Iterator[tuple[int, PacketFormat]]:
+def _line_settings(model: str | None, baud: int | None) -> Iterator[tuple[int, PacketFormat]]:
     """Speeds and packets to ask with: every family's first speed before any one's second."""
     families = all_families().values()
     most = max(len(family.bauds) for family in families)
-    asked = set()
+    tried = set()
     for rank in range(most):
         for family in families:
             for packets in family.formats(model):
                 speeds = family.bauds[rank : rank + 1] if baud is None else (baud,)
                 for speed in speeds:
-                    if (speed, packets) not in asked:
-                        asked.add((speed, packets))
+                    if (speed, packets) not in tried:
+                        tried.add((speed, packets))
                         yield speed, packets
 
 
@@ -138,12 +138,12 @@ def _answering(
     Raises:
         DeviceError: several answer.
     """
-    for speed, packets in _ways(model, baud):
+    for speed, packets in _line_settings(model, baud):
         bus.packets = packets
         if bus.set_baud(speed):
             answering = bus.ping(packets.everyone if servo_id is None else servo_id, wait_s)
             if len(answering) > 1:
-                raise DeviceError(f"{bus.port}: servos {answering} answer: say which one with --servo-id")
+                raise DeviceError(f"{bus.port}: servos {answering} answer: give servo_id")
             if answering:
                 yield ServoUnit(bus, _any_table(packets), answering[0])
 

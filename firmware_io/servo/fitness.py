@@ -12,7 +12,7 @@ from scanwright.firmware_io.servo.bus.unit import ServoUnit
 
 _READ_S = 0.007  # of bytes, so that with 3 ms for adapter and program 100 readings fit into a second
 _MUTE = "so that it answers nothing but pings"
-_ANSWERS_LESS = "so that it does not answer what it is told"
+_ANSWERS_LESS = "so that it does not answer writes"
 _NEUTRAL = "which turns or shifts the angles"
 _MODE = {True: "so that it does not turn continuously", False: "so that it does not go to every angle"}
 
@@ -95,7 +95,7 @@ def needed_changes(unit: ServoUnit, *, spins: bool | None) -> list[SettingChange
 def improvements(unit: ServoUnit) -> list[SettingChange]:
     """The settings that differ and that the driver can do without, if less well; only reads."""
     delay = unit.table.return_delay_ns
-    late = f"so that its answers come {unit.value(delay) / 1e3:g} us late"
+    late = f"so that its answers are {unit.value(delay) / 1e3:g} us late"
     return [*_differing(unit, [((delay, 0), late)]), *_slow(unit)]
 
 
@@ -131,8 +131,8 @@ def slow_adapter(port: str) -> str | None:
     if latency_ms <= 1:
         return None
     return (
-        f"the USB adapter gathers bytes for {latency_ms} ms, so angles come late and seldom: as root, "
-        f'echo 1 > {timer}, or for good a udev rule with ATTR{{latency_timer}}="1"'
+        f"the USB adapter gathers bytes for {latency_ms} ms, so angles are late and few: as root, "
+        f'echo 1 > {timer}, or permanently a udev rule with ATTR{{latency_timer}}="1"'
     )
 
 
@@ -151,5 +151,5 @@ def _slow(unit: ServoUnit) -> Iterator[SettingChange]:
     table, baud = unit.table, unit.bus.baud
     if (wire_s := _reading_s(table, baud)) > _READ_S:
         register, count = table.fast
-        why = f"{baud} baud, so that it can be read {1 / wire_s:.0f} times a second at best"
+        why = f"{baud} baud, so that it can be read at {1 / wire_s:.0f} Hz at most"
         yield SettingChange(register, unit.count(register), count, why)

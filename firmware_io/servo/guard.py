@@ -48,7 +48,7 @@ class Guard:
         )
         assert self._process.stdin and self._process.stdout
         self._words, ready = self._process.stdin, self._process.stdout
-        self._said_s = 0.0
+        self._sent_s = 0.0
         with ready:
             if ready.read(1) != b"!":
                 self._words.close()
@@ -56,26 +56,26 @@ class Guard:
 
     def turning(self) -> bool:
         """The servo turns from now on, and the program is alive; False if the guard has stopped it."""
-        return self._say(_TURNING)
+        return self._send(_TURNING)
 
     def resting(self) -> bool:
         """The servo stands; silence is fine."""
-        return self._say(_RESTING)
+        return self._send(_RESTING)
 
     def beat(self) -> bool:
         """The program is alive, said at most ten times a second."""
-        return time.monotonic() - self._said_s < 0.1 or self._say(_TURNING)
+        return time.monotonic() - self._sent_s < 0.1 or self._send(_TURNING)
 
-    def dismiss(self, stands: bool) -> bool:
+    def dismiss(self, at_rest: bool) -> bool:
         """End the guard, which first stops the servo if it does not stand; whether it does now. May be called again."""
         if not self._words.closed:
-            if stands:
-                self._say(_DONE)
+            if at_rest:
+                self._send(_DONE)
             self._words.close()
         return self._process.wait() == 0
 
-    def _say(self, word: bytes) -> bool:
-        self._said_s = time.monotonic()
+    def _send(self, word: bytes) -> bool:
+        self._sent_s = time.monotonic()
         try:
             self._words.write(word)
         except (BrokenPipeError, ValueError):  # it has ended, or was dismissed
@@ -114,13 +114,13 @@ def stop(port_fd: int, packet: bytes, answer: bytes) -> None:
     while time.monotonic() < end_s:
         termios.tcflush(port_fd, termios.TCIFLUSH)  # an answer to the dead program is none to us
         os.write(port_fd, packet)
-        heard, until_s = b"", time.monotonic() + _ANSWER_S
+        received, until_s = b"", time.monotonic() + _ANSWER_S
         while select.select([port_fd], [], [], max(0.0, until_s - time.monotonic()))[0]:
             some = os.read(port_fd, 4096)
             if not some:
                 raise OSError("the port is gone")
-            heard += some
-            if answer in heard:
+            received += some
+            if answer in received:
                 return
     raise OSError("no answer")
 

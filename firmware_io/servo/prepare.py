@@ -33,14 +33,14 @@ def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) ->
         DeviceError: the servo does not answer, or does not keep a setting.
     """
     table, bus = unit.table, unit.bus
-    if not table.is_kept(table.status_return):
+    if not table.is_permanent(table.status_return):
         unit.answer_everything()
     _torque_off(unit)
     changes = needed_changes(unit, spins=spins)
     set_agreed(unit, changes, undo_folder)
     notes = [f"{change.register} was {change.now}, {change.why}: set to {change.needed}" for change in changes]
-    if reported := unit.told(unit.present()):
-        notes.append(f"it reported {reported} and was reset: find out why before it turns again")
+    if reported := unit.reported_fault(unit.present()):
+        notes.append(f"it reported {reported} and was reset: find the cause before it turns again")
         _recover(unit)
     bus.return_delay_ns = unit.value(table.return_delay_ns)
     bus.lower_latency()
@@ -61,15 +61,15 @@ def set_agreed(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: P
         ServoSetupError: a setting outlasts the power and there is no folder; nothing was written.
         DeviceError: the file cannot be written, or a setting does not stay.
     """
-    kept = [change for change in changes if unit.table.is_kept(change.register)]
-    if kept and undo_folder is None:
-        raise ServoSetupError(unit.bus.port, unit.table.model, unit.id, kept)
-    if kept and undo_folder is not None:
-        for _ in write_changes(unit, kept, undo_folder):
+    permanent = [change for change in changes if unit.table.is_permanent(change.register)]
+    if permanent and undo_folder is None:
+        raise ServoSetupError(unit.bus.port, unit.table.model, unit.id, permanent)
+    if permanent and undo_folder is not None:
+        for _ in write_changes(unit, permanent, undo_folder):
             pass
     for change in changes:
-        if change not in kept:
-            unit.set_kept(change.register, change.needed)
+        if change not in permanent:
+            unit.set_permanent(change.register, change.needed)
 
 
 def _torque_off(unit: ServoUnit) -> None:

@@ -62,7 +62,7 @@ class Stall:
     def __str__(self) -> str:
         stuck = math.isnan(self.moved_rad)
         moved = "stuck in the dead sector" if stuck else f"moved {math.degrees(self.moved_rad):.1f} deg"
-        return f"stall: {moved} where {math.degrees(self.due_rad):.1f} were due"
+        return f"stall: {moved} instead of {math.degrees(self.due_rad):.1f}"
 
 
 def follow(order: TurnOrder, state: ServoState, step_rad: float) -> TurnOrder | Stall | None:

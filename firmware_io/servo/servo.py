@@ -31,13 +31,13 @@ from scanwright.firmware_io.servo.prepare import prepare, set_agreed
 from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
 from scanwright.firmware_io.servo.reading import state_of
 
-_GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it stands in its dead sector when it begins to hold
+_GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it is in its dead sector when it begins to hold
 
 _IS_OFF = "has answered that its torque is off"
 _ADVICE = {
-    "overload": "free what brakes the axis, balance or lighten the head, then open the servo again",
-    "overheating": "let it cool down; then a lower rate or a lighter head",
-    "voltage": "look at its supply and the cable to it",
+    "overload": "free the axis, balance or lighten the head, then open the servo again",
+    "overheating": "let it cool down; then use a lower rate or a lighter head",
+    "voltage": "check its supply and the cable to it",
 }
 
 
@@ -97,9 +97,9 @@ class ServoDriver:
         except BaseException as error:  # Ctrl-C again, too: the guard insists
             trouble = error
         self._bus.close()
-        heard = self._guard.dismiss(stands=trouble is None)  # which tries longer
-        if trouble and not heard:
-            raise UnsafeError(f"{self}: could not be stopped: take its power ({trouble})") from trouble
+        answered = self._guard.dismiss(at_rest=trouble is None)  # which tries longer
+        if trouble and not answered:
+            raise UnsafeError(f"{self}: could not be stopped: cut its power ({trouble})") from trouble
         if trouble and not isinstance(trouble, DeviceError):
             trouble.add_note(f"{self} {_IS_OFF}")
             raise trouble
@@ -185,7 +185,7 @@ class ServoDriver:
     def _observe(self) -> ServoState:
         answer = self._unit.present()
         if answer.conditions:
-            self._fault(self._told(answer))
+            self._fault(self._reported_fault(answer))
         state = state_of(self._table, answer, spins=bool(self._spins), known=self._known, order=self._order)
         if not math.isnan(state.position_rad):
             self._known = state
@@ -202,11 +202,11 @@ class ServoDriver:
             self._rest()
         return progress
 
-    def _told(self, answer: ServoAnswer) -> str:
+    def _reported_fault(self, answer: ServoAnswer) -> str:
         """What it reports of itself, and what to do about it."""
-        table, names = self._table, self._unit.told(answer) or ""
+        table, names = self._table, self._unit.reported_fault(answer) or ""
         volts, degC = table.pick(table.voltage, answer.data), table.pick(table.temperature, answer.data)
-        broken = "switch its power off and on; if it comes again, the servo is broken"
+        broken = "switch its power off and on; if it occurs again, the servo is broken"
         advice = next((text for name, text in _ADVICE.items() if name in names), broken)
         return f"{names} at {volts:.1f} V, {degC:.0f} degC: {advice}"
 
@@ -220,8 +220,8 @@ class ServoDriver:
 
     def _neglected(self) -> NoReturn:
         self._order, self._spins = None, None
-        heard = self._guard.dismiss(stands=False)
-        stopped = "so it was stopped" if heard else "and did not answer when it was to be stopped: take its power"
+        answered = self._guard.dismiss(at_rest=False)
+        stopped = "so it was stopped" if answered else "and did not answer the order to stop: cut its power"
         neglected = f"not read for {SILENCE_S:g} s while it turned, {stopped}"
         raise DeviceError(f"{self}: {neglected}: read it more often, open it again")
 

@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import Field, ValidationError
 
 from scanwright.design.errors import DeviceError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.bus.unit import ServoUnit
@@ -73,7 +73,7 @@ def set_up(
         if changes:
             yield from write_changes(unit, changes, undo_folder)
         else:
-            yield f"{unit} ({unit.table.model}): every setting is as it should be"
+            yield f"{unit} ({unit.table.model}): every setting is right"
 
 
 def wanted_changes(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> list[SettingChange]:
@@ -101,7 +101,7 @@ def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder
         if (now := unit.count(change.register)) != change.needed:
             raise DeviceError(
                 f"{unit}: {change.register}: {change.needed} was written, and it is {now} again: the servo has "
-                "restarted or does not keep it: look at its supply; nothing was moved"
+                "restarted or does not keep it: check its supply; nothing was moved"
             )
 
 
@@ -111,7 +111,8 @@ def _still_true(unit: ServoUnit, agreed: Sequence[SettingChange]) -> Sequence[Se
         muted = unit.was_mute and change.register == unit.table.status_return
         if not muted and (now := unit.count(change.register)) != change.now:
             raise DeviceError(
-                f"{unit}: {change.register} is {now}, and was {change.now} before: another servo? nothing was written"
+                f"{unit}: {change.register} is {now}, and was {change.now} before: it may be another servo; "
+                "nothing was written"
             )
     return agreed
 
@@ -123,7 +124,7 @@ def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Registe
         DeviceError: the file cannot be written; nothing was changed then.
     """
     model, at = unit.table.model, f"{datetime.now():%Y%m%d-%H%M%S}"
-    kept = ServoSettings(
+    saved = ServoSettings(
         schema_name="scanwright/servo-settings/1",
         port=unit.bus.port,
         model=model,
@@ -133,7 +134,7 @@ def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Registe
             ServoSetting(register_name=register.name, before=was, after=needed) for register, was, needed in changes
         ),
     )
-    return _write(folder, f"servo-{model}-{unit.id}-{at}", kept)
+    return _write(folder, f"servo-{model}-{unit.id}-{at}", saved)
 
 
 def restore(file: Path, port: str | None) -> Iterator[str]:
@@ -147,29 +148,29 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
         DeviceError: no such file, no such servo, it holds its torque, or keeps a count.
     """
     try:
-        kept = ServoSettings.model_validate_json(file.read_bytes())
+        saved = ServoSettings.model_validate_json(file.read_bytes())
     except OSError as error:
         raise DeviceError(f"{file}: cannot read: {error.strerror}") from error
     except ValidationError as error:
-        raise DeviceError(explain(error, file, ServoSettings)) from error
-    expected = [table for table in all_tables() if (table.model, table.protocol) == (kept.model, kept.protocol)]
+        raise DeviceError(format_validation_error(error, file, ServoSettings)) from error
+    expected = [table for table in all_tables() if (table.model, table.protocol) == (saved.model, saved.protocol)]
     known = settable(expected[0]) if expected else {}
-    for setting in kept.settings:
+    for setting in saved.settings:
         register = known.get(setting.register_name)
         fits = register is not None and register.bounds[0] <= setting.before <= register.bounds[1]
         if register is None or not fits or (register == expected[0].baud and setting.before not in expected[0].bauds):
             what = f"{setting.register_name} = {setting.before}"
-            raise DeviceError(f"{file}: {kept.model} of protocol {kept.protocol} has no setting {what}")
-    with closing(open_bus(port or kept.port)) as bus:
-        now_id = next((one.after for one in kept.settings if known[one.register_name] == expected[0].id), kept.id)
-        unit = find_servo(bus, kept.model, now_id, unmute="for good")
+            raise DeviceError(f"{file}: {saved.model} of protocol {saved.protocol} has no setting {what}")
+    with closing(open_bus(port or saved.port)) as bus:
+        now_id = next((one.after for one in saved.settings if known[one.register_name] == expected[0].id), saved.id)
+        unit = find_servo(bus, saved.model, now_id, unmute="for good")
         if unit.table != expected[0]:
-            raise DeviceError(f"{unit} speaks protocol {unit.table.protocol}, not {kept.protocol}")
+            raise DeviceError(f"{unit} speaks protocol {unit.table.protocol}, not {saved.protocol}")
         check_torque(unit)
-        for setting in reversed(kept.settings):
+        for setting in reversed(saved.settings):
             register = known[setting.register_name]
-            unit, said = changed(unit, register, unit.count(register), setting.before)
-            yield said
+            unit, line = changed(unit, register, unit.count(register), setting.before)
+            yield line
 
 
 def check_torque(unit: ServoUnit) -> None:
@@ -181,7 +182,7 @@ def check_torque(unit: ServoUnit) -> None:
     if unit.has_torque():
         raise DeviceError(
             f"{unit} has its torque on, and holds or turns something: "
-            "end what drives it, or switch its power off and on; nothing was changed"
+            "end the program that drives it, or switch it off and on; nothing was changed"
         )
 
 
@@ -202,11 +203,11 @@ def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple
         unit.set_answers(register, needed)
         return unit, f"{unit}: {register}: {was} -> {needed}; it was not read back"
     else:
-        unit.set_kept(register, needed)
+        unit.set_permanent(register, needed)
     return now, f"{unit}: {register}: {was} -> {now.count(register)}"
 
 
-def _write(folder: Path, stem: str, kept: ServoSettings) -> Path:
+def _write(folder: Path, stem: str, saved: ServoSettings) -> Path:
     """Write a file of a new name, which is on the disk before anything is changed; the file."""
     file, again = folder / f"{stem}.json", 1
     while os.path.lexists(file):  # two changes within a second
@@ -214,7 +215,7 @@ def _write(folder: Path, stem: str, kept: ServoSettings) -> Path:
         file = folder / f"{stem}-{again}.json"
     try:
         with file.open("x", encoding="utf-8") as out:
-            out.write(kept.model_dump_json(by_alias=True, indent=2) + "\n")
+            out.write(saved.model_dump_json(by_alias=True, indent=2) + "\n")
             out.flush()
             os.fsync(out.fileno())
     except OSError as error:

@@ -16,11 +16,11 @@ TaskLike = LoadedTask | str | Path | Mapping[str, Any]
 """A loaded task, the name of a shipped one, a file, a build folder, or a table with the keys of a task file."""
 AnglesLike = AngleSet | str | Path
 """An angle set, or the file of one."""
-Say = Callable[[str], None]
+Say = Callable[..., None]
 """Is told what is being done, a line at a time."""
 
 
-def quiet(_line: str) -> None:
+def quiet(_line: str, _fraction: float | None = None) -> None:
     """Progress that nobody asked for."""
 
 

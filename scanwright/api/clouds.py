@@ -55,7 +55,7 @@ def register(
     given = None if start is None else Path(start)
     scanner = None if angles is None else as_angle_set(angles)
     paths = [Path(cloud) for cloud in clouds]
-    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, say)
+    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, lambda step, _=None: say(step))
 
 
 def make_map(
@@ -99,7 +99,18 @@ def make_map(
     scanner = None if angles is None else as_angle_set(angles)
     tum = None if poses is None else Path(poses)
     paths = [Path(cloud) for cloud in clouds]
-    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, seen_through_m, say)
+    return map_files(
+        paths,
+        Path(out),
+        scanner,
+        tum,
+        floor_m,
+        from_m,
+        to_m,
+        resolution_m,
+        seen_through_m,
+        lambda step, _=None: say(step),
+    )
 
 
 def read_cloud(path: str | Path) -> Cloud:
@@ -136,4 +147,4 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organi
         RecordingError: the format is not known or cannot hold this, or the file cannot be written.
     """
     record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud) * 1.0)
-    return list(write_clouds(Path(path), [record], organised=organised).said)
+    return list(write_clouds(Path(path), [record], organised=organised).notes)

@@ -14,7 +14,7 @@ from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
-from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.clouds.formats import check_target
 from scanwright.firmware_io.ros import robot_frames
 
@@ -128,7 +128,7 @@ def assemble(
     limits, finish = BeamLimits(min_range_m, max_range_m, edges_deg), Finish(outliers, voxel_m, normals)
     if organised and finish.thins:
         raise RecordingError(f"{target}: organised: every beam keeps its row, so none can go: leave out --organised")
-    platform, said = _platform(recording, poses, imu, imu_rpy_deg)
+    platform, notes = _platform(recording, poses, imu, imu_rpy_deg)
     paint = None
     if camera is not None:
         from scanwright.firmware_io.colour.paint import painter
@@ -145,15 +145,15 @@ def assemble(
             lag_s=lag_s,
             per=per,
             poses=platform,
-            own_body=None if isinstance(angles, AngleSet) else own_body_beside(Path(angles)),
+            own_body=None if isinstance(angles, AngleSet) else own_body_of(Path(angles)),
             smooth=smooth,
             columns=columns,
             beams=limits,
         )
         if paint is not None:
-            said += [paint(cloud).line(cloud) for cloud in summary.clouds]
+            notes += [paint(cloud).line(cloud) for cloud in summary.clouds]
             summary = summary if organised else replace(summary, rows=summary.points, width=0, padding=0)
-        summary = replace(summary, said=(*summary.said, *said))
+        summary = replace(summary, notes=(*summary.notes, *notes))
         if finished:
             summary = finish_clouds(summary, target, finish, seen_from(scanner, platform), organised=organised)
     return summary
@@ -207,18 +207,20 @@ def calibrate(
     check_place(target, RecordingError)
     if not isinstance(angles, AngleSet) and target.resolve() == Path(angles).resolve():
         raise RecordingError(f"{target}: holds the angles that are to be calibrated: write to another file (-o)")
-    own_body = None if isinstance(angles, AngleSet) else own_body_beside(Path(angles))
+    own_body = None if isinstance(angles, AngleSet) else own_body_of(Path(angles))
     beside = None if isinstance(angles, AngleSet) else Path(angles).with_name(robot_frames.URDF)
     urdf = robot_frames.calibrated_urdf_place(target)
     designed = beside if beside and beside.is_file() and beside.resolve() != urdf.resolve() else None
     if designed:
         robot_frames.with_frames(robot_frames.read_urdf(designed), before, str(designed))  # refused before the work
     paths = [Path(recording) for recording in recordings]
-    found = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, say=say)
+    found = calibrate_recordings(
+        paths, before, target, one_place=one_place, own_body=own_body, progress=lambda step, _=None: say(step)
+    )
     if designed:
         robot_frames.write_calibrated_urdf(designed, urdf, found.angles)
     fixed = robot_frames.fixed_frames(found.angles)
-    said = [*robot_frames.what_changed(before, found.angles), *([f"wrote {urdf}"] if designed else [])]
-    said += [f"  {frame.command()}" for frame in fixed]
-    said += ["as parameters of a launch file:", *(f"  {frame.launch_parameters()}" for frame in fixed)]
-    return replace(found, frames=tuple(said))
+    notes = [*robot_frames.what_changed(before, found.angles), *([f"wrote {urdf}"] if designed else [])]
+    notes += [f"  {frame.command()}" for frame in fixed]
+    notes += ["as parameters of a launch file:", *(f"  {frame.launch_parameters()}" for frame in fixed)]
+    return replace(found, frames=tuple(notes))

@@ -139,8 +139,9 @@ class Progress:
     said_s: float = -math.inf
     said: str = ""
 
-    def __call__(self, line: str) -> None:
+    def __call__(self, line: str, fraction: float | None = None) -> None:
         """Say it."""
+        line = line if fraction is None else f"{fraction:4.0%}  {line}"
         if voice() is Voice.QUIET:
             return
         now_s = self.clock()

@@ -13,7 +13,7 @@ import typer
 
 from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
 from scanwright.cli.help import Commands
-from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command, undo_command
+from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command
 from scanwright.design.errors import DeviceError, ScanwrightError, notes_of, require
 from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
@@ -96,11 +96,12 @@ def emulate(
         on_duty(),
         emulated_scanner(
             angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed, factory_servo=factory_servo
-        ) as twins,
-        announced(out, twins.ports),
+        ) as emulators,
+        announced(out, emulators.ports),
     ):
-        print(f"lidar {angles.sensor} at {' and '.join(filter(None, [twins.ports.lidar, twins.lidar.address]))}")
-        print(f"servo {angles.servo} at {twins.ports.servo}")
+        places = filter(None, [emulators.ports.lidar, emulators.lidar.address])
+        print(f"lidar {angles.sensor} at {' and '.join(places)}")
+        print(f"servo {angles.servo} at {emulators.ports.servo}")
         print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
         Event().wait()
 
@@ -260,25 +261,22 @@ def doctor(
     ] = None,
 ) -> None:
     """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
-    from itertools import chain
-
-    from scanwright.firmware_io.scan import doctor as examination
+    from scanwright.firmware_io.scan import doctor as diagnosis
+    from scanwright.firmware_io.servo import settings
 
     if restore is not None:
-        findings = examination.restore(restore, servo)
-    else:
-        fixed = examination.fix(out, servo, servo_id) if fix else iter(())
-        findings = chain(fixed, examination.examine(out, lidar, servo, servo_id))
-    wrong = False
-    for finding in findings:
-        remedy = ""
-        if finding.set_up is not None and finding.undo is not None:
-            remedy = f": `{undo_command(finding.set_up, finding.undo)}` restores them"
-        elif finding.set_up is not None:
-            remedy = f": `{set_up_command(finding.set_up, out, servo_id)}` sets it"
-        print(f"{finding.verdict:8} {finding.says}{remedy}", flush=True)
-        wrong |= finding.verdict == "wrong"
-    raise typer.Exit(1 if wrong else 0)
+        print_steps("", settings.restore(restore, servo))
+        return
+    if fix:
+        print_steps(*diagnosis.fix(out, servo, servo_id))
+    failed = False
+    for finding in diagnosis.examine(out, lidar, servo, servo_id):
+        hint = finding.hint
+        if finding.code == diagnosis.SERVO_SETTING:
+            hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
+        print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
+        failed |= finding.severity == "error"
+    raise typer.Exit(1 if failed else 0)
 
 
 @app.command("servo-setup")

@@ -99,7 +99,7 @@ class FoxgloveChannels:
         self._log(SCAN_TOPIC, ros_messages.encode_scan(replace(scan, stamp_ns=at_ns)), at_ns)
         self._push(scan)
 
-    def told(self, line: str) -> None:
+    def message(self, line: str) -> None:
         """Nothing: no channel is of words."""
 
     def close(self) -> None:

@@ -18,10 +18,10 @@ from mcap.writer import Writer
 
 from scanwright.design.angles import angles_in_use, load_angles
 from scanwright.design.errors import RecordingError, TaskError
-from scanwright.design.files.atomic_file import check_place, whole_file
-from scanwright.firmware_io.assembly.own_body import own_body_beside
+from scanwright.design.files.atomic_file import atomic_write, check_place
+from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, held_by
+from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
@@ -89,7 +89,7 @@ def write_for_foxglove(recording: Path, angles: Path, out: Path) -> int:
     check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: Foxglove reads MCAP; name it {out.with_suffix('.mcap').name}")
-    with whole_file(out, RecordingError) as part, mcap_log(part) as log:
+    with atomic_write(out, RecordingError) as part, mcap_log(part) as log:
         shown = _shown(recording, angles, log)
         scans, _ = replay(recording, shown, wait_until=lambda _: None)
         shown.close()
@@ -112,9 +112,9 @@ def mcap_log(path: Path) -> Iterator[Log]:
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
     found = load_angles(angles)
-    smooth = not held_by(read_note(recording, NOTE))
+    smooth = not rests_in_scans(read_note(recording, NOTE))
     urdf = description(angles.parent, found)
-    return FoxgloveChannels(found, own_body_beside(angles), urdf, log, smooth=smooth)
+    return FoxgloveChannels(found, own_body_of(angles), urdf, log, smooth=smooth)
 
 
 @contextmanager
@@ -134,7 +134,7 @@ def _serve(receiving: Connection, folder: Path, allow_origins: tuple[str, ...]) 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
     urdf, wall_minus_ns = description(folder, in_use.angles), time.time_ns() - time.monotonic_ns()
-    own_body = own_body_beside(in_use.path)
+    own_body = own_body_of(in_use.path)
 
     def say(line: str) -> None:
         print(line, flush=True)
@@ -159,4 +159,4 @@ def tell(batch: Batch, watch: Watch) -> None:
         else:
             watch.joint(thing.time_ns, thing.position_rad)
     for line in batch.lines:
-        watch.told(line)
+        watch.message(line)

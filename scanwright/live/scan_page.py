@@ -19,8 +19,8 @@ from threading import Thread
 
 from scanwright.design.angles import angles_in_use
 from scanwright.design.errors import DeviceError
-from scanwright.firmware_io.assembly.own_body import own_body_beside
-from scanwright.firmware_io.scan.live_feed import NOBODY, Feed, Placing, Viewer, growing
+from scanwright.firmware_io.assembly.own_body import own_body_of
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Feed, Placing, Viewer, growing
 from scanwright.firmware_io.scan.scan_end import LOST
 
 ALONE_S = 10.0
@@ -44,7 +44,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         DeviceError: the page cannot be served.
     """
     if not wanted:
-        yield NOBODY
+        yield UNWATCHED
         return
     spawn = get_context("spawn")
     receiving, sending = spawn.Pipe(duplex=False)
@@ -84,7 +84,7 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the scan, and that ends this
     in_use = angles_in_use(folder)
-    placing = Placing(in_use.angles, own_body_beside(in_use.path))
+    placing = Placing(in_use.angles, own_body_of(in_use.path))
     with guarded_server(f"Scanwright: scan of {folder.name}") as (server, gate):
         view = CloudView(server, folder.name, in_use.angles.T_world_rot(0.0)[:3, 3])
         telling.send(gate.address)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from scanwright.cad.checks.check import Check, failed_of, read_checks
 from scanwright.cad.kernel import require_kernel
-from scanwright.design.concurrency.processes import Packed, processes_beside
+from scanwright.design.concurrency.processes import Packed, worker_processes
 from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
@@ -265,7 +265,7 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
     from scanwright.design.evaluation.metres import on_planes
     from scanwright.design.search.optimum import find_optimum
 
-    with fresh_folder(target) as work, processes_beside(2, KERNEL) as begin:  # this one never loads the kernel
+    with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this one never loads the kernel
         optimum = find_optimum(asked, _at(say, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search

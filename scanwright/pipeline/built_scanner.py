@@ -7,7 +7,7 @@ from pathlib import Path
 
 from scanwright.design.angles import AngleSet, load_angles
 from scanwright.design.arrays import Setting
-from scanwright.design.shadow import Shadow, load_own_body
+from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
 from scanwright.design.task.task import LoadedTask, load_task, shipped_tasks
 from scanwright.pipeline.manifest import require_as_built
 from scanwright.report.answer import mounting_rad, task_as_built
@@ -25,7 +25,7 @@ class BuiltScanner:
 
     loaded: LoadedTask
     angles: AngleSet
-    shadow: Shadow | None
+    shadow: SelfOcclusion | None
 
     @property
     def setting_rad(self) -> Setting:
@@ -48,4 +48,4 @@ def open_built(folder: Path) -> BuiltScanner:
     require_as_built(folder)
     angles, own_body = load_angles(folder / "angles.json"), folder / "own_body.npz"
     loaded = task_as_built(load_task(folder / "task.toml"), angles)
-    return BuiltScanner(loaded, angles, load_own_body(own_body)[0] if own_body.is_file() else None)
+    return BuiltScanner(loaded, angles, load_self_occlusion(own_body)[0] if own_body.is_file() else None)

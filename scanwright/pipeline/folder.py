@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from scanwright.design.concurrency.processes import ctrl_c_held_back
-from scanwright.design.errors import BuildError
+from scanwright.design.concurrency.processes import sigint_deferred
+from scanwright.design.errors import BuildError, ScanwrightError
 from scanwright.design.files.atomic_file import place_in
 from scanwright.pipeline.manifest import MANIFEST, inside, listed_files, read_manifest, write_json
 
@@ -50,7 +50,7 @@ def fresh_folder(target: Path) -> Iterator[Path]:
                     shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
                     work.mkdir()
                 yield work
-                with _told_of(target), ctrl_c_held_back():  # a folder is as it was, or finished
+                with _told_of(target), sigint_deferred():  # a folder is as it was, or finished
                     made = _files_in(work)
                     known = {*listed_files(target), *_told(moving), *made}
                     _refuse_what_is_in_the_way(target, made, known)
@@ -68,6 +68,8 @@ def _told_of(target: Path) -> Iterator[None]:
     """Our own dealings with the disk: what the system refuses is told of the folder."""
     try:
         yield
+    except ScanwrightError:
+        raise
     except OSError as error:
         raise BuildError(f"{target}: cannot write the build folder: {error.strerror or error}") from error
 
@@ -88,6 +90,8 @@ def report_folder(target: Path) -> Iterator[Path]:
         finally:
             if not any(target.iterdir()):
                 target.rmdir()
+    except ScanwrightError:
+        raise
     except OSError as error:
         raise BuildError(f"{target}: cannot write the comparison: {error.strerror}") from error
 

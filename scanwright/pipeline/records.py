@@ -12,7 +12,7 @@ import tomli_w
 
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
-from scanwright.design.files.atomic_file import place_in, whole_file
+from scanwright.design.files.atomic_file import atomic_write, place_in
 from scanwright.design.left_out import LeftOut
 from scanwright.design.search.search import SearchResult
 from scanwright.design.task.shapes import MapRegion, MeshRegion
@@ -67,7 +67,7 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
     from scanwright.report.page import REPORT, report_html
 
     require_as_built(folder, but=REPORT)
-    with whole_file(place_in(folder, REPORT, BuildError), BuildError) as part:
+    with atomic_write(place_in(folder, REPORT, BuildError), BuildError) as part:
         part.write_text(report_html(folder, begin), encoding="utf-8")
     enter(folder, REPORT)
     return folder / REPORT

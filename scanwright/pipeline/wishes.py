@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pydantic import TypeAdapter, ValidationError
 
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.files.faults import faults_of
+from scanwright.design.files.faults import faults_in
 from scanwright.design.task.shapes import Region
 from scanwright.design.task.task import SMALLEST_BALL_DEG, Task
 
@@ -87,7 +87,7 @@ def region_lines(word: str, numbers: Numbers, height_m: float) -> list[str]:
         _REGION.validate_python(tomllib.loads("\n".join(lines)))
     except ValidationError as error:
         wish = ":".join([word, *(f"{each:g}" for each in numbers)])
-        raise TaskError(f"--see {wish}: {'; '.join(map(str, faults_of(error, Task)))}") from error
+        raise TaskError(f"--see {wish}: {'; '.join(map(str, faults_in(error, Task)))}") from error
     return ["[[weight]]", *lines, ""]
 
 

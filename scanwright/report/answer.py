@@ -14,7 +14,7 @@ from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.tolerance import sensitivity
 from scanwright.design.search.with_parts import checked_score
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
@@ -63,7 +63,7 @@ class BuildAnswer:
     worst: float | None
 
 
-def answer(loaded: LoadedTask, angles: AngleSet, shadow: Shadow | None = None) -> BuildAnswer:
+def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None) -> BuildAnswer:
     """Judge the angle set on its task, without the beams that `shadow` blocks.
 
     Raises:
@@ -111,7 +111,7 @@ def mounting_rad(angles: AngleSet) -> Array:
     return np.radians([getattr(angles.angles_deg, name) for name in NAMES])
 
 
-def hidden_by(shadow: Shadow) -> Hidden:
+def hidden_by(shadow: SelfOcclusion) -> Hidden:
     """The counts of a shadow."""
     share = shadow.hidden()
     return Hidden(len(share), int((share == 1).sum()), int(((share > 0) & (share < 1)).sum()), shadow.share())

@@ -28,6 +28,8 @@ def read(path: Path, reader: Callable[[Path], T]) -> T | None:
         return None
     try:
         return reader(path)
+    except BuildError:
+        raise
     except (OSError, EOFError, ValueError, LookupError, TypeError, BadZipFile) as error:
         raise BuildError(f"{path}: not as a build writes it ({error}): build the folder again") from error
 

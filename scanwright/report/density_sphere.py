@@ -23,7 +23,7 @@ from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.search.mounts.reference import TunedMount
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri
 
@@ -88,7 +88,7 @@ def density_sphere(
     mounts: Iterable[TunedMount],
     axes: Array | None,
     step_deg: float,
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
 ) -> DensitySphere:
     """Density of the scanner and of the reference mounts on one scale, J over the axes, and where the axis points.
 

@@ -17,7 +17,7 @@ from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.objective.holes import percent
-from scanwright.design.shadow import load_own_body
+from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
@@ -115,7 +115,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
     scanner = [] if assembly is None else about_centre(assembly, angles)
     problem, task = problem_as_built(loaded, angles), loaded.task
     setting = mounting_rad(angles)
-    planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_own_body)
+    planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_self_occlusion)
     shadow = None if own_body is None else own_body[0]
     found = answer(loaded, angles, shadow)
     mounts = [mount.gain.mount for mount in found.as_built.mounts]
@@ -135,7 +135,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
 def _on_bodies(folder: Path) -> dict[str, Any]:
     """What shows the scanner, and what it hides."""
     angles, checks, bom = load_angles(folder / "angles.json"), _checks(folder), read(folder / "bom.csv", read_table)
-    own_body = read(folder / "own_body.npz", load_own_body)
+    own_body = read(folder / "own_body.npz", load_self_occlusion)
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
     return {
         "hidden": None if own_body is None else hidden_by(own_body[0]),

@@ -24,7 +24,7 @@ from scanwright.design.evaluation.coverage import UNSEEN, mean_density_at
 from scanwright.design.frames import Rx, Ry, Rz
 from scanwright.design.objective.problem import Problem
 from scanwright.design.scene import ray_caster
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.shapes import MeshRegion
 from scanwright.design.task.task import Task
 from scanwright.report.check_pictures import PlacedBody
@@ -76,7 +76,7 @@ def room_picture(
     setting: Setting,
     sphere: DensitySphere,
     scanner: Sequence[PlacedBody],
-    shadow: Shadow | None = None,
+    shadow: SelfOcclusion | None = None,
 ) -> RoomPicture:
     """Draw it.
 
@@ -108,7 +108,7 @@ def room_picture(
 
 
 def _painted(
-    problem: Problem, setting: Setting, shadow: Shadow | None, room: Room, camera: Pinhole, walls: Walls
+    problem: Problem, setting: Setting, shadow: SelfOcclusion | None, room: Room, camera: Pinhole, walls: Walls
 ) -> tuple[Array, float, float]:
     """Colour of each pixel, shape (rows, columns, 3), NaN beside the room, and the density of darkest and brightest."""
     inside, size = walls.inside, camera.size

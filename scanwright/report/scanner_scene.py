@@ -18,7 +18,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.frames import apply
 from scanwright.design.motion import Sweep
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.report.check_pictures import PlacedBody
 
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
@@ -45,7 +45,7 @@ def load_glb(path: Path) -> Any:
 
 
 def scanner_scene(
-    assembly: Any, exploded: Any | None, angles: AngleSet, own_body: tuple[Shadow, Array] | None
+    assembly: Any, exploded: Any | None, angles: AngleSet, own_body: tuple[SelfOcclusion, Array] | None
 ) -> dict[str, Any]:
     """What the page draws, ready for JSON.
 
@@ -120,7 +120,7 @@ def _pose(scene: Any, node: str) -> Array:
     return Y_TO_Z @ scene.graph.get(node)[0]
 
 
-def _fan(shadow: Shadow, bearings_rad: Array) -> dict[str, Any]:
+def _fan(shadow: SelfOcclusion, bearings_rad: Array) -> dict[str, Any]:
     """Bearings, and for every beam that is ever hidden one bit an axis step, 1 where it is."""
     stator = np.zeros((len(bearings_rad), AXIS_STEPS), bool) if shadow.stator is None else shadow.stator
     hidden = stator | shadow.beams[:, None]

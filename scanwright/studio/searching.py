@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from threading import Thread
 
-from scanwright.design.concurrency.processes import processes_beside
+from scanwright.design.concurrency.processes import worker_processes
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.as_built import as_built
 from scanwright.design.search.optimum import Optimum, find_optimum
@@ -60,7 +60,7 @@ class Searching:
             blind = optimum.hole_lines(tabled=False)
             holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
             self._say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
-            with processes_beside() as begin:
+            with worker_processes() as begin:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
                 self._move(Setting.within_bounds(chosen.family.angles_deg), step)

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from scanwright.design.arrays import Array
 from scanwright.design.errors import TaskError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.task.shapes import ConeRegion, MaskRegion, Region
 from scanwright.design.task.task import LoadedTask
 
@@ -125,6 +125,6 @@ def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
         weights: tuple[Region, ...] = tuple(dab.cone() for dab in dabs if dab.brush != "hidden")
         masks: tuple[MaskRegion, ...] = tuple(dab.cone() for dab in dabs if dab.brush == "hidden")
     except ValidationError as error:
-        raise TaskError(explain(error, "paint", ConeRegion)) from error
+        raise TaskError(format_validation_error(error, "paint", ConeRegion)) from error
     changed = task.model_copy(update={"weight": (*task.weight, *weights), "mask": (*task.mask, *masks)})
     return replace(loaded, task=changed)

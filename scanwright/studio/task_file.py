@@ -9,7 +9,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from scanwright.design.errors import TaskError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask, Task, load_task
 from scanwright.pipeline.records import rename_files
@@ -38,7 +38,7 @@ def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None
     try:
         Task.model_validate(table)
     except ValidationError as error:
-        raise TaskError(explain(error, f"{name}.toml", Task)) from error
+        raise TaskError(format_validation_error(error, f"{name}.toml", Task)) from error
     return tomli_w.dumps(table)
 
 

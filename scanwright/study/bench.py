@@ -26,7 +26,7 @@ from scanwright.design.search.families import Family
 from scanwright.design.search.optimum import angle_set
 from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.search.with_parts import Refused, choose_with_parts
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 from scanwright.study.candidate import density_gain, of_lidar, per_ball, price_usd, why, with_motion
 from scanwright.study.front import six_digits
@@ -50,7 +50,7 @@ class BuiltSetting:
         weakest: the load nearest to its rating.
     """
 
-    shadow: Shadow
+    shadow: SelfOcclusion
     values: dict[str, float | None]
     weakest: str
 
@@ -62,11 +62,11 @@ class PartsBench:
     scanner: Scanner
     _made: dict[tuple[float, ...], BuiltSetting | Refused] = field(default_factory=dict)
 
-    def bound(self, setting_rad: Array) -> Shadow | Refused:
+    def bound(self, setting_rad: Array) -> SelfOcclusion | Refused:
         """See `Workshop`."""
         return PartsWorkshop(self.scanner).bound(setting_rad)
 
-    def shadow(self, setting_rad: Array) -> Shadow | Refused:
+    def shadow(self, setting_rad: Array) -> SelfOcclusion | Refused:
         """See `Workshop`; refused as well where clearance, loads, walls or beams fail."""
         made = self.made(setting_rad)
         return made if isinstance(made, Refused) else made.shadow
@@ -160,7 +160,7 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
     return Refused(failed[0]) if failed else _weighed(scanner, assembly, checks, shadow)
 
 
-def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Check], shadow: Shadow) -> BuiltSetting:
+def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Check], shadow: SelfOcclusion) -> BuiltSetting:
     from scanwright.cad.assembly.masses import link_bodies
 
     margins = {

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.errors import TaskError
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.task.named_products import motion_faults
 from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.study import NO_RING, LoadedStudy, Mounting
@@ -88,7 +88,7 @@ class Crossing:
             doubts = doubts or replace(base, task=task, products=products).unread_angles()
             refused = doubts[0] if doubts else ""
         except ValidationError as error:
-            refused = explain(error, name, Task).splitlines()[0]
+            refused = format_validation_error(error, name, Task).splitlines()[0]
         except TaskError as error:
             refused = str(error)
         loaded = None if refused or task is None else _trimmed(replace(base, task=task, products=products))

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from scanwright.design.errors import BuildError
-from scanwright.design.files.atomic_file import place_in, whole_file
+from scanwright.design.files.atomic_file import atomic_write, place_in
 from scanwright.pipeline.manifest import code_digest, versions
 
 MARK = "results.json"
@@ -47,7 +47,7 @@ class Results:
         """Keep a result: whole or not at all, whatever ends the program."""
         path = place_in(self.folder, f"{address[:2]}/{address}.json", BuildError)
         path.parent.mkdir(exist_ok=True)
-        with whole_file(path, BuildError) as part:
+        with atomic_write(path, BuildError) as part:
             part.write_text(json.dumps(result), encoding="utf-8")
 
     def is_here(self) -> bool:

@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.files.faults import explain
+from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
 from scanwright.design.motion import LONGEST_S, SHORTEST_S
 from scanwright.design.task.angle_ranges import AngleRanges
@@ -107,7 +107,7 @@ def load_study(path: Path) -> LoadedStudy:
     try:
         study = Study.model_validate(table)
     except ValidationError as error:
-        raise TaskError(explain(error, source, Study)) from error
+        raise TaskError(format_validation_error(error, source, Study)) from error
     products = load_catalogue(*(source.parent / extra for extra in study.catalogue))
     for field, kind in (("sensors", Lidar), ("servos", Servo), ("slip_rings", SlipRing), ("printers", Printer)):
         for name in getattr(study, field):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scanwright.design.errors import BuildError
-from scanwright.design.files.atomic_file import place_in, whole_file
+from scanwright.design.files.atomic_file import atomic_write, place_in
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.study.crossing import AXES
 from scanwright.study.front import COLUMNS, costs
@@ -77,7 +77,7 @@ def write_tables(folder: Path, rows: Iterable[Row]) -> Counter[str]:
     """
     statuses: Counter[str] = Counter()
     with ExitStack() as open_files:
-        text = open_files.enter_context(whole_file(folder / "study.csv", BuildError))
+        text = open_files.enter_context(atomic_write(folder / "study.csv", BuildError))
         file = open_files.enter_context(text.open("w", encoding="utf-8", newline=""))
         add_group = open_files.enter_context(_parquet(folder / "study.parquet"))
         writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
@@ -100,7 +100,7 @@ def _parquet(path: Path) -> Iterator[Callable[[list[Row]], None]]:
         yield lambda _: None
         return
     schema = pa.schema([(name, pa.float64() if name in NUMBERS else pa.string()) for name in FIELDS])
-    with whole_file(path, BuildError) as part, pq.ParquetWriter(part, schema) as parquet:
+    with atomic_write(path, BuildError) as part, pq.ParquetWriter(part, schema) as parquet:
         yield lambda rows: parquet.write_table(
             pa.Table.from_pylist([{name: row.get(name) for name in FIELDS} for row in rows], schema)
         )

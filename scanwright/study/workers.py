@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, contextmanager
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from scanwright.design.concurrency.processes import cores, ctrl_c_held_back, kill, one_thread_each, spawn_pool
+from scanwright.design.concurrency.processes import cores, kill, one_thread_each, sigint_deferred, spawn_pool
 from scanwright.design.errors import BuildError, TaskError, require
 from scanwright.study.units import Crew
 
@@ -57,7 +57,7 @@ class SingleProcesses(Executor):
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """See `Executor`; waits for a process that has nothing to do. A dead one is replaced."""
         number = self._idle.get()
-        with ctrl_c_held_back():
+        with sigint_deferred():
             try:
                 future = self._pools[number].submit(fn, *args, **kwargs)
             except BrokenExecutor:

@@ -47,7 +47,7 @@ def axis_trials(progress: Callable[[str], None]) -> Iterator[Trial]:
 def ways_between(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
     """Interpolation orders and the smoothing spline: what makes the curve of a log, by name."""
 
-    def held() -> AxisCurve:
+    def at_rest() -> AxisCurve:
         rows = np.zeros((log.time_ns.size - 1, 4))
         rows[:, 0] = log.position_rad[:-1]
         return AxisCurve(log.time_ns, rows)
@@ -57,10 +57,10 @@ def ways_between(log: JointLog) -> dict[str, Callable[[], AxisCurve]]:
         return AxisCurve(log.time_ns, np.ascontiguousarray(CubicSpline(seconds, log.position_rad).c[::-1].T))
 
     return {
-        "order 0, last sample": held,
+        "order 0, last sample": at_rest,
         "order 1, straight": lambda: straight(log),
         "order 3, through samples": cubic,
-        "smoothed": lambda: axis_curve(log, held=False)[0],
+        "smoothed": lambda: axis_curve(log, at_rest=False)[0],
     }
 
 

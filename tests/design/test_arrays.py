@@ -6,7 +6,7 @@ from jaxtyping import TypeCheckError
 
 from scanwright.design import frames
 from scanwright.design.density.ball_count import ball_count
-from scanwright.design.shadow import Shadow
+from scanwright.design.self_occlusion import SelfOcclusion
 
 
 def test_a_wrong_shape_is_refused():
@@ -22,6 +22,6 @@ def test_a_wrong_dtype_is_refused():
 
 
 def test_axes_of_one_name_are_of_one_length():
-    Shadow(np.zeros(4, bool), np.zeros((4, 720), bool))
+    SelfOcclusion(np.zeros(4, bool), np.zeros((4, 720), bool))
     with pytest.raises(TypeCheckError, match="stator"):
-        Shadow(np.zeros(4, bool), np.zeros((5, 720), bool))
+        SelfOcclusion(np.zeros(4, bool), np.zeros((5, 720), bool))

@@ -12,7 +12,7 @@ from scanwright.firmware_io.servo.bus import bus, serial_line, unit
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """Twins share a computer with the tests, and answer late where it is busy, as no device does: ten times as long."""
+    """Emulators share a computer with the tests, and answer late if it is busy: wait ten times as long."""
     monkeypatch.setattr(dialogue, "_ANSWER_S", 5.0)
     monkeypatch.setattr(driver, "_SCAN_S", 10.0)
     monkeypatch.setattr(cola_dialogue, "_ANSWER_S", 1.5)  # waited for whole where a sensor knows one dialect only
@@ -25,8 +25,8 @@ def patience(monkeypatch):
 def virtual_bus(monkeypatch):
     """Makes the bus that the next port to be opened leads to."""
 
-    def make(model, protocol=None, beside=()):
-        made = VirtualBus(model, protocol, beside)
+    def make(model, protocol=None, others=()):
+        made = VirtualBus(model, protocol, others)
 
         def open_port(port, baud, timeout):
             assert port == made.port

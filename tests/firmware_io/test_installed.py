@@ -13,7 +13,7 @@ from scanwright.design.catalogue.catalogue import SHIPPED, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
-from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.lidar import families as lidar_families
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
@@ -94,11 +94,11 @@ class Machine:
         self.at_ns = now_ns
 
 
-def twin(lidar, sight, seed):
+def emulator(lidar, sight, seed):
     return LidarLine(lidar.name, Machine(sight), network=False, seed=seed)
 
 
-FAMILY = LidarFamily("acme", "Acme", Acme, "acme.family:twin")
+FAMILY = LidarFamily("acme", "Acme", Acme, "acme.family:emulator")
 NO_FAMILY = 7
 """
 
@@ -116,11 +116,11 @@ class AcmePackets(Sts):
 
 
 TABLE = replace(TABLES[0], model="ACME-1", packets=AcmePackets(), number=4711)
-FAMILY = ServoFamily("Acme", (TABLE,), (250_000,), "acme.family:Twin")
+FAMILY = ServoFamily("Acme", (TABLE,), (250_000,), "acme.family:Emulator")
 NO_FAMILY = 7
 
 
-def Twin(table, load, time_ns, angle_rad):
+def Emulator(table, load, time_ns, angle_rad):
     from scanwright.firmware_io.emulators.servo.feetech_machine import FeetechMachine
 
     made = FeetechMachine(table, load, time_ns, angle_rad)
@@ -202,9 +202,9 @@ def test_a_lidar_of_a_package_of_its_own_sees_the_room(installed):
 def test_a_servo_of_a_package_of_its_own_turns(installed):
     installed(SERVOS, "FAMILY")
     assert load_catalogue().get("ACME-1", Servo).maker == "Feetech"
-    with ServoTwin("ACME-1") as twin:
-        twin.set_up(spins=True)
-        with open_servo(twin.port) as servo:
+    with ServoEmulator("ACME-1") as emulator:
+        emulator.set_up(spins=True)
+        with open_servo(emulator.port) as servo:
             assert (servo.model, servo.protocol, servo.baud) == ("ACME-1", "ACME", 250_000)
             servo.spin(1.0)
             assert servo.read().voltage_V == pytest.approx(12.0)

@@ -1,4 +1,4 @@
-"""Waiting for threads, processes and twins, which run in real time: the one clock that no test can turn forward."""
+"""Waiting for threads, processes and emulators, which run in real time: the one clock that no test can turn forward."""
 
 import time
 

@@ -8,17 +8,17 @@ from scanwright.firmware_io.emulators.servo_plant import Load
 
 
 class VirtualBus:
-    """The machines of `ServoTwin` behind a port of pyserial's shape, the clock of both, and all that was sent."""
+    """The machines of `ServoEmulator` behind a port of pyserial's shape, the clock of both, and all that was sent."""
 
     port = "virtual"
     is_open = True
 
-    def __init__(self, model, protocol=None, beside=()):
+    def __init__(self, model, protocol=None, others=()):
         self.now_ns = 1_000_000_000
         self.baudrate, self.timeout = 57_600, 0.0
         self.servo = machine_of(model, protocol, Load(), self.now_ns, 0.0)
         self.servos = [self.servo]
-        for other_model, number in beside:
+        for other_model, number in others:
             other = machine_of(other_model, self.servo.table.protocol, Load(), self.now_ns, 0.0)
             other.memory[other.table.id.address] = number
             self.servos.append(other)

@@ -13,12 +13,12 @@ _BUFFER_NS = 50_000_000  # of a line that nobody reads
 
 
 class VirtualLine:
-    """The machine of a twin behind a stream of the drivers' shape, and the clock of both."""
+    """The machine of an emulator behind a stream of the drivers' shape, and the clock of both."""
 
-    def __init__(self, model, sight):
+    def __init__(self, model, ranging):
         self.model = model
         lidar = load_catalogue().get(model, Lidar)
-        self.machine = resolve_name(family_of(model).twin)(lidar, sight, 0).machine
+        self.machine = resolve_name(family_of(model).emulator)(lidar, ranging, 0).machine
         self.now_ns = time.monotonic_ns()  # at which the machine was made
         self.plugged = True
         self.damage = deque()  # what happens to the next packets

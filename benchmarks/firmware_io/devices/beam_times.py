@@ -1,10 +1,10 @@
-"""Times of beams of a lidar of each family against the true ones of its twin.
+"""Times of beams of a lidar of each family against the true ones of its emulator.
 
     uv run python -m benchmarks.firmware_io.devices.beam_times [TURNS] [MODEL...]
 
-Each twin is driven through its line for so many turns (default 200). It notes when it looked in which direction; what
-the driver says of a beam is compared with the look nearest to it. Twins run in real time: a busy computer adds to what
-is told here.
+Each emulator is driven through its line for so many turns (default 200). It notes when it measured in which direction;
+each beam of the driver is compared with the nearest of these. Emulators run in real time: a busy computer adds to the
+errors.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Watched:
     """A wall of one metre, and when it was looked at in which direction."""
 
     def __init__(self) -> None:
-        self.looks: list[tuple[Times, Floats]] = []  # one list: the twin adds to it meanwhile
+        self.looks: list[tuple[Times, Floats]] = []  # one list: the emulator adds to it meanwhile
 
     def __call__(self, time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
-        """What the twin sees."""
+        """What the emulator sees."""
         self.looks.append((time_ns, bearing_rad))
         return np.ones(time_ns.size), np.ones(time_ns.size)
 
@@ -63,7 +63,10 @@ def measured_ns(model: str, turns: int) -> Floats:
     """By how much each beam's time is late, turn by turn."""
     lidar, watched = load_catalogue().get(model, Lidar), Watched()
     late: list[Floats] = []
-    with resolve_name(family_of(model).twin)(lidar, watched, 0) as twin, open_lidar(twin.port, model) as driver:
+    with (
+        resolve_name(family_of(model).emulator)(lidar, watched, 0) as emulator,
+        open_lidar(emulator.port, model) as driver,
+    ):
         driver.start()
         clockwise = driver.read().scan.angle_increment_rad < 0
         for turn in range(turns):
@@ -78,7 +81,7 @@ def main() -> None:
     """Measure those that are named, or one of each kind, and print a table."""
     turns = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     with suppress(PermissionError):
-        os.nice(-10)  # twins need their time, as hardware does not
+        os.nice(-10)  # emulators need their time, as hardware does not
     print("| lidar | turns | late, median | off, 95 % | off, worst |")
     print("| --- | --- | --- | --- | --- |")
     for model in sys.argv[2:] or MODELS:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.design.errors import ProtocolError
-from scanwright.firmware_io.emulators import ldrobot as ldrobot_twins
-from scanwright.firmware_io.emulators import slamtec as slamtec_twins
-from scanwright.firmware_io.emulators.sick import lms_twin as lms_twins
+from scanwright.firmware_io.emulators import ldrobot as ldrobot_emulators
+from scanwright.firmware_io.emulators import slamtec as slamtec_emulators
+from scanwright.firmware_io.emulators.sick import lms_emulator as lms_emulators
 from scanwright.firmware_io.lidar.ldrobot import protocol as ldrobot
 from scanwright.firmware_io.lidar.lms2xx import protocol as lms
 from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
@@ -101,7 +101,7 @@ def ldrobot_dialogue(rng: random.Random) -> bytes:
     said = b""
     for start_deg in (rng.uniform(0, 340), 355.0):
         points = [[rng.randrange(1 << 16), rng.randrange(256)] for _ in range(12)]
-        said += ldrobot_twins.write_packet(3600, start_deg, start_deg + 8.8, rng.randrange(30_000), points)
+        said += ldrobot_emulators.write_packet(3600, start_deg, start_deg + 8.8, rng.randrange(30_000), points)
     return said
 
 
@@ -111,18 +111,18 @@ def ldrobot_survive(stream: bytes) -> tuple[int, int]:
     for packet in [*splitter.feed(stream[:middle]), *splitter.feed(stream[middle:])]:
         windows = [stream[at : at + 47] for at in range(len(stream) - 46) if stream[at : at + 2] == b"\x54\x2c"]
         stamped = [one for one in windows if int.from_bytes(one[44:46], "little") % 30_000 == packet.stamp_ms]
-        assert any(ldrobot_twins.checksum(one[:46]) == one[46] for one in stamped), "accepted with a wrong sum"
+        assert any(ldrobot_emulators.checksum(one[:46]) == one[46] for one in stamped), "accepted with a wrong sum"
         accepted += 1
     return accepted, splitter.bad
 
 
 def lms_dialogue(rng: random.Random) -> bytes:
     """What an LMS 2xx says: that it heard, who it is, its variant, and scans in both units."""
-    said = b"\x06" + lms_twins.write_telegram(b"\xbaLMS200;30106;V02.30\x10")
-    said += b"\x06" + lms_twins.write_telegram(b"\xbb\x01\xb4\x00\x32\x00\x10")
+    said = b"\x06" + lms_emulators.write_telegram(b"\xbaLMS200;30106;V02.30\x10")
+    said += b"\x06" + lms_emulators.write_telegram(b"\xbb\x01\xb4\x00\x32\x00\x10")
     for unit in (0x40, 0x00):
         count = rng.randrange(1, 40)
-        said += lms_twins.write_telegram(bytes([0xB0, count, unit]) + rng.randbytes(2 * count) + b"\x10")
+        said += lms_emulators.write_telegram(bytes([0xB0, count, unit]) + rng.randbytes(2 * count) + b"\x10")
     return said
 
 
@@ -130,7 +130,7 @@ def lms_survive(stream: bytes) -> tuple[int, int]:
     """As `scip_survive`, for an LMS 2xx."""
     splitter, middle, accepted, refused = lms.LmsSplitter(), len(stream) // 2, 0, 0
     for told in [*splitter.feed(stream[:middle]), *splitter.feed(stream[middle:])]:
-        there = lms_twins.write_telegram(bytes([told.command]) + told.values, told.address)
+        there = lms_emulators.write_telegram(bytes([told.command]) + told.values, told.address)
         assert there in stream, "accepted with a wrong sum"
         for read in (lms.scan, lms.accepted_variant):
             try:
@@ -143,10 +143,10 @@ def lms_survive(stream: bytes) -> tuple[int, int]:
 def slamtec_dialogue(rng: random.Random) -> bytes:
     """What an RPLIDAR says: who it is, its health, one of its modes, and a stream in that."""
     kind = rng.choice((slamtec.NODES, slamtec.CAPSULES, slamtec.DENSE))
-    said = slamtec_twins.reply(0x04, bytes([0x41, 29, 1, 7]) + rng.randbytes(16))
-    said += slamtec_twins.reply(0x06, bytes([rng.randrange(3), 0, 0]))
-    said += slamtec_twins.reply(0x20, (0x75).to_bytes(4, "little") + bytes([kind]))
-    said += slamtec_twins.stream_begins(kind, slamtec.SIZES[kind])
+    said = slamtec_emulators.reply(0x04, bytes([0x41, 29, 1, 7]) + rng.randbytes(16))
+    said += slamtec_emulators.reply(0x06, bytes([rng.randrange(3), 0, 0]))
+    said += slamtec_emulators.reply(0x20, (0x75).to_bytes(4, "little") + bytes([kind]))
+    said += slamtec_emulators.stream_begins(kind, slamtec.SIZES[kind])
     start = rng.randrange(360 * 64)
     if kind == slamtec.NODES:
         for k in range(8):
@@ -155,7 +155,7 @@ def slamtec_dialogue(rng: random.Random) -> bytes:
         return said
     for k in range(3):
         word = (start + 1440 * k) % (360 * 64)
-        said += slamtec_twins.summed(bytearray(word.to_bytes(2, "little") + rng.randbytes(80)))
+        said += slamtec_emulators.summed(bytearray(word.to_bytes(2, "little") + rng.randbytes(80)))
     return said
 
 
@@ -178,7 +178,9 @@ def slamtec_survive(stream: bytes) -> tuple[int, int]:
             there = [
                 one for one in windows if int.from_bytes(one[2:4], "little") % (1 << 15) / 64 % 360 == packet.start_deg
             ]
-            assert any(slamtec_twins.summed(bytearray(one[2:])) == one for one in there), "accepted with a wrong sum"
+            assert any(slamtec_emulators.summed(bytearray(one[2:])) == one for one in there), (
+                "accepted with a wrong sum"
+            )
         count = PointCount(told.kind, 1e5, 115_200)
         for placed in count.placed(packets, 1_000_000_000) if packets else ():
             assert np.all((placed.angle_deg >= 0) & (placed.angle_deg < 360)), "a point at no angle"

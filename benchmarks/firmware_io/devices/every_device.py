@@ -1,4 +1,4 @@
-"""Every lidar and every servo of the catalogue scans the room that its twins stand in; one row for each pair.
+"""Every lidar and every servo of the catalogue scans the room that its emulators stand in; one row for each pair.
 
     uv run python -m benchmarks.firmware_io.devices.every_device [LIDAR...]
 
@@ -19,6 +19,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo
 from scanwright.design.errors import ScanwrightError
+from scanwright.design.progress import no_progress
 
 _MOTION = {"mode": "sweep", "limits_deg": [-85, 85], "period_s": 6.0, "profile": "trapezoid", "accel_deg_s2": 200.0}
 _ANGLES_DEG = {"alpha_rot": 0, "beta_rot": 0, "alpha_laser": 0, "beta_laser": 50}
@@ -39,14 +40,14 @@ def pairs(wanted: list[str]) -> Iterator[AngleSet]:
 def main() -> None:
     """Print the table; what cannot be scanned is a row, too, and fails the command."""
     with suppress(PermissionError):
-        os.nice(-10)  # twins need their time, as hardware does not
+        os.nice(-10)  # emulators need their time, as hardware does not
     failed = False
     print("| lidar | servo | points | away from edges | behind the room | spread | noise | beyond six times it |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for angles in pairs(sys.argv[1:]):
         who = f"| {angles.sensor} | {angles.servo} |"
         try:
-            found = scanned(angles, 1, lambda _: None)
+            found = scanned(angles, 1, no_progress)
         except ScanwrightError as error:
             failed = True
             print(f"{who} {error} |", flush=True)

@@ -1,4 +1,4 @@
-"""The cloud of the shipped task `low_cost` against the room that its twins stand in.
+"""The cloud of the shipped task `low_cost` against the room that its emulators stand in.
 
     uv run python -m benchmarks.firmware_io.devices.low_cost_cloud [TURNS] [TASK]
 
@@ -13,7 +13,6 @@ import math
 import os
 import sys
 import tempfile
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +24,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
+from scanwright.design.progress import Progress
 from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.clouds.ply import read_ply
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
@@ -50,8 +50,8 @@ def residuals_m(cloud: np.ndarray, angles: AngleSet, scene: Scene) -> tuple[Floa
     clear = np.isfinite(hits.range_m)
     here_m = origins_m + hits.range_m[:, None] * directions
     for aside in (across, -across, upright, -upright):
-        beside = directions + _ASIDE_RAD * aside
-        there_m = origins_m + cast(scene, origins_m, beside).range_m[:, None] * beside
+        others = directions + _ASIDE_RAD * aside
+        there_m = origins_m + cast(scene, origins_m, others).range_m[:, None] * others
         clear &= np.abs(np.einsum("ij,ij->i", there_m - here_m, normals)) < _LEAST_M  # still on the same plane
     return (range_m - hits.range_m)[clear], float(clear.mean())
 
@@ -75,7 +75,7 @@ class Residuals:
     beyond: float
 
 
-def scanned(angles: AngleSet, turns: int, say: Callable[[str], None]) -> Residuals:
+def scanned(angles: AngleSet, turns: int, progress: Progress) -> Residuals:
     """Scan the furnished room with the emulated scanner of an angle set, assemble, and compare.
 
     Raises:
@@ -85,8 +85,8 @@ def scanned(angles: AngleSet, turns: int, say: Callable[[str], None]) -> Residua
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         (out / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        with emulated_scanner(angles, scene) as twins:
-            acquire(plan_scan(out, turns=turns, lidar=twins.ports.lidar, servo=twins.ports.servo), say)
+        with emulated_scanner(angles, scene) as emulators:
+            acquire(plan_scan(out, turns=turns, lidar=emulators.ports.lidar, servo=emulators.ports.servo), progress)
         (recording,) = (out / "recordings").glob("*.mcap")
         api.assemble(recording, out / "angles.json", out / "cloud.ply")
         error_m, share = residuals_m(read_ply(out / "cloud.ply"), angles, scene)
@@ -106,7 +106,7 @@ def main() -> None:
     turns = int(sys.argv[1]) if len(sys.argv) > 1 else 1
     task = sys.argv[2] if len(sys.argv) > 2 else "low_cost"
     with suppress(PermissionError):
-        os.nice(-10)  # twins need their time, as hardware does not
+        os.nice(-10)  # emulators need their time, as hardware does not
     angles = api.optimise(task).angle_set()
     sigma_mm = load_catalogue().get(angles.sensor, Lidar).range_sigma_mm
     found = scanned(angles, turns, print)

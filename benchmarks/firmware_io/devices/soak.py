@@ -1,10 +1,10 @@
-"""The node of ROS 2 on twins for as long as one likes: memory, lost scans, killed listeners, devices that go and come.
+"""Soak test of the ROS 2 node on emulators: memory, lost scans, killed listeners, devices that go and come.
 
     python -m benchmarks.firmware_io.devices.soak MINUTES ROS_PYTHON
 
 ROS_PYTHON has rclpy and scanwright. A row each 30 s: resident memory of the node, scans heard, and the largest gap
 between two stamps (0.1 s and what the sensor's turn wanders: none is lost). After every second row the listener is
-killed (-9) and another one comes; in the middle the twins stand still for 12 s, as devices that are unplugged.
+killed (-9) and another one comes; in the middle the emulators stand still for 12 s, as devices that are unplugged.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def soak(minutes: float, python: str) -> None:
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         Path(folder, "angles.json").write_text(ANGLES.to_json(), encoding="utf-8")
-        twins = _started(stack, [sys.executable, "-m", "scanwright", "emulate", folder], env)
-        while not Path(folder, "emulated.json").exists() and twins.poll() is None:
+        emulators = _started(stack, [sys.executable, "-m", "scanwright", "emulate", folder], env)
+        while not Path(folder, "emulated.json").exists() and emulators.poll() is None:
             time.sleep(0.1)
         node = _started(stack, [python, "-m", "scanwright", "ros2", folder, "--straight"], env)
         listener = Listener(python, env)
@@ -86,9 +86,9 @@ def soak(minutes: float, python: str) -> None:
             what = ""
             if row == rows // 2:
                 what = "devices away for 12 s from here"
-                twins.send_signal(signal.SIGSTOP)
+                emulators.send_signal(signal.SIGSTOP)
                 time.sleep(AWAY_S)
-                twins.send_signal(signal.SIGCONT)
+                emulators.send_signal(signal.SIGCONT)
             elif row % 2 == 0:
                 what = "listener killed"
                 listener.kill()

@@ -53,10 +53,10 @@ class HeldUpLine:
             stalls: when the reader is held up, and for how long [s].
             buffer_bytes: what the line keeps meanwhile.
         """
-        twin = resolve_name(family_of(model).twin)(load_catalogue().get(model, Lidar), _seen_at, 0)
-        self.machine: Machine = twin.machine
+        emulator = resolve_name(family_of(model).emulator)(load_catalogue().get(model, Lidar), _seen_at, 0)
+        self.machine: Machine = emulator.machine
         if model.startswith("LMS"):
-            twin.machine.baud = 500_000
+            emulator.machine.baud = 500_000
         self.now_ns = time.monotonic_ns()  # when the machine was made
         self.stalls = deque((self.now_ns + round(at_s * 1e9), round(length_s * 1e9)) for at_s, length_s in stalls)
         self._buffer_bytes = buffer_bytes

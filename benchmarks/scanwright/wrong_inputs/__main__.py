@@ -32,7 +32,7 @@ from benchmarks.scanwright.wrong_inputs.accidents import damage, number
 from benchmarks.scanwright.wrong_inputs.workshop import FORMATS, Job, furnish, jobs
 from scanwright.cli.app import run
 from scanwright.design.errors import ScanwrightError
-from scanwright.design.files.faults import MOST_TOLD
+from scanwright.design.files.faults import MOST_REPORTED
 from scanwright.firmware_io.clouds.formats import read_clouds
 
 _MOST_BYTES = 2 << 30
@@ -200,7 +200,7 @@ def _fault(job: Job, out: Path, named: str, ended: Ended) -> str:
         ]
         if ended.complaints[:1] and ended.complaints[0].startswith("Usage:"):
             return ""  # typer's own
-        if not 1 <= len(told) <= MOST_TOLD + 1:
+        if not 1 <= len(told) <= MOST_REPORTED + 1:
             return f"{len(told)} lines"
         if any(line.startswith("Traceback") for line in told):
             return "traceback"

@@ -1,1 +1,1 @@
-"""Twins of servos: the bus with its port, and how each family behaves on it."""
+"""Emulators of servos: the bus with its port, and how each family behaves on it."""

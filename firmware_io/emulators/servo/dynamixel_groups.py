@@ -15,7 +15,7 @@ def span(parameters: bytes, *, two: bool) -> tuple[int, int]:
     return int.from_bytes(parameters[:wide], "little"), int.from_bytes(parameters[wide : 2 * wide], "little")
 
 
-def ids_asked(request: Request, *, two: bool) -> tuple[int, ...] | None:
+def ids_in_turn(request: Request, *, two: bool) -> tuple[int, ...] | None:
     """The servos that answer one after the other: those of sync and bulk reads; None to another request."""
     if request.instruction in (SYNC_READ, FAST_SYNC_READ) and two:
         return tuple(request.parameters[4:])

@@ -90,13 +90,13 @@ class DynamixelMachine:
 
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
         """The servos that answer one after the other: those of sync and bulk reads."""
-        return groups.ids_asked(request, two=self._two) if request.id == BROADCAST and request.intact else None
+        return groups.ids_in_turn(request, two=self._two) if request.id == BROADCAST and request.intact else None
 
-    def statuses(self, request: Request, said: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
+    def statuses(self, request: Request, answers: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
         """The bytes of what servos say: one status each, or one of all to a fast read."""
         if self._two and request.id == BROADCAST and request.instruction in groups.FAST:
-            return [fast_status(groups.fast_size(request), said)]
-        return [status(self.table.protocol, *one) for one in said]
+            return [fast_status(groups.fast_size(request), answers)]
+        return [status(self.table.protocol, *one) for one in answers]
 
     def overheat(self) -> None:
         """The motor is 5 degrees above its limit."""

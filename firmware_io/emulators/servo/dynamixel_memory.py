@@ -1,4 +1,4 @@
-"""Control tables of the twins: every entry with its factory value, as the e-manual lists them."""
+"""Control tables of the emulators: every entry with its factory value, as the e-manual lists them."""
 
 from __future__ import annotations
 

@@ -100,10 +100,10 @@ class FeetechMachine:
         """The servos of a sync read answer one after the other."""
         return tuple(request.parameters[2:]) if request.instruction == _SYNC_READ else None
 
-    def statuses(self, request: Request, said: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
+    def statuses(self, request: Request, answers: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
         """The bytes of what servos say."""
         del request
-        return [feetech_packets.status(*one) for one in said]
+        return [feetech_packets.status(*one) for one in answers]
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
         """Carry out a request; status byte and data of the answer, None where there is none."""

@@ -1,4 +1,4 @@
-"""What the bus of a twin asks of the servos on it, and how several of them answer one request."""
+"""What the bus of an emulator asks of the servos on it, and how several of them answer one request."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class ServoMachine(Protocol):
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
         """The servos that answer a request one after the other, each waiting for the one before it; None for others."""
 
-    def statuses(self, request: Request, said: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
+    def statuses(self, request: Request, answers: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
         """The bytes of what servos say to a request; id, error and data of each."""
 
     def overheat(self) -> None:
@@ -98,12 +98,12 @@ class ServoMachine(Protocol):
 
 def answers(servos: Sequence[ServoMachine], request: Request, now_ns: int) -> list[bytes]:
     """What the servos of one bus answer to a request, in the order of their statuses."""
-    said = {servo.id: told for servo in servos if (told := servo.answer(request, now_ns)) is not None}
-    asked = servos[0].in_turn(request)
-    order = sorted(said) if asked is None else list(asked)
-    heard: list[tuple[int, int, bytes]] = []
+    answers = {servo.id: answer for servo in servos if (answer := servo.answer(request, now_ns)) is not None}
+    answering_ids = servos[0].in_turn(request)
+    order = sorted(answers) if answering_ids is None else list(answering_ids)
+    in_order: list[tuple[int, int, bytes]] = []
     for servo_id in order:
-        if servo_id not in said:  # those after it wait for ever
+        if servo_id not in answers:  # those after it wait for ever
             break
-        heard.append((servo_id, *said[servo_id]))
-    return servos[0].statuses(request, heard) if heard else []
+        in_order.append((servo_id, *answers[servo_id]))
+    return servos[0].statuses(request, in_order) if in_order else []

@@ -1,4 +1,4 @@
-"""The control table of a twin: its entries, and the bytes that a program reads and writes."""
+"""The control table of an emulator: its entries, and the bytes that a program reads and writes."""
 
 from __future__ import annotations
 

@@ -21,13 +21,13 @@ def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle
         angle_rad: of the horn.
 
     Raises:
-        DeviceError: nobody has written such a twin.
+        DeviceError: nobody has written such an emulator.
     """
     for family in all_families().values():
         for table in family.tables:
             if table.model == model and protocol in (None, table.protocol):
-                made: ServoMachine = resolve_name(family.twin)(table, load, time_ns, angle_rad)
+                made: ServoMachine = resolve_name(family.emulator)(table, load, time_ns, angle_rad)
                 return made
     there = ", ".join(f"{table.model} with {table.protocol}" for table in all_tables())
-    asked = model if protocol is None else f"{model} with {protocol}"
-    raise DeviceError(f"there is no twin of a servo {asked}; {removal(model) or f'there are: {there}'}")
+    wanted = model if protocol is None else f"{model} with {protocol}"
+    raise DeviceError(f"there is no emulator of a servo {wanted}; {removal(model) or f'there are: {there}'}")

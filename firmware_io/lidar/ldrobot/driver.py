@@ -26,7 +26,7 @@ from scanwright.firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 FAMILY = "ldrobot"
 
 _BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}
-_HEARD_S = 0.5  # it talks hundreds of times a second
+_FIRST_PACKETS_S = 0.5  # it talks hundreds of times a second
 _TURN_S = 1.0  # without a turn: five of the slowest
 _SILENCE_NS = 500_000_000  # after which the sensor may have restarted
 _PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which packets waited or were lost
@@ -137,9 +137,7 @@ class LdrobotLidar:
             DeviceError: clusters, which it has not.
         """
         if cluster != 1:
-            raise DeviceError(
-                f"{self._line.name}: cluster = {cluster}: a {self.model} tells every point: leave it at 1"
-            )
+            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every point; use 1")
         self._scanning, self._intensity, self._skip = True, intensity, skip
         self._begin_anew()
 
@@ -205,26 +203,26 @@ class LdrobotLidar:
                 if points_s is None:
                     continue
                 by_speed = [(abs(math.log(points_s / _points_s(product))), product) for product in products]
-                nearest = min(by_speed, key=lambda found: found[0])[0]
+                nearest = min(by_speed, key=lambda matching: matching[0])[0]
                 fitting = [product for off, product in by_speed if off == nearest]
-                found = [product for product in fitting if product in named]
-                if not found:
+                matching = [product for product in fitting if product in named]
+                if not matching:
                     others = " or ".join(product.name for product in fitting)
                     raise DeviceError(f"{self._line.name}: {points_s:.0f} points/s: this is a {others}, not a {model}")
-                return found[0]
-            raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor talks there; check power, cable and port")
+                return matching[0]
+            raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor answers; check power, cable and port")
 
     def _points_s(self) -> float | None:
         """Points per second by angles and speed; None where nothing talks."""
-        deadline_s = time.monotonic() + _HEARD_S
-        told: list[float] = []
-        while len(told) < _FIRST:
+        deadline_s = time.monotonic() + _FIRST_PACKETS_S
+        rates: list[float] = []
+        while len(rates) < _FIRST:
             try:
                 packets, _ = self._line.hear(self._splitter.feed, deadline_s)
             except DeviceTimeoutError:
                 return None
-            told += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
-        return float(np.median(told)) or None
+            rates += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
+        return float(np.median(rates)) or None
 
     def _begin_anew(self) -> None:
         self._turns.begin_anew(self._skip)

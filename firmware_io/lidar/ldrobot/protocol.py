@@ -111,11 +111,11 @@ class LdrobotSplitter:
     def feed(self, data: bytes) -> list[LdrobotPacket]:
         """The packets that these bytes complete."""
         self._rest += data
-        found: list[LdrobotPacket] = []
+        packets: list[LdrobotPacket] = []
         at = 0
         while at + SIZE <= len(self._rest):
             try:
-                found.append(packet(self._rest[at : at + SIZE]))
+                packets.append(packet(self._rest[at : at + SIZE]))
             except ProtocolError:
                 following = self._rest.find(HEAD, at + 1)
                 # without a head all is nothing, but for a last byte that may be half of one
@@ -127,4 +127,4 @@ class LdrobotSplitter:
                 self._passed = 0
                 at += SIZE
         self._rest = self._rest[at:]
-        return found
+        return packets

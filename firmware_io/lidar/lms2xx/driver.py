@@ -100,11 +100,13 @@ class LmsLidar:
         """
         if intensity or cluster != 1:
             what = "intensity" if intensity else f"cluster = {cluster}"
-            raise DeviceError(f"{self._line.name}: {what}: a {self.model} tells ranges only, each beam's: leave it out")
+            raise DeviceError(
+                f"{self._line.name}: {what}: a {self.model} sends one range for each beam, nothing else; omit it"
+            )
         step_centideg = round(36_000 / self._lidar.steps_per_turn)
-        told = self._ask(protocol.variant(180, step_centideg), protocol.VARIANT, _MODE_S)
-        if protocol.accepted_variant(told) != (180, step_centideg):
-            raise DeviceError(f"{self._line.name}: it refuses 180 deg in steps of {step_centideg / 100:g} deg")
+        reply = self._ask(protocol.variant(180, step_centideg), protocol.VARIANT, _MODE_S)
+        if protocol.accepted_variant(reply) != (180, step_centideg):
+            raise DeviceError(f"{self._line.name}: it rejects 180 deg in steps of {step_centideg / 100:g} deg")
         self._speed_up()
         self._mode(protocol.STREAM)
         self._skip = skip
@@ -131,14 +133,14 @@ class LmsLidar:
         patience_s = _SCAN_S if timeout_s is None else timeout_s
         deadline_s = time.monotonic() + patience_s
         while not self._waiting:
-            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._count.pause_s)
-            if not heard:
+            telegrams, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._count.pause_s)
+            if not telegrams:
                 self._splitter.cut_in()
                 self._count.resume()
                 deadline_s = time.monotonic() + patience_s
-            for told in heard:
-                if told.command == protocol.SCAN:
-                    self._take(told, arrival_ns)
+            for reply in telegrams:
+                if reply.command == protocol.SCAN:
+                    self._take(reply, arrival_ns)
         return self._waiting.popleft()
 
     def condition(self) -> tuple[str, ...]:
@@ -165,7 +167,7 @@ class LmsLidar:
         def connect() -> None:
             self._line.reopen()
             # the plug was out, and it streams on, or the power was; to look for it at all four costs a second more
-            streams = self._is_heard_at(before)
+            streams = self._receives_at(before)
             self._recognise(self.model, (before, _POWER_UP_BAUD) if streams else (_POWER_UP_BAUD, before))
             if scanning:
                 with self._line.closed_on_error():
@@ -176,11 +178,11 @@ class LmsLidar:
         finally:
             self._scanning = scanning
 
-    def _is_heard_at(self, baud: int) -> bool:
+    def _receives_at(self, baud: int) -> bool:
         """Whether anything comes at this speed, within some turns."""
         if self._line.serial is not None:
             self._line.serial.baud = baud
-        with self._line.closed_on_error(), self._line.told_when_gone():
+        with self._line.closed_on_error(), self._line.broken_line_as_error():
             return bool(self._line.stream.read(_STREAM_S))
 
     def _recognise(self, model: str | None, bauds: tuple[int, ...]) -> None:
@@ -193,27 +195,27 @@ class LmsLidar:
                     self._line.serial.baud = baud
                 self._baud = baud
                 for _ in range(_TRIES):
-                    before = self._line.heard
+                    before = self._line.received
                     try:
                         self._mode(protocol.ON_REQUEST, _ANSWER_S)
-                        told = self._ask(protocol.telegram(protocol.TYPE), protocol.TYPE)
+                        reply = self._ask(protocol.telegram(protocol.TYPE), protocol.TYPE)
                     except DeviceTimeoutError:
-                        if self._line.heard == before and baud != _POWER_UP_BAUD:
+                        if self._line.received == before and baud != _POWER_UP_BAUD:
                             break
                         continue
-                    self._accept(told.values[:-1].decode("ascii", "replace"), model)
+                    self._accept(reply.values[:-1].decode("ascii", "replace"), model)
                     self._splitter.bad = 0  # what was on its way when we came is nobody's fault
                     return
             raise DeviceTimeoutError(f"{self.address}: no SICK LMS 2xx answers; check power, cable and port")
 
-    def _accept(self, said: str, model: str | None) -> None:
+    def _accept(self, type_text: str, model: str | None) -> None:
         lidars = [one for one in load_catalogue() if isinstance(one, Lidar) and one.family == FAMILY]
-        found = next((one for one in lidars if said.startswith(one.name.replace(" ", ""))), None)
-        if found is None or model not in (None, found.name):
+        product = next((one for one in lidars if type_text.startswith(one.name.replace(" ", ""))), None)
+        if product is None or model not in (None, product.name):
             wanted = model or "LMS that is known"
-            raise DeviceError(f"{self._line.name}: it calls itself '{said.strip()}': not a {wanted}")
-        self._lidar, self.firmware = found, said.rpartition(";")[2].strip()
-        self._interlaced = max(round(_TURN_S**-1 / found.scan_rate_hz), 1)
+            raise DeviceError(f"{self._line.name}: it calls itself '{type_text.strip()}': not a {wanted}")
+        self._lidar, self.firmware = product, type_text.rpartition(";")[2].strip()
+        self._interlaced = max(round(_TURN_S**-1 / product.scan_rate_hz), 1)
 
     def _speed_up(self) -> None:
         """The fastest speed that both ends can: what is slower than its scans loses turns."""
@@ -229,45 +231,45 @@ class LmsLidar:
                 return
 
     def _mode(self, mode: int, timeout_s: float = _MODE_S) -> None:
-        told = self._ask(protocol.telegram(protocol.MODE, bytes([mode])), protocol.MODE, timeout_s)
-        if told.values[:1] != b"\0":
-            raise DeviceError(f"{self._line.name}: it refuses mode {mode:02X}")
+        reply = self._ask(protocol.telegram(protocol.MODE, bytes([mode])), protocol.MODE, timeout_s)
+        if reply.values[:1] != b"\0":
+            raise DeviceError(f"{self._line.name}: it rejects mode {mode:02X}")
 
     def _ask(self, request: bytes, command: int, timeout_s: float = _ANSWER_S) -> protocol.LmsTelegram:
         self._line.send(request)
         deadline_s = time.monotonic() + timeout_s
         while True:
-            heard, _ = self._line.hear(self._splitter.feed, deadline_s)
-            for told in heard:
-                if told.command == command | protocol.ANSWER:
-                    return told
+            telegrams, _ = self._line.hear(self._splitter.feed, deadline_s)
+            for reply in telegrams:
+                if reply.command == command | protocol.ANSWER:
+                    return reply
             if time.monotonic() > deadline_s:  # it streams on, and answers nothing
                 raise DeviceTimeoutError(f"{self._line.name}: no answer to {command:02X}")
 
-    def _take(self, told: protocol.LmsTelegram, arrival_ns: int) -> None:
+    def _take(self, reply: protocol.LmsTelegram, arrival_ns: int) -> None:
         try:
-            taken = protocol.scan(told)
+            measured = protocol.scan(reply)
         except ProtocolError:
             self._bad_scans += 1
             return
         beams = self._lidar.last_step - self._lidar.first_step + 1
-        if taken.range_m.size != beams:
+        if measured.range_m.size != beams:
             self._bad_scans += 1
             return
-        if taken.status & 7 >= protocol.FATAL:
-            fault = f"it reports a fault (status {taken.status:02X})"
-            raise DeviceFaultError(f"{self._line.name}: {fault}: look at its lamps")
+        if measured.status & 7 >= protocol.FATAL:
+            fault = f"it reports a fault (status {measured.status:02X})"
+            raise DeviceFaultError(f"{self._line.name}: {fault}: check its lamps")
         assert self._count is not None
-        for held, over_ns, came_ns in self._count.add(taken, arrival_ns):
+        for ready, over_ns, came_ns in self._count.add(measured, arrival_ns):
             for turn in range(self._interlaced):
                 self._skipped += 1
                 if self._skipped > self._skip:
                     self._skipped = 0
                     before_ns = (self._interlaced - 1 - turn + 0.5) * 1e9 * _TURN_S
-                    self._waiting.append(self._turn(held, turn, self._count, over_ns - before_ns, came_ns))
+                    self._waiting.append(self._turn(ready, turn, self._count, over_ns - before_ns, came_ns))
 
     def _turn(
-        self, taken: protocol.LmsScan, turn: int, count: TelegramCount, begin_ns: float, arrival_ns: int
+        self, measured: protocol.LmsScan, turn: int, count: TelegramCount, begin_ns: float, arrival_ns: int
     ) -> TimedScan:
         """The beams of one turn, which begins at -90 deg at `begin_ns`."""
         bearing_rad = self._lidar.bearings_rad()[turn :: self._interlaced]
@@ -281,12 +283,12 @@ class LmsLidar:
             scan_time_s=_TURN_S * (self._skip + 1),
             range_min_m=self._lidar.range_min_mm / 1e3,
             range_max_m=self._lidar.range_max_mm / 1e3,
-            range_m=taken.range_m[turn :: self._interlaced],
+            range_m=measured.range_m[turn :: self._interlaced],
             intensity=np.empty(0, np.float32),
         )
-        warning = "its window is dirty: clean it" if taken.status & protocol.POLLUTED else ""
+        warning = "its window is dirty: clean it" if measured.status & protocol.POLLUTED else ""
         if not warning and self._baud < _FAST_BAUD:
-            warning = f"at {self._baud} baud most of its turns are lost: take an adapter that can {_FAST_BAUD}"
+            warning = f"at {self._baud} baud most turns are lost; use an adapter with {_FAST_BAUD} baud"
         return TimedScan(scan, arrival_ns, count.arrivals.uncertainty_ns, warning)
 
 

@@ -87,35 +87,35 @@ def variant(angle_deg: int, step_centideg: int) -> bytes:
     return telegram(VARIANT, struct.pack("<HH", angle_deg, step_centideg))
 
 
-def accepted_variant(told: LmsTelegram) -> tuple[int, int] | None:
+def accepted_variant(reply: LmsTelegram) -> tuple[int, int] | None:
     """Field [deg] and step [0.01 deg] that it has now; None where it refuses.
 
     Raises:
         ProtocolError: it is no answer to VARIANT.
     """
-    if told.command != VARIANT | ANSWER or len(told.values) != 6:
-        raise ProtocolError(f"LMS 2xx: {len(told.values)} bytes about its variant, not 6")
-    done, angle_deg, step_centideg, _ = struct.unpack("<BHHB", told.values)
+    if reply.command != VARIANT | ANSWER or len(reply.values) != 6:
+        raise ProtocolError(f"LMS 2xx: {len(reply.values)} bytes about its variant, not 6")
+    done, angle_deg, step_centideg, _ = struct.unpack("<BHHB", reply.values)
     return (angle_deg, step_centideg) if done == 1 else None
 
 
-def scan(told: LmsTelegram) -> LmsScan:
+def scan(reply: LmsTelegram) -> LmsScan:
     """The ranges of a telegram that is a whole scan.
 
     Raises:
         ProtocolError: it is none, a part of one, of an unknown unit, or cut.
     """
-    if told.command != SCAN or len(told.values) < 3:
-        raise ProtocolError(f"LMS 2xx: telegram {told.command:02X}: no scan")
-    head = told.values[0] | told.values[1] << 8
+    if reply.command != SCAN or len(reply.values) < 3:
+        raise ProtocolError(f"LMS 2xx: telegram {reply.command:02X}: no scan")
+    head = reply.values[0] | reply.values[1] << 8
     count, partial, unit = head & 0x3FF, head >> 13 & 1, head >> 14
     if partial or unit not in (0, 1):
         raise ProtocolError(f"LMS 2xx: a scan of kind {head >> 10:06b}: not whole, or neither in cm nor in mm")
-    if len(told.values) != 2 + 2 * count + 1:
-        raise ProtocolError(f"LMS 2xx: {len(told.values) - 3} bytes for {count} ranges")
-    raw = np.frombuffer(told.values, "<u2", count, 2) & 0x1FFF
+    if len(reply.values) != 2 + 2 * count + 1:
+        raise ProtocolError(f"LMS 2xx: {len(reply.values) - 3} bytes for {count} ranges")
+    raw = np.frombuffer(reply.values, "<u2", count, 2) & 0x1FFF
     range_m = np.where((raw > 0) & (raw < _FIRST_CODE), raw * (1e-3 if unit else 1e-2), np.nan)
-    return LmsScan(range_m.astype(np.float32), told.status)
+    return LmsScan(range_m.astype(np.float32), reply.status)
 
 
 class LmsSplitter:
@@ -137,7 +137,7 @@ class LmsSplitter:
     def feed(self, data: bytes) -> list[LmsTelegram]:
         """The telegrams that these bytes complete."""
         self._rest += data
-        found: list[LmsTelegram] = []
+        telegrams: list[LmsTelegram] = []
         at = 0
         while at < len(self._rest):
             size = _announced(self._rest[at : at + 4])
@@ -145,7 +145,7 @@ class LmsSplitter:
                 break
             one = self._rest[at : at + (size or 0)]
             if size and crc16(one[:-2]) == one[-2] | one[-1] << 8:
-                found.append(LmsTelegram(one[1], one[4], one[5:-2]))
+                telegrams.append(LmsTelegram(one[1], one[4], one[5:-2]))
                 self._lost = False
                 at += size
                 continue
@@ -154,7 +154,7 @@ class LmsSplitter:
                 self._lost = True
             at += 1
         self._rest = self._rest[at:]
-        return found
+        return telegrams
 
     @property
     def rest(self) -> bytes:

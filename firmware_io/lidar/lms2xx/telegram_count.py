@@ -41,24 +41,24 @@ class TelegramCount:
     def _begin(self, ended_ns: int) -> None:
         """A new line; `ended_ns` is the arrival of the last telegram before, 0 if nothing is missing before it."""
         self.arrivals = ArrivalLine(smallest_delay_ns=self._telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
-        self._held: list[tuple[LmsScan, int]] = []
+        self._pending: list[tuple[LmsScan, int]] = []
         self._number, self._ended_ns = 0, ended_ns
 
     def add(self, scan: LmsScan, arrival_ns: int) -> list[tuple[LmsScan, float, int]]:
         """The scans that are known by now, each with the sensor's time of its end [ns] and its arrival."""
-        self._held.append((scan, arrival_ns))
+        self._pending.append((scan, arrival_ns))
         numbers = self._numbers()
         if numbers[-1] > self._number + len(numbers) and len(numbers) < self._patience:
             return []
         if not self._number and self._ended_ns:
             self.lost += max(round((arrival_ns - self._ended_ns) / self._period_ns) - 1, 0)
         known = []
-        for number, (held, came_ns) in zip(numbers, self._held, strict=True):
+        for number, (pending, came_ns) in zip(numbers, self._pending, strict=True):
             self.lost += number - self._number - 1
             self._number = number
             self.arrivals.add(number * self._period_ns, came_ns)
-            known.append((held, number * self._period_ns, came_ns))
-        self._held = []
+            known.append((pending, number * self._period_ns, came_ns))
+        self._pending = []
         return known
 
     def _numbers(self) -> list[int]:
@@ -67,12 +67,12 @@ class TelegramCount:
         Which number fits an arrival says the line; but one that comes late, with others close behind it, looks as if
         some had been lost before it. As none comes early, the least that any of those behind it allows is right.
         """
-        least = [self._number + 1 + k for k in range(len(self._held))]
+        least = [self._number + 1 + k for k in range(len(self._pending))]
         if not self._number:
             return least
         numbers: list[int] = []
         above = math.inf
-        for at_least, (_, came_ns) in zip(reversed(least), reversed(self._held), strict=True):
+        for at_least, (_, came_ns) in zip(reversed(least), reversed(self._pending), strict=True):
             late_ns = came_ns - self._telegram_ns - self.arrivals.host_ns(at_least * self._period_ns)
             above = min(above - 1, at_least + max(round(late_ns / self._period_ns), 0))
             numbers.append(int(above))

@@ -61,9 +61,9 @@ class ScipDialogue:
         self.line.send(request + b"\n")
         deadline_s = time.monotonic() + (_ANSWER_S if timeout_s is None else timeout_s)
         while True:
-            told, arrival_ns = self.next(deadline_s)
-            if told.echo == request and not measurement.is_scan(told):
-                return told, arrival_ns
+            reply, arrival_ns = self.next(deadline_s)
+            if reply.echo == request and not measurement.is_scan(reply):
+                return reply, arrival_ns
 
     def insist(self, request: bytes, *statuses: str) -> None:
         """Ask, and take no other status for an answer.
@@ -71,15 +71,15 @@ class ScipDialogue:
         Raises:
             DeviceError: it has another one; or as `ask` does.
         """
-        told = self.ask(request)
-        if told.status not in statuses:
-            raise DeviceError(f"{self.line.name}: {told.echo.decode()}: status {told.status}: {told.told()}")
+        reply = self.ask(request)
+        if reply.status not in statuses:
+            raise DeviceError(f"{self.line.name}: {reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
 
     def next(self, deadline_s: float) -> tuple[protocol.Reply, int]:
         """What it says next and when that came; raises as `SensorLine.hear` does."""
         if not self._waiting:
             replies, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
-            self._waiting.extend((told, arrival_ns) for told in replies)
+            self._waiting.extend((reply, arrival_ns) for reply in replies)
         return self._waiting.popleft()
 
     def speed_up(self, bytes_s: float, without_speed: Callable[[], Iterable[str]]) -> None:
@@ -122,18 +122,18 @@ class ScipDialogue:
             if port is not None and port.baud != baud:
                 port.baud = baud
             for _ in range(_TRIES):
-                before = self.line.heard
+                before = self.line.received
                 try:
-                    told = self.ask(b"QT", timeout_s=_ANSWER_S / 2)
+                    reply = self.ask(b"QT", timeout_s=_ANSWER_S / 2)
                 except DeviceTimeoutError:
-                    if self.line.heard == before and baud != _BAUDS[0]:
+                    if self.line.received == before and baud != _BAUDS[0]:
                         break
                     continue
-                if told.status == "00":
+                if reply.status == "00":
                     if port is not None and baud != FIRST_BAUD:
                         self.insist(b"SS%06d" % FIRST_BAUD, "00", "03", "04")
                         port.baud = FIRST_BAUD
                     return
                 # SCIP 1.1 knows no QT; a sensor that is adjusting its time knows nothing but TM.
-                self.ask(protocol.SCIP_2 if len(told.status) == 1 else b"TM2")
+                self.ask(protocol.SCIP_2 if len(reply.status) == 1 else b"TM2")
         raise DeviceTimeoutError(f"{self.line.address}: no SCIP sensor answers; check power, cable and port")

@@ -105,8 +105,8 @@ class ScipLidar:
         Raises:
             DeviceError: it does not answer, or is gone.
         """
-        said = self.information("II").get("STAT", "")
-        return (f"it says: {said}",) if _is_well(said) else ()
+        status = self.information("II").get("STAT", "")
+        return (f"status: {status}",) if _is_well(status) else ()
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; the laser lights by itself.
@@ -142,14 +142,14 @@ class ScipLidar:
         """The next scan as the sensor sent it; raises as `read` does, whose clock it passes by."""
         deadline_s = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
         while True:
-            told, arrival_ns = self._dialogue.next(deadline_s)
-            if told.echo[:-2] != self._request[:-2] or told.status == "00":
+            reply, arrival_ns = self._dialogue.next(deadline_s)
+            if reply.echo[:-2] != self._request[:-2] or reply.status == "00":
                 continue
-            if told.status.isdigit() and 50 <= int(told.status) <= 97:
-                raise DeviceError(f"{self._dialogue.line.name}: status {told.status}: {told.told()}")
-            if measurement.is_scan(told):
+            if reply.status.isdigit() and 50 <= int(reply.status) <= 97:
+                raise DeviceError(f"{self._dialogue.line.name}: status {reply.status}: {reply.meaning()}")
+            if measurement.is_scan(reply):
                 try:
-                    return self._raw(measurement.measurement(told), arrival_ns)
+                    return self._raw(measurement.measurement(reply), arrival_ns)
                 except ProtocolError:
                     self._bad_scans += 1
 
@@ -199,8 +199,8 @@ class ScipLidar:
 
     def _scan_on(self) -> None:
         self._stamp_ms = -1
-        said = self.information("II").get("STAT", "")
-        self._warning = f"it says of itself: {said}: give its power anew" if said and not _is_well(said) else ""
+        status = self.information("II").get("STAT", "")
+        self._warning = f"status: {status}; switch it off and on" if status and not _is_well(status) else ""
         self._dialogue.insist(self._request, "00")
 
     def _synchronise(self) -> TimeSync | None:
@@ -210,10 +210,10 @@ class ScipLidar:
         try:
             exchanges = []
             for _ in range(_EXCHANGES):
-                asked_ns = time.monotonic_ns()
-                told, answered_ns = self._dialogue.ask_timed(b"TM1")
-                stamp_ms = self._counter.unwrap(measurement.stamp(told), answered_ns)
-                exchanges.append(Exchange(asked_ns, stamp_ms, answered_ns))
+                sent_ns = time.monotonic_ns()
+                reply, answered_ns = self._dialogue.ask_timed(b"TM1")
+                stamp_ms = self._counter.unwrap(measurement.stamp(reply), answered_ns)
+                exchanges.append(Exchange(sent_ns, stamp_ms, answered_ns))
         finally:
             self._dialogue.insist(b"TM2", "00", "03")
         return synchronised(exchanges)
@@ -237,8 +237,8 @@ class ScipLidar:
             clock.synchronise(self.sync)
         return clock
 
-    def _raw(self, taken: measurement.Measurement, arrival_ns: int) -> RawScan:
-        stamp_ms = self._counter.unwrap(taken.stamp_ms, arrival_ns)
+    def _raw(self, measured: measurement.Measurement, arrival_ns: int) -> RawScan:
+        stamp_ms = self._counter.unwrap(measured.stamp_ms, arrival_ns)
         if 0 <= self._stamp_ms < stamp_ms:
             period_ms = self.parameters.scan_period_s * 1e3 * (self._skip + 1)
             self.dropped += max(round((stamp_ms - self._stamp_ms) / period_ms) - 1, 0)
@@ -247,15 +247,15 @@ class ScipLidar:
             stamp_ms=stamp_ms,
             restarts=self._counter.restarts,
             arrival_ns=arrival_ns,
-            first_step=taken.window.first_step,
-            cluster=taken.window.cluster,
-            range_m=parameters.ranges_m(taken.value, self.parameters),
-            intensity=taken.intensity.astype("float32"),
+            first_step=measured.window.first_step,
+            cluster=measured.window.cluster,
+            range_m=parameters.ranges_m(measured.value, self.parameters),
+            intensity=measured.intensity.astype("float32"),
         )
 
 
-def _is_well(said: str) -> bool:
-    return said.rstrip(". ").lower() in _WELL
+def _is_well(status: str) -> bool:
+    return status.rstrip(". ").lower() in _WELL
 
 
 def open_scip(address: str, _model: str | None = None, stamp_at: StampAt = "step_0") -> ScipLidar:

@@ -43,7 +43,7 @@ class Window:
         return (self.last_step - self.first_step) // self.cluster + 1
 
     @property
-    def whole_clusters(self) -> int:
+    def full_clusters(self) -> int:
         """Number of ranges of a sensor that sends none for steps that fill no cluster: which do is not known."""
         return (self.last_step - self.first_step + 1) // self.cluster
 
@@ -85,20 +85,20 @@ def continuous(window: Window, *, skip: int = 0, count: int = 0) -> bytes:
     return f"M{window.letter}{_steps(window)}{skip}{count:02d}".encode()
 
 
-def is_scan(told: Reply) -> bool:
+def is_scan(reply: Reply) -> bool:
     """Whether a reply carries a scan, and is not the word that scans will come or will not."""
-    return (told.echo[:1] == b"M" and told.status == "99") or (told.echo[:1] == b"G" and told.status == "00")
+    return (reply.echo[:1] == b"M" and reply.status == "99") or (reply.echo[:1] == b"G" and reply.status == "00")
 
 
-def measurement(told: Reply) -> Measurement:
+def measurement(reply: Reply) -> Measurement:
     """The numbers of a scan reply.
 
     Raises:
         ProtocolError: it is none, or lines or numbers are missing, or too many.
     """
-    match = _SCAN_ECHO.fullmatch(told.echo)
-    if match is None or not is_scan(told):
-        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
+    match = _SCAN_ECHO.fullmatch(reply.echo)
+    if match is None or not is_scan(reply):
+        raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
     _, letter, first, last, cluster, _, remaining = match.groups()
     window = Window(
         first_step=int(first),
@@ -107,26 +107,26 @@ def measurement(told: Reply) -> Measurement:
         characters=2 if letter == b"S" else 3,
         intensity=letter == b"E",
     )
-    stamp, *data = told.lines or (b"",)
+    stamp, *data = reply.lines or (b"",)
     if len(stamp) != 4 or any(len(line) != LINE_CHARACTERS for line in data[:-1]):
-        raise ProtocolError(f"{told.echo.decode()}: a line was cut")
+        raise ProtocolError(f"{reply.echo.decode()}: a line was cut")
     numbers = decode(b"".join(data), window.characters)
     each = 2 if window.intensity else 1
-    if numbers.size not in (window.size * each, window.whole_clusters * each):
-        raise ProtocolError(f"{told.echo.decode()}: {numbers.size} numbers for {window.size} steps")
+    if numbers.size not in (window.size * each, window.full_clusters * each):
+        raise ProtocolError(f"{reply.echo.decode()}: {numbers.size} numbers for {window.size} steps")
     value, intensity = (numbers[::2], numbers[1::2]) if window.intensity else (numbers, numbers[:0])
     return Measurement(window, int(remaining or 0), int(decode(stamp, 4)[0]), value, intensity)
 
 
-def stamp(told: Reply) -> int:
+def stamp(reply: Reply) -> int:
     """The sensor's clock [ms, 24 bit] from a TM1 reply.
 
     Raises:
         ProtocolError: it is none.
     """
-    if told.echo[:3] != b"TM1" or told.status != "00" or len(told.lines) != 1 or len(told.lines[0]) != 4:
-        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
-    return int(decode(told.lines[0], 4)[0])
+    if reply.echo[:3] != b"TM1" or reply.status != "00" or len(reply.lines) != 1 or len(reply.lines[0]) != 4:
+        raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
+    return int(decode(reply.lines[0], 4)[0])
 
 
 def _steps(window: Window) -> str:

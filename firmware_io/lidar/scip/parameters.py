@@ -69,7 +69,7 @@ class Parameters:
         return (step - (rear_step if stamp_at == "rear" else 0.0)) * self.step_s
 
 
-def parameters(told: Mapping[str, str]) -> Parameters:
+def parameters(fields: Mapping[str, str]) -> Parameters:
     """The record of a PP reply.
 
     Raises:
@@ -77,22 +77,22 @@ def parameters(told: Mapping[str, str]) -> Parameters:
     """
     try:
         known = Parameters(
-            model=told["MODL"].partition("(")[0].strip(),
-            range_min_mm=int(told["DMIN"]),
-            range_max_mm=int(told["DMAX"]),
-            steps_per_turn=int(told["ARES"]),
-            first_step=int(told["AMIN"]),
-            last_step=int(told["AMAX"]),
-            front_step=int(told["AFRT"]),
-            rpm=int(told["SCAN"]),
+            model=fields["MODL"].partition("(")[0].strip(),
+            range_min_mm=int(fields["DMIN"]),
+            range_max_mm=int(fields["DMAX"]),
+            steps_per_turn=int(fields["ARES"]),
+            first_step=int(fields["AMIN"]),
+            last_step=int(fields["AMAX"]),
+            front_step=int(fields["AFRT"]),
+            rpm=int(fields["SCAN"]),
         )
     except KeyError as error:
-        raise ProtocolError(f"PP: the sensor tells no {error.args[0]}") from error
+        raise ProtocolError(f"PP: {error.args[0]} is missing") from error
     except ValueError as error:
         raise ProtocolError(f"PP: {error}") from error
     ordered = 0 <= known.first_step < known.last_step < known.first_step + known.steps_per_turn
     if not (ordered and known.rpm > 0 and 0 <= known.range_min_mm < known.range_max_mm):
-        raise ProtocolError(f"PP: the values contradict each other: {dict(told)}")
+        raise ProtocolError(f"PP: the values contradict each other: {dict(fields)}")
     return known
 
 

@@ -67,7 +67,7 @@ class Reply:
         """The two letters that say what it is."""
         return self.echo[:2]
 
-    def told(self) -> str:
+    def meaning(self) -> str:
         """The status in words."""
         if self.status.isdigit() and 21 <= int(self.status) <= 49:
             return "the sensor stopped to check itself"
@@ -164,7 +164,7 @@ class Splitter:
         if len(self._pending) > LONGEST_REPLY:
             self.bad += 1
             self._pending = b""
-        return [told for block in blocks for told in self._parsed(block.strip(b"\n"))]
+        return [reply for block in blocks for reply in self._parsed(block.strip(b"\n"))]
 
     def _parsed(self, block: bytes) -> list[Reply]:
         if not block:
@@ -179,17 +179,17 @@ class Splitter:
             return []
 
 
-def information(told: Reply) -> dict[str, str]:
+def information(reply: Reply) -> dict[str, str]:
     """Keys and texts of a VV, PP or II reply.
 
     Raises:
         ProtocolError: the sensor refused, or a line is not `KEY:text`.
     """
-    if told.status != "00":
-        raise ProtocolError(f"{told.echo.decode()}: status {told.status}: {told.told()}")
-    pairs = [line.decode("ascii", "replace").partition(":") for line in told.lines]
+    if reply.status != "00":
+        raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
+    pairs = [line.decode("ascii", "replace").partition(":") for line in reply.lines]
     if not all(colon for _, colon, _ in pairs):
-        raise ProtocolError(f"{told.echo.decode()}: a line without a key")
+        raise ProtocolError(f"{reply.echo.decode()}: a line without a key")
     return {key: text for key, _, text in pairs}
 
 

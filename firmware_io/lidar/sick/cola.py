@@ -26,7 +26,7 @@ _STX, _ETX = 0x02, 0x03
 _WORDS = (b"sRN", b"sRA", b"sWN", b"sWA", b"sMN", b"sMA", b"sAN", b"sEN", b"sEA", b"sSN", b"sFA")
 
 ERRORS = {
-    0x01: "access denied: it wants a login",
+    0x01: "access denied: login required",
     0x02: "unknown method",
     0x03: "unknown variable",
     0x04: "a condition for it is not met",
@@ -179,19 +179,19 @@ class TelegramSplitter:
     def feed(self, received: bytes) -> list[Telegram]:
         """The telegrams that are whole now."""
         self._buffer += received
-        found: list[Telegram] = []
+        telegrams: list[Telegram] = []
         while self._buffer:
             used, telegram, broken = _first(self._buffer)
             if not used:
                 break
             self._buffer = self._buffer[used:]
             if telegram is not None:
-                found.append(telegram)
+                telegrams.append(telegram)
                 self._lost = False
             else:
                 self.bad += broken or not self._lost
                 self._lost = True
-        return found
+        return telegrams
 
     @property
     def rest(self) -> bytes:

@@ -92,14 +92,14 @@ class ColaDialogue:
             DeviceTimeoutError: none came.
             DeviceError: the sensor is gone.
         """
-        asked = out.telegram()
-        name = asked.name.decode()
+        request = out.telegram()
+        name = request.name.decode()
         deadline_s = time.monotonic() + _ANSWER_S
         while True:
-            told = self._answer(asked, deadline_s)
-            if told.word != b"sFA":
-                return told.values()
-            code = self.checked(name, error_code, told)
+            reply = self._answer(request, deadline_s)
+            if reply.word != b"sFA":
+                return reply.values()
+            code = self.checked(name, error_code, reply)
             if code != _BUSY or time.monotonic() > deadline_s:
                 raise RefusedError(f"{self.line.name}: {name}: {error_words(code)}", code)
             time.sleep(POLL_S / 2)
@@ -131,18 +131,18 @@ class ColaDialogue:
         """What it says next and when that came; raises as `SensorLine.hear` does."""
         if not self._waiting:
             telegrams, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
-            self._waiting.extend((told, arrival_ns) for told in telegrams)
+            self._waiting.extend((reply, arrival_ns) for reply in telegrams)
         return self._waiting.popleft()
 
-    def _answer(self, asked: Telegram, deadline_s: float) -> Telegram:
+    def _answer(self, request: Telegram, deadline_s: float) -> Telegram:
         self._waiting.clear()
-        self.line.send(framed(asked))
+        self.line.send(framed(request))
         while True:
-            told, _ = self.next(deadline_s)
-            if told.binary == asked.binary and (
-                told.word == b"sFA" or (told.word, told.name) == (_ANSWERS[asked.word], asked.name)
+            reply, _ = self.next(deadline_s)
+            if reply.binary == request.binary and (
+                reply.word == b"sFA" or (reply.word, reply.name) == (_ANSWERS[request.word], request.name)
             ):
-                return told
+                return reply
 
     def _begin(self) -> None:
         self._splitter = TelegramSplitter()

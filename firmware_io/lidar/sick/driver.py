@@ -57,15 +57,15 @@ class SickLidar:
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
         self._dialogue = ColaDialogue(address)
         with self._dialogue.line.closed_on_error():
-            said = self._identity()
+            identity = self._identity()
             known = [lidar.name for lidar in load_catalogue() if isinstance(lidar, Lidar) and lidar.family == "sick"]
-            if model is None and said[0] not in known:
+            if model is None and identity[0] not in known:
                 raise DeviceError(
-                    f"{self._name} calls itself '{said[0]}', which leaves open what it is: name its model; "
+                    f"{self._name} calls itself '{identity[0]}', which leaves open what it is: name its model; "
                     f"known: {', '.join(sorted(known))}"
                 )
-            self.model = model or said[0]
-            self.firmware = said[1]
+            self.model = model or identity[0]
+            self.firmware = identity[1]
             self.serial_number = self._serial_number()
         self._product = load_catalogue().get(self.model, Lidar)
         self._forget()
@@ -95,8 +95,8 @@ class SickLidar:
             DeviceError: it does not answer, or is gone.
         """
         hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
-        told = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
-        return (*told, *([] if starts is None else [f"it was switched on {starts:,} times"]))
+        age = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
+        return (*age, *([] if starts is None else [f"it was switched on {starts:,} times"]))
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`, at the rate and resolution of the catalogue.
@@ -110,7 +110,7 @@ class SickLidar:
             DeviceError: the sensor refuses, does not get ready, or is gone.
         """
         if cluster != 1:
-            raise DeviceError(f"{self._name}: cluster = {cluster}: a {self.model} cannot, take 1")
+            raise DeviceError(f"{self._name}: cluster = {cluster}: a {self.model} sends every beam; use 1")
         self._begin(intensity, skip, _READY_S)
 
     def _begin(self, intensity: bool, skip: int, patience_s: float) -> None:
@@ -137,11 +137,11 @@ class SickLidar:
         """
         deadline_s = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
         while True:
-            told, arrival_ns = self._dialogue.next(deadline_s)
-            if (told.word, told.name) != (b"sSN", b"LMDscandata"):
+            reply, arrival_ns = self._dialogue.next(deadline_s)
+            if (reply.word, reply.name) != (b"sSN", b"LMDscandata"):
                 continue
             try:
-                scan = scan_data(told)
+                scan = scan_data(reply)
                 return self._timed(scan, arrival_ns)
             except ProtocolError:
                 self._bad_scans += 1
@@ -185,26 +185,26 @@ class SickLidar:
 
     def _identity(self) -> tuple[str, str]:
         """Name and version, as the sensor writes them."""
-        told = self._dialogue.ask(self._dialogue.writer("sRN DeviceIdent"))
-        return self._dialogue.checked("DeviceIdent", told.text).strip(), self._dialogue.checked(
-            "DeviceIdent", told.text
+        reply = self._dialogue.ask(self._dialogue.writer("sRN DeviceIdent"))
+        return self._dialogue.checked("DeviceIdent", reply.text).strip(), self._dialogue.checked(
+            "DeviceIdent", reply.text
         ).strip()
 
     def _serial_number(self) -> str:
         """Empty from a sensor that does not tell it."""
         try:
-            told = self._dialogue.ask(self._dialogue.writer("sRN SerialNumber"))
+            reply = self._dialogue.ask(self._dialogue.writer("sRN SerialNumber"))
         except RefusedError:
             return ""
-        return self._dialogue.checked("SerialNumber", told.text).strip()
+        return self._dialogue.checked("SerialNumber", reply.text).strip()
 
     def _counter(self, name: str) -> int | None:
         """None from a sensor that does not count this, or tells it to others only."""
         try:
-            told = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
+            reply = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
         except RefusedError:
             return None
-        return self._dialogue.checked(name, told.number, "u32")
+        return self._dialogue.checked(name, reply.number, "u32")
 
     def _login(self) -> None:
         out = self._dialogue.writer("sMN SetAccessMode").number("u8", _CLIENT).number("u32", _PASSWORD)
@@ -238,8 +238,8 @@ class SickLidar:
     def _timed(self, scan: ScanData, arrival_ns: int) -> TimedScan:
         if scan.status & FAULT:
             if scan.status & DIRT:
-                raise DeviceFaultError(f"{self._name}: its window is too dirty to see through: clean it")
-            raise DeviceFaultError(f"{self._name}: it reports a fault of its own (status {scan.status:X})")
+                raise DeviceFaultError(f"{self._name}: its window is too dirty to measure: clean it")
+            raise DeviceFaultError(f"{self._name}: it reports a fault (status {scan.status:X})")
         first = scan.channel("DIST1")
         if first is None:
             raise ProtocolError("no DIST1")
@@ -255,7 +255,7 @@ class SickLidar:
         start_deg, step_deg = first.bearing_deg
         shown = scan.channel("RSSI1")
         intensity = shown.raw * shown.scale + shown.offset if shown else np.empty(0)
-        taken = Scan(
+        turn = Scan(
             stamp_ns=moment.time_ns - round(scan.first_beam_before_sent_us * 1e3),
             angle_min_rad=float(np.radians(start_deg)),
             angle_increment_rad=self._step_rad(step_deg),
@@ -266,8 +266,8 @@ class SickLidar:
             range_m=first.range_m(),
             intensity=intensity.astype(np.float32),
         )
-        warning = "its window is dirty, though it still sees: clean it" if scan.status & DIRT_WARNING else ""
-        return TimedScan(taken, arrival_ns, moment.uncertainty_ns, warning)
+        warning = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
+        return TimedScan(turn, arrival_ns, moment.uncertainty_ns, warning)
 
     def _step_rad(self, step_deg: float) -> float:
         """A step of a third of a degree is sent as 0.3333: 0.027 deg are missing at the end of 811 beams."""

@@ -33,6 +33,6 @@ def set_rate(dialogue: ColaDialogue, lidar: Lidar) -> None:
     code = dialogue.checked("mLMPsetscancfg", answer.number, "u8")
     if code:
         raise DeviceError(
-            f"{dialogue.line.name}: {lidar.scan_rate_hz:g} turns/s in steps of {step / 1e4:g} deg: it refuses "
+            f"{dialogue.line.name}: {lidar.scan_rate_hz:g} Hz in steps of {step / 1e4:g} deg: it rejects "
             f"{_SET_UP.get(code, f'with code {code}')}; is it a {lidar.name}?"
         )

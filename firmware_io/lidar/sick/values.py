@@ -29,7 +29,7 @@ class Reader:
         """
         bits = _bits(kind)
         if self._binary:
-            value = int.from_bytes(self._taken(bits // 8), "big")
+            value = int.from_bytes(self._next(bits // 8), "big")
         else:
             token = self._token()
             if not _TOKEN.fullmatch(token):
@@ -69,7 +69,7 @@ class Reader:
         if count * (_bits(kind) // 8 if self._binary else 2) > len(self._values) - self._at + 1:
             raise ProtocolError(f"{count} values announced, fewer came")
         if self._binary:
-            raw = self._taken(count * _bits(kind) // 8)
+            raw = self._next(count * _bits(kind) // 8)
             return list(struct.unpack(f">{count}{FORMAT[kind][1]}", raw))
         return [self.number(kind) for _ in range(count)]
 
@@ -79,7 +79,7 @@ class Reader:
         Raises:
             ProtocolError: it is cut, or not ASCII.
         """
-        raw = self._taken(length)
+        raw = self._next(length)
         if not self._binary:
             self._skip_space()
         if not (raw.isascii() and raw.decode("ascii").isprintable()):
@@ -90,7 +90,7 @@ class Reader:
         """A text of any length, its length before it; raises as `name` does."""
         return self.name(self.number("u16"))
 
-    def _taken(self, length: int) -> bytes:
+    def _next(self, length: int) -> bytes:
         if self._at + length > len(self._values):
             raise ProtocolError("the telegram ends early")
         self._at += length

@@ -15,7 +15,7 @@ from scanwright.firmware_io.lidar.slamtec import protocol
 
 _ANSWER_S = 0.5
 
-Told = TypeVar("Told")
+Answer = TypeVar("Answer")
 
 
 class SlamtecDialogue:
@@ -35,8 +35,8 @@ class SlamtecDialogue:
         self._replies = protocol.ReplySplitter()
         self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
 
-    def told(self, command: int, kind: int, read: Callable[[bytes], Told], payload: bytes = b"") -> Told:
-        """What it answers to a request.
+    def ask(self, command: int, kind: int, read: Callable[[bytes], Answer], payload: bytes = b"") -> Answer:
+        """Send a request and return its answer.
 
         Args:
             command: the request.
@@ -51,12 +51,12 @@ class SlamtecDialogue:
         self.request(command, payload)
         deadline_s = time.monotonic() + _ANSWER_S
         while True:
-            told, data = self._reply(deadline_s)
-            if told.kind == kind:
+            descriptor, data = self._reply(deadline_s)
+            if descriptor.kind == kind:
                 return read(data)
 
     def request(self, command: int, payload: bytes = b"") -> None:
-        """Ask, and forget what was told before.
+        """Send a request, and drop what came before it.
 
         Raises:
             DeviceError: the connection broke.
@@ -97,7 +97,7 @@ def typical_mode(dialogue: SlamtecDialogue) -> StreamMode:
         point_us = _configured(dialogue, protocol.CONF_SAMPLE_US, of_mode, "<I") / 256
         if kind in protocol.SIZES and point_us > 0:
             return StreamMode(number, kind, point_us * 1e3)
-    standard_us, express_us = dialogue.told(protocol.SAMPLE_TIMES, 0x15, protocol.sample_times)
+    standard_us, express_us = dialogue.ask(protocol.SAMPLE_TIMES, 0x15, protocol.sample_times)
     if express_us:
         return StreamMode(0, protocol.CAPSULES, express_us * 1e3)
     return StreamMode(0, protocol.NODES, max(standard_us, 1) * 1e3)
@@ -111,4 +111,4 @@ def _configured(dialogue: SlamtecDialogue, key: int, payload: bytes, layout: str
             raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not the configuration {key:#x}")
         return int(struct.unpack_from(layout, data, 4)[0])
 
-    return dialogue.told(protocol.GET_CONF, 0x20, value, struct.pack("<I", key) + payload)
+    return dialogue.ask(protocol.GET_CONF, 0x20, value, struct.pack("<I", key) + payload)

@@ -99,25 +99,21 @@ class SlamtecLidar:
             DeviceError: clusters, which it has not; it refuses, or is gone.
         """
         if cluster != 1:
-            raise DeviceError(
-                f"{self._line.name}: cluster = {cluster}: a {self.model} tells every point: leave it at 1"
-            )
-        status, code = self._dialogue.told(protocol.HEALTH, 6, protocol.health)
+            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every point; use 1")
+        status, code = self._dialogue.ask(protocol.HEALTH, 6, protocol.health)
         if status == 2:
-            raise DeviceFaultError(
-                f"{self._line.name}: it reports fault {code:#06x}: take its power away, and give it again"
-            )
-        self._warning = f"it reports a warning of its own health, {code:#06x}: it still scans" if status else ""
+            raise DeviceFaultError(f"{self._line.name}: it reports fault {code:#06x}; switch it off and on")
+        self._warning = f"health warning {code:#06x}; it still scans" if status else ""
         self._intensity, self._skip = intensity, skip
         self._mode = typical_mode(self._dialogue)
         self._turn_motor(on=True)
         mode = struct.pack("<BHH", self._mode.number, 0, 0)
         command = protocol.SCAN if self._mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
         self._dialogue.request(command, mode)
-        told, _ = self._dialogue.reply()
-        if not told.stream or told.kind != self._mode.kind:
-            raise DeviceError(f"{self._line.name}: it sends packets of type {told.kind:#x}, not {self._mode.kind:#x}")
-        byte_ns = self._mode.point_ns * protocol.POINTS[told.kind] / protocol.SIZES[told.kind]
+        answer, _ = self._dialogue.reply()
+        if not answer.stream or answer.kind != self._mode.kind:
+            raise DeviceError(f"{self._line.name}: it sends packets of type {answer.kind:#x}, not {self._mode.kind:#x}")
+        byte_ns = self._mode.point_ns * protocol.POINTS[answer.kind] / protocol.SIZES[answer.kind]
         self._pause_s = max(_PAUSE_S, _BUFFER_BYTES * byte_ns / 1e9)
         self._scanning, self._turning = True, False
         self._bad_before = self.bad_packets
@@ -139,9 +135,9 @@ class SlamtecLidar:
         patience_s = patience_s if timeout_s is None else timeout_s
         deadline_s = time.monotonic() + patience_s
         while (turn := self._turns.next(self._count.arrivals)) is None:
-            heard, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
-            if heard:
-                self._take(heard, arrival_ns)
+            received, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
+            if received:
+                self._take(received, arrival_ns)
             else:
                 self._resume()
                 deadline_s = time.monotonic() + patience_s
@@ -186,28 +182,28 @@ class SlamtecLidar:
                 if self._line.serial is not None:
                     self._line.serial.baud = baud
                 for _ in range(_TRIES):
-                    before = self._line.heard
+                    before = self._line.received
                     with suppress(DeviceTimeoutError):
                         self._dialogue.request(protocol.STOP)
                         self._line.drop_waiting()
-                        told = self._dialogue.told(protocol.INFO, 4, protocol.info)
-                        self._accept(told, model)
+                        info = self._dialogue.ask(protocol.INFO, 4, protocol.info)
+                        self._accept(info, model)
                         self._baud = baud
                         return
-                    if self._line.heard == before and len(bauds) > 1:
+                    if self._line.received == before and len(bauds) > 1:
                         break
             raise DeviceTimeoutError(f"{self.address}: no RPLIDAR answers; check power, cable and port")
 
-    def _accept(self, told: protocol.Info, model: str | None) -> None:
-        found = SERIES.get(told.model >> 4)
-        if found is None or model not in (None, found.model):
-            other = f"a model {told.model:#04x} of Slamtec's" if found is None else f"a {found.model}"
+    def _accept(self, info: protocol.Info, model: str | None) -> None:
+        series = SERIES.get(info.model >> 4)
+        if series is None or model not in (None, series.model):
+            other = f"a model {info.model:#04x} of Slamtec's" if series is None else f"a {series.model}"
             raise DeviceError(f"{self._line.name}: this is {other}, not a {model}")
-        if self.serial_number not in ("", told.serial_number):
-            raise DeviceError(f"{self._line.name}: this is {told.serial_number}, not {self.serial_number}")
-        self._motor = found.motor
-        self._lidar = load_catalogue().get(found.model, Lidar)
-        self.serial_number, self.firmware = told.serial_number, told.firmware
+        if self.serial_number not in ("", info.serial_number):
+            raise DeviceError(f"{self._line.name}: this is {info.serial_number}, not {self.serial_number}")
+        self._motor = series.motor
+        self._lidar = load_catalogue().get(series.model, Lidar)
+        self.serial_number, self.firmware = info.serial_number, info.firmware
 
     def _turn_motor(self, *, on: bool) -> None:
         if self._motor == "dtr" and self._line.serial is not None:
@@ -224,10 +220,10 @@ class SlamtecLidar:
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
         self._last_ns = 0
 
-    def _take(self, heard: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
+    def _take(self, received: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
         silent = self._last_ns and arrival_ns - self._last_ns > _SILENCE_NS
         self._last_ns = arrival_ns
-        for points in [] if silent else self._count.placed(heard, arrival_ns):
+        for points in [] if silent else self._count.placed(received, arrival_ns):
             self._turns.add(points, arrival_ns)
         if silent or self._count.broken:
             self._line.drop_waiting()

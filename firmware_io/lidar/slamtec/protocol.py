@@ -200,21 +200,21 @@ class ReplySplitter:
     def feed(self, data: bytes) -> list[tuple[Descriptor, bytes]]:
         """The replies that these bytes complete; with the descriptor of a stream come the bytes that followed it."""
         self._rest += data
-        found: list[tuple[Descriptor, bytes]] = []
+        packets: list[tuple[Descriptor, bytes]] = []
         while (at := self._rest.find(_MARK)) >= 0 and len(self._rest) >= at + _DESCRIPTOR_SIZE:
             begin = at + _DESCRIPTOR_SIZE
-            told = descriptor(self._rest[at:begin])
-            end = len(self._rest) if told.stream else begin + told.size
-            if told.size > _LONGEST_REPLY:
+            reply = descriptor(self._rest[at:begin])
+            end = len(self._rest) if reply.stream else begin + reply.size
+            if reply.size > _LONGEST_REPLY:
                 self._rest = self._rest[at + 1 :]
                 continue
             if end > len(self._rest):
                 break
-            found.append((told, self._rest[begin:end]))
+            packets.append((reply, self._rest[begin:end]))
             self._rest = self._rest[end:]
         if at < 0:
             self._rest = self._rest[-1:]
-        return found
+        return packets
 
 
 class SlamtecSplitter:
@@ -237,7 +237,7 @@ class SlamtecSplitter:
     def feed(self, data: bytes) -> list[tuple[SlamtecPacket, int]]:
         """The packets that these bytes complete, each with how many bytes were passed over before it."""
         self._rest += data
-        found: list[tuple[SlamtecPacket, int]] = []
+        packets: list[tuple[SlamtecPacket, int]] = []
         at = 0
         while at + self._size <= len(self._rest):
             try:
@@ -252,11 +252,11 @@ class SlamtecSplitter:
                 self._passed += 1
                 at += 1
             else:
-                found.append((packet, self._passed))
+                packets.append((packet, self._passed))
                 self._passed = 0
                 at += self._size
         self._rest = self._rest[at:]
-        return found
+        return packets
 
 
 def _capsule_start(data: bytes) -> tuple[float, bool]:

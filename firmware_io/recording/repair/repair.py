@@ -21,10 +21,10 @@ from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import check_place, whole_file
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages
-from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey, survey, whole_messages
+from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey, intact_messages, survey
 
 
 def repair(path: Path, out: Path | None = None) -> RepairSummary:
@@ -37,8 +37,8 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
     Raises:
         RecordingError: the file cannot be read, holds not one whole message, or `out` is the same file.
     """
-    beside = repaired_place(path)
-    out = beside if out is None else out
+    target = repaired_place(path)
+    out = target if out is None else out
     check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
@@ -46,29 +46,29 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
         raise RecordingError(f"{out}: the damaged recording itself: it stays as it is, name another file")
     size = path.stat().st_size
     data = foreign(f"{path}: cannot read", np.memmap, path, np.uint8, "r").data if size else memoryview(b"")
-    found = survey(data)
-    summary = found.summary
+    result = survey(data)
+    summary = result.summary
     lost_before = 0
-    for at, message in whole_messages(data, found):
-        topic = found.topic(message)
+    for at, message in intact_messages(data, result):
+        topic = result.topic(message)
         if topic is None:
             summary.lost_messages += 1
             continue
         first, last = summary.times_ns
         summary.messages[topic] += 1
-        if lost_before < (lost_before := bisect(found.lost_at, at)):
-            summary.misses(last or found.said_ns[0], message.log_time)
+        if lost_before < (lost_before := bisect(result.lost_at, at)):
+            summary.misses(last or result.summary_ns[0], message.log_time)
         summary.times_ns = min(first, message.log_time), max(last, message.log_time)
     if not summary.messages:
         raise RecordingError(f"{path}: no whole message in it, there is nothing to save (is it an MCAP recording?)")
-    if lost_before < len(found.lost_at):
-        summary.misses(summary.times_ns[1], found.said_ns[1])
-    summary.lost_messages = max(summary.lost_messages, found.announced - summary.messages.total())
-    if summary.whole and not _read_alike(path, summary.messages):
-        summary.mended["what readers stumble over"] += 1
-    if not summary.whole:
-        with whole_file(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
-            _write(TimedChunks(stream), data, found)
+    if lost_before < len(result.lost_at):
+        summary.misses(summary.times_ns[1], result.summary_ns[1])
+    summary.lost_messages = max(summary.lost_messages, result.announced - summary.messages.total())
+    if summary.intact and not _read_alike(path, summary.messages):
+        summary.repaired["what readers stumble over"] += 1
+    if not summary.intact:
+        with atomic_write(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
+            _write(TimedChunks(stream), data, result)
     return summary
 
 
@@ -100,22 +100,22 @@ def _read_alike(path: Path, messages: Counter[str]) -> bool:
         return False
 
 
-def _write(writer: TimedChunks, data: memoryview, found: Survey) -> None:
+def _write(writer: TimedChunks, data: memoryview, result: Survey) -> None:
     """Everything anew, schemas and channels under numbers of their own."""
-    header = found.header or mcap.Header("ros2", "scanwright")
+    header = result.header or mcap.Header("ros2", "scanwright")
     writer.start(header.profile, header.library)
-    for extra in found.extras:
+    for extra in result.extras:
         if isinstance(extra, mcap.Metadata):
             writer.add_metadata(extra.name, extra.metadata)
         else:
             writer.add_attachment(extra.create_time, extra.log_time, extra.name, extra.media_type, extra.data)
     numbers: dict[int, int] = {}
-    for _, message in whole_messages(data, found):
-        if found.topic(message) is None:
+    for _, message in intact_messages(data, result):
+        if result.topic(message) is None:
             continue
         if message.channel_id not in numbers:
-            channel = found.channels[message.channel_id]
-            schema = found.schemas.get(channel.schema_id)
+            channel = result.channels[message.channel_id]
+            schema = result.schemas.get(channel.schema_id)
             number = writer.register_schema(schema.name, schema.encoding, schema.data) if schema else 0
             numbers[message.channel_id] = writer.register_channel(
                 channel.topic, channel.message_encoding, number, channel.metadata

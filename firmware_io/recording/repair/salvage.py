@@ -44,7 +44,7 @@ _READ: dict[int, Callable[[Any], Any]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class WholeChunk:
+class IntactChunk:
     """Packed bytes in the file that unpack to what their checksum says."""
 
     begin: int
@@ -105,7 +105,7 @@ def between_magics(data: memoryview) -> bool:
     return data[:size].tobytes() == MCAP0_MAGIC == data[-size:].tobytes()
 
 
-def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None) -> WholeChunk | None:
+def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None) -> IntactChunk | None:
     """The chunk at a place, whatever is damaged of its head, if its checksum holds."""
     if at + RECORD_HEAD.size + _CHUNK_HEAD.size > len(data):
         return None
@@ -119,8 +119,8 @@ def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None)
         ):
             unpacked, stop = unpacked_at(data, begin, until, packing)
             off = (zlib.crc32(unpacked) ^ checksum).bit_count() if checksum else 0
-            if stop and off <= 1 and (checksum or _whole_inside(unpacked)):
-                return WholeChunk(begin, stop, packing, doubtful=bool(off))
+            if stop and off <= 1 and (checksum or _intact_inside(unpacked)):
+                return IntactChunk(begin, stop, packing, doubtful=bool(off))
     return None
 
 
@@ -131,14 +131,14 @@ def unpacked_at(data: memoryview, begin: int, end: int, packing: str) -> tuple[b
     if not packing:
         return data[begin:end].tobytes(), end
     reader = zstandard.ZstdDecompressor().decompressobj() if packing == "zstd" else lz4.frame.LZ4FrameDecompressor()
-    found, size, at = [], 0, begin
+    chunks, size, at = [], 0, begin
     try:
         while at < end and not reader.eof and size <= _MOST_UNPACKED:
-            found.append(reader.decompress(data[at : min(at + _SIP, end)].tobytes()))
-            size, at = size + len(found[-1]), min(at + _SIP, end)
+            chunks.append(reader.decompress(data[at : min(at + _SIP, end)].tobytes()))
+            size, at = size + len(chunks[-1]), min(at + _SIP, end)
     except Exception:  # bytes that are not what was written, in whatever way
         return b"", 0
-    return (b"".join(found), at - len(reader.unused_data or b"")) if reader.eof else (b"", 0)
+    return (b"".join(chunks), at - len(reader.unused_data or b"")) if reader.eof else (b"", 0)
 
 
 def inside_of(unpacked: bytes) -> Iterator[tuple[int, Any]]:
@@ -151,7 +151,7 @@ def inside_of(unpacked: bytes) -> Iterator[tuple[int, Any]]:
         at = end
 
 
-def _whole_inside(unpacked: bytes) -> bool:
+def _intact_inside(unpacked: bytes) -> bool:
     """Whether a chunk without a checksum is records to its last byte."""
     data, at = memoryview(unpacked), 0
     while at < len(data):
@@ -166,19 +166,21 @@ def fits(record: Any, noted: mcap.ChunkIndex | None, messages: Counter[tuple[int
     if not isinstance(record, mcap.Chunk):
         return False
     times = [time_ns for _, time_ns, _ in messages] or [0]
-    said = (record.message_start_time, record.message_end_time)
-    return said == (min(times), max(times)) and (noted is None or noted.uncompressed_size == record.uncompressed_size)
+    span_ns = (record.message_start_time, record.message_end_time)
+    return span_ns == (min(times), max(times)) and (
+        noted is None or noted.uncompressed_size == record.uncompressed_size
+    )
 
 
-def next_record(data: memoryview, at: int, said_end: int, noted: mcap.ChunkIndex | None) -> int:
+def next_record(data: memoryview, at: int, expected_end: int, noted: mcap.ChunkIndex | None) -> int:
     """Where the chain goes on behind what cannot be read; the end of the file if nowhere."""
     if noted:
         return min(at + noted.chunk_length, len(data))
-    if _begins(data, said_end):
-        return said_end
-    whole = np.frombuffer(data, np.uint8)
+    if _begins(data, expected_end):
+        return expected_end
+    octets = np.frombuffer(data, np.uint8)
     for block in range(at + 1, len(data) - RECORD_HEAD.size, _BLOCK):
-        part = whole[block : block + _BLOCK + RECORD_HEAD.size - 1]
+        part = octets[block : block + _BLOCK + RECORD_HEAD.size - 1]
         count = len(part) - RECORD_HEAD.size + 1
         could = (part[:count] > 0) & (part[:count] <= Opcode.DATA_END)
         for byte in range(5, RECORD_HEAD.size):  # records are below 4 GB

@@ -15,7 +15,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from scanwright.firmware_io.recording.repair.salvage import (
     RECORD_HEAD,
-    WholeChunk,
+    IntactChunk,
     between_magics,
     chunk_at,
     fits,
@@ -28,7 +28,7 @@ from scanwright.firmware_io.recording.repair.salvage import (
 )
 
 _LEAST_GAP_NS = 50_000_000  # a shorter one is printed as nothing
-_MOST_TOLD = 8  # gaps
+_MOST_LISTED = 8  # gaps
 
 
 @dataclass(slots=True)
@@ -40,7 +40,7 @@ class RepairSummary:
         lost_messages: messages that are not whole, where the file still tells how many.
         damaged_chunks: chunks whose checksum does not hold.
         lost_bytes: what is in no record that can be read, damaged chunks among it.
-        mended: what else is damaged and is made anew -> how often.
+        repaired: what else is damaged and is made anew -> how often.
         times_ns: log times of the first and of the last message.
         missing_ns: log times before and after what is lost, where both are known.
     """
@@ -49,7 +49,7 @@ class RepairSummary:
     lost_messages: int = 0
     damaged_chunks: int = 0
     lost_bytes: int = 0
-    mended: Counter[str] = field(default_factory=Counter)
+    repaired: Counter[str] = field(default_factory=Counter)
     times_ns: tuple[int, int] = (2**64, 0)
     missing_ns: list[tuple[int, int]] = field(default_factory=list)
 
@@ -59,26 +59,28 @@ class RepairSummary:
             self.missing_ns.append((before_ns, after_ns))
 
     @property
-    def whole(self) -> bool:
+    def intact(self) -> bool:
         """There is nothing to repair."""
-        return not (self.lost_bytes or self.lost_messages or self.mended)
+        return not (self.lost_bytes or self.lost_messages or self.repaired)
 
     def lines(self, path: Path, out: Path) -> list[str]:
         """What was found in the recording `path` and written to `out`, in words."""
         first_ns, last_ns = self.times_ns
-        kept = " and ".join(f"{count:,} messages of {topic}" for topic, count in sorted(self.messages.items()))
-        found = [f"{path}: {kept}, {(last_ns - first_ns) / 1e9:.1f} s"]
-        if self.whole:
-            return [*found, "it is whole: nothing to repair, nothing written"]
+        counts = " and ".join(f"{count:,} messages of {topic}" for topic, count in sorted(self.messages.items()))
+        result = [f"{path}: {counts}, {(last_ns - first_ns) / 1e9:.1f} s"]
+        if self.intact:
+            return [*result, "it is whole: nothing to repair, nothing written"]
         if self.lost_bytes or self.lost_messages:
             chunks = f"{self.damaged_chunks} damaged chunks, {self.lost_messages:,} messages known to be lost"
-            found.append(f"left out {self.lost_bytes:,} bytes that are not whole ({chunks})")
-            found += self._missing()
+            result.append(f"left out {self.lost_bytes:,} bytes that are not whole ({chunks})")
+            result += self._missing()
         else:
-            found.append("every message is whole")
-        if self.mended:
-            found.append(f"made anew: {', '.join(f'{what} ({count})' for what, count in sorted(self.mended.items()))}")
-        return [*found, f"wrote {out}"]
+            result.append("every message is whole")
+        if self.repaired:
+            result.append(
+                f"made anew: {', '.join(f'{what} ({count})' for what, count in sorted(self.repaired.items()))}"
+            )
+        return [*result, f"wrote {out}"]
 
     def _missing(self) -> list[str]:
         """Where it has gaps, counted from its first message, in a line."""
@@ -87,9 +89,9 @@ class RepairSummary:
         begin_ns = min(self.times_ns[0], self.missing_ns[0][0])
         gaps = [
             f"{(after_ns - before_ns) / 1e9:.1f} s missing at {(before_ns - begin_ns) / 1e9:.1f} s"
-            for before_ns, after_ns in self.missing_ns[:_MOST_TOLD]
+            for before_ns, after_ns in self.missing_ns[:_MOST_LISTED]
         ]
-        if len(self.missing_ns) > _MOST_TOLD:
+        if len(self.missing_ns) > _MOST_LISTED:
             all_s = sum(after_ns - before_ns for before_ns, after_ns in self.missing_ns) / 1e9
             gaps.append(f"and so on: {len(self.missing_ns)} gaps, {all_s:.1f} s in all")
         return [", ".join(gaps)]
@@ -104,10 +106,10 @@ class Survey:
     schemas: dict[int, mcap.Schema] = field(default_factory=dict)
     channels: dict[int, mcap.Channel] = field(default_factory=dict)
     extras: list[mcap.Metadata | mcap.Attachment] = field(default_factory=list)
-    chunks: list[WholeChunk] = field(default_factory=list)
+    chunks: list[IntactChunk] = field(default_factory=list)
     loose: list[tuple[int, int]] = field(default_factory=list)  # where messages outside of chunks begin and end
     announced: int = 0
-    said_ns: tuple[int, int] = (0, 0)  # log times of the first and of the last message, by the index at the end
+    summary_ns: tuple[int, int] = (0, 0)  # log times of the first and of the last message, by the index at the end
     lost_at: list[int] = field(default_factory=list)  # where bytes are lost, increasing
 
     def learn(self, records: Iterable[Any]) -> None:
@@ -126,17 +128,17 @@ class Survey:
 
 def survey(data: memoryview) -> Survey:
     """Find everything that can be read, and count what cannot."""
-    found = Survey()
-    lost, mended = found.summary, found.summary.mended
+    result = Survey()
+    lost, repaired = result.summary, result.summary.repaired
     index, end_of_data = index_at_the_end(data)
     chunk_indexes = {record.chunk_start_offset: record for record in index if isinstance(record, mcap.ChunkIndex)}
     for record in index:
         if isinstance(record, mcap.Statistics):
-            found.announced = record.message_count
-            found.said_ns = (record.message_start_time, record.message_end_time)
-    found.learn(index)
-    mended["the index at the end"] += not index
-    mended["the first or last bytes"] += not between_magics(data)
+            result.announced = record.message_count
+            result.summary_ns = (record.message_start_time, record.message_end_time)
+    result.learn(index)
+    repaired["the index at the end"] += not index
+    repaired["the first or last bytes"] += not between_magics(data)
     unsure: list[Any] = []
     closed = False
     due: Counter[tuple[int, int, int]] | None = None  # what message indexes have to say of the chunk before them
@@ -146,69 +148,69 @@ def survey(data: memoryview) -> Survey:
         noted = chunk_indexes.get(at)
         chunk = chunk_at(data, at, end, noted) if record is None or isinstance(record, mcap.Chunk) else None
         if due is not None and not isinstance(record, mcap.MessageIndex):
-            mended["indexes of chunks"] += due.total() != 0
+            repaired["indexes of chunks"] += due.total() != 0
             due = None
         if chunk is not None:
             inside = list(inside_of(unpacked_at(data, chunk.begin, chunk.end, chunk.packing)[0]))
-            found.learn(item for _, item in inside)
-            found.chunks.append(chunk)
-            held = Counter(
+            result.learn(item for _, item in inside)
+            result.chunks.append(chunk)
+            records = Counter(
                 (item.channel_id, item.log_time, place) for place, item in inside if isinstance(item, mcap.Message)
             )
-            due = held if noted is None or noted.message_index_offsets else None
-            mended["heads of chunks"] += chunk.doubtful or not fits(record, noted, held)
+            due = records if noted is None or noted.message_index_offsets else None
+            repaired["heads of chunks"] += chunk.doubtful or not fits(record, noted, records)
             end = chunk.end
         elif isinstance(record, mcap.Chunk):
             lost.damaged_chunks += 1
             lost.lost_bytes += end - at
-            found.lost_at.append(at)
+            result.lost_at.append(at)
         elif isinstance(record, mcap.MessageIndex):
             if due is None:
                 lost.lost_messages += len(record.records)
             else:
-                said = Counter((record.channel_id, time_ns, place) for time_ns, place in record.records)
-                mended["indexes of chunks"] += bool(said - due)
-                due -= said
+                indexed = Counter((record.channel_id, time_ns, place) for time_ns, place in record.records)
+                repaired["indexes of chunks"] += bool(indexed - due)
+                due -= indexed
         elif record is None:
             end = min(next_record(data, at, end, noted), end_of_data)
             lost.damaged_chunks += noted is not None
             lost.lost_bytes += end - at
-            found.lost_at.append(at)
+            result.lost_at.append(at)
         elif isinstance(record, mcap.Message):
             # any bytes are a message: one of a damaged length ends where nothing begins, and others begin within it
             begins = end if record_at(data, end)[0] is not None else next_record(data, at, at, None)
             if begins < end:
                 lost.lost_bytes += begins - at
-                found.lost_at.append(at)
+                result.lost_at.append(at)
                 end = begins
             else:
-                found.loose.append((at, end))
+                result.loose.append((at, end))
         elif isinstance(record, mcap.Attachment) and not sealed(data, at, end):
             lost.lost_bytes += end - at
         elif isinstance(record, mcap.Attachment | mcap.Metadata):
-            found.extras.append(record)
-        elif isinstance(record, mcap.Header) and found.header is None:
-            found.header = record
+            result.extras.append(record)
+        elif isinstance(record, mcap.Header) and result.header is None:
+            result.header = record
         else:
             if isinstance(record, mcap.DataEnd):
                 closed = not record.data_section_crc or record.data_section_crc == zlib.crc32(data[:at])
             unsure.append(record)
         at = end
-    found.learn(unsure)
-    if found.chunks or lost.damaged_chunks:  # any bytes may look like a message, and nothing vouches for these
-        lost.lost_bytes += sum(end - at for at, end in found.loose)
-        found.loose.clear()
-    mended["the end of the data"] += bool(index) and not closed
-    mended["the header"] += found.header is None
-    for what in [what for what, count in mended.items() if not count]:
-        del mended[what]
-    return found
+    result.learn(unsure)
+    if result.chunks or lost.damaged_chunks:  # any bytes may look like a message, and nothing vouches for these
+        lost.lost_bytes += sum(end - at for at, end in result.loose)
+        result.loose.clear()
+    repaired["the end of the data"] += bool(index) and not closed
+    repaired["the header"] += result.header is None
+    for what in [what for what, count in repaired.items() if not count]:
+        del repaired[what]
+    return result
 
 
-def whole_messages(data: memoryview, found: Survey) -> Iterator[tuple[int, mcap.Message]]:
+def intact_messages(data: memoryview, result: Survey) -> Iterator[tuple[int, mcap.Message]]:
     """The whole messages as they stand in the file, behind the place of their chunk, of a known topic or not."""
-    places: list[tuple[int, WholeChunk | None]] = [(chunk.begin, chunk) for chunk in found.chunks]
-    places += [(at, None) for at, _ in found.loose]
+    places: list[tuple[int, IntactChunk | None]] = [(chunk.begin, chunk) for chunk in result.chunks]
+    places += [(at, None) for at, _ in result.loose]
     for at, chunk in sorted(places, key=itemgetter(0)):
         if chunk is None:
             yield at, record_at(data, at)[0]

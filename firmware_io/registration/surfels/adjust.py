@@ -78,7 +78,7 @@ def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None
         one, on_a, off_a = _summed(a, cells, lookup, np.eye(4), False)
         two, on_b, off_b = _summed(b, cells, lookup, T, True)
         enough = (np.minimum(on_a, on_b) > 3) & (off_a <= _FOREIGN * on_a) & (off_b <= _FOREIGN * on_b)
-        cells, one, two, on_a, on_b = cells.kept(enough), one[enough], two[enough], on_a[enough], on_b[enough]
+        cells, one, two, on_a, on_b = cells.select(enough), one[enough], two[enough], on_a[enough], on_b[enough]
         if len(cells) < _MIN_CELLS:
             return None
         solved = _solve(one, two, on_a, on_b, prior, free)
@@ -90,7 +90,7 @@ def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None
         still = solved.x[:6] @ np.linalg.solve(solved.covariance, solved.x[:6]) < _SETTLED
         if still and reach_m > _SAME_REACH * cells.reach_m:
             break
-        cells = cells.moved(solved.planes, reach_m).kept(solved.agrees)
+        cells = cells.moved(solved.planes, reach_m).select(solved.agrees)
     return answer
 
 

@@ -46,7 +46,7 @@ class Cells:
     def __len__(self) -> int:
         return len(self.edge_m)
 
-    def kept(self, keep: Bool[ndarray, " n"]) -> Cells:
+    def select(self, keep: Bool[ndarray, " n"]) -> Cells:
         """Those that are marked."""
         return Cells(self.low_m[keep], self.edge_m[keep], self.centre_m[keep], self.axes[keep], self.reach_m)
 
@@ -95,7 +95,7 @@ def find_cells(
         eyes_m: the optical centres of both, shape (2, 3).
         spacing_m: edge of the voxels.
     """
-    found = []
+    results = []
     reach_m = _REACH * spacing_m
     for level in reversed(range(_LEVELS)):
         edge_m = _FINEST * spacing_m * 2**level
@@ -118,12 +118,12 @@ def find_cells(
             & (sides[0] * sides[1] > 0)
         )
         low_m = np.floor(mean[flat] / edge_m) * edge_m
-        found.append((low_m, np.full(len(low_m), edge_m), mean[flat], axes[flat]))
+        results.append((low_m, np.full(len(low_m), edge_m), mean[flat], axes[flat]))
         rest = ~flat[cube]
         points_m, counts, ours = points_m[rest], counts[rest], ours[rest]
         if not len(points_m):
             break
-    low_m, edge, centre, directions = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    low_m, edge, centre, directions = (np.concatenate(parts) for parts in zip(*results, strict=True))
     return Cells(low_m, edge, centre, directions, reach_m)
 
 

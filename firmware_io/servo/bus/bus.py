@@ -122,13 +122,13 @@ class ServoBus:
 
     def ping(self, servo_id: int, wait_s: float) -> list[int]:
         """Which servos answer a ping of one, or of all, in time; damaged answers are left out."""
-        found: set[int] = set()
+        answering: set[int] = set()
         with self._port_errors():
             self._send(self.packets.ping(servo_id), wait_s)
-            while not self._line.isPacketTimeout() and servo_id not in found:
+            while not self._line.isPacketTimeout() and servo_id not in answering:
                 with suppress(DeviceTimeoutError, ProtocolError):
-                    found.add(self.packets.receive(self._line).id)
-        return sorted(found)
+                    answering.add(self.packets.receive(self._line).id)
+        return sorted(answering)
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo of protocol 2.0; raises as `read` does."""
@@ -174,11 +174,11 @@ class ServoBus:
     def _checked(self, status: Status, expected: int, *, reads: bool) -> ServoAnswer:
         meaning, complete = self.packets.meaning(status.error), len(status.data) == expected
         if meaning.damaged:
-            raise ProtocolError("the request arrived damaged: look at cable and ground")
+            raise ProtocolError("the request arrived damaged: check cable and ground")
         if meaning.refusal and not (complete and reads):  # a read that brings its values was no mistake
             raise DeviceError(f"{self.port}: servo {status.id}: refused: {meaning.refusal}")
         if not complete:
-            raise ProtocolError(f"{len(status.data)} bytes where {expected} were asked for")
+            raise ProtocolError(f"{len(status.data)} bytes instead of {expected}")
         wire_ns = (len(self._line.sent) - status.length) * self._line.byte_s * 1e9
         total_ns = self._line.ended_ns - self._line.began_ns
         known_ns = (len(self._line.sent) + status.length) * self._line.byte_s * 1e9 + self.return_delay_ns
@@ -193,6 +193,8 @@ class ServoBus:
     def _port_errors(self) -> Iterator[None]:
         try:
             yield
+        except DeviceTimeoutError:
+            raise
         except (OSError, termios.error) as error:  # pyserial's own are OSErrors
             raise DeviceTimeoutError(
                 f"{self.port}: the port is gone ({error}): plug the adapter in, then open it again"

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
-NO_ANSWER = "no answer: look at its power and cable; another program may have set another speed"
+NO_ANSWER = "no answer: check its power and cable; another program may have set another speed"
 
 
 @dataclass(frozen=True, slots=True)

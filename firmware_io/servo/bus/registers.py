@@ -134,7 +134,7 @@ class ControlTable:
     lock: Register | None = None
     watchdog: Register | None = None
 
-    def is_kept(self, register: Register) -> bool:
+    def is_permanent(self, register: Register) -> bool:
         """Whether a register outlasts the power (EEPROM): such a register is written only if a person agrees."""
         return register.address < self.ram
 

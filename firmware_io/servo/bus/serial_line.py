@@ -61,7 +61,9 @@ class SerialLine:
         if self._echo_due:
             self._echo_due = False
             if self._read(len(self.sent)) != self.sent:
-                raise ProtocolError("the adapter's echo is not what was sent: do two programs send at a time?")
+                raise ProtocolError(
+                    "the adapter's echo differs from what was sent: another program may send on this port"
+                )
         data = self._read(length)
         if data:
             self.ended_ns = time.monotonic_ns()

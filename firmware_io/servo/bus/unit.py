@@ -61,14 +61,14 @@ class ServoUnit:
         torque = self.table.torque
         return self.bus.write_packet(self.id, torque, torque.encode(0)), self.bus.packets.acknowledged(self.id)
 
-    def told(self, answer: ServoAnswer) -> str | None:
+    def reported_fault(self, answer: ServoAnswer) -> str | None:
         """What the servo reports of itself with an answer, in words; None where it is well."""
         if not answer.conditions:
             return None
         fault = self.table.hardware_error
         return self.table.names(answer.conditions if fault is None else self.count(fault))
 
-    def set_kept(self, register: Register, count: int) -> int:
+    def set_permanent(self, register: Register, count: int) -> int:
         """Set an entry that outlasts the power, torque being off; its count before. Written if it differs: it wears.
 
         Raises:
@@ -114,7 +114,9 @@ class ServoUnit:
                 if self.id in self.bus.ping(self.id, PING_S) and self.count(register) == count:
                     self._unlock(False)
                     return
-        raise DeviceTimeoutError(f"{self}: {register}: not heard with {count}: power off and on, look again")
+        raise DeviceTimeoutError(
+            f"{self}: {register}: no answer after {count} was written: switch it off and on, then try again"
+        )
 
     def set_id(self, new_id: int) -> ServoUnit:
         """Give it another number, torque being off; the servo with it, read back.
@@ -128,12 +130,12 @@ class ServoUnit:
         time.sleep(PING_S)  # whether it answers with the old number or the new is its own affair
         renamed = ServoUnit(self.bus, self.table, new_id)
         if renamed.count(register) != new_id:
-            raise DeviceError(f"{self}: does not answer as {new_id}: power off and on, look again")
+            raise DeviceError(f"{self}: no answer as {new_id}: switch it off and on, then try again")
         renamed._unlock(False)
         return renamed
 
     def answer_everything(self) -> None:
-        """Set it to answer everything; this outlasts the power if `ControlTable.is_kept` says so."""
+        """Set it to answer everything; this outlasts the power if `ControlTable.is_permanent` says so."""
         level = self.table.status_return
         with_answer = level.encode(self.table.answers_all)
         try:

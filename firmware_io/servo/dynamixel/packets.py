@@ -72,7 +72,7 @@ class Protocol1:
 
     def receive(self, line: SerialLine) -> Status:
         """The next status; raises as `PacketFormat.receive`."""
-        packet = _whole(*Protocol1PacketHandler().rxPacket(line))
+        packet = _checked(*Protocol1PacketHandler().rxPacket(line))
         if len(packet) != packet[3] + 4 or len(packet) < 6:
             raise ProtocolError(f"an answer of a wrong length: {packet.hex(' ')}")
         return Status(packet[2], packet[4], packet[5:-1], len(packet))
@@ -119,7 +119,7 @@ class Protocol2:
 
     def receive(self, line: SerialLine) -> Status:
         """The next status; raises as `PacketFormat.receive`."""
-        packet = _whole(*Protocol2PacketHandler().rxPacket(line, True))  # "fast": without unstuffing
+        packet = _checked(*Protocol2PacketHandler().rxPacket(line, True))  # "fast": without unstuffing
         if len(packet) != packet[5] + 256 * packet[6] + 7:
             raise ProtocolError(f"an answer of a wrong length: {packet.hex(' ')}")
         body = packet[7:-2].replace(_STUFFED, _HEADER)
@@ -136,7 +136,7 @@ class Protocol2:
 PROTOCOL_1, PROTOCOL_2 = Protocol1(), Protocol2()
 
 
-def _whole(packet: list[int], result: int) -> bytes:
+def _checked(packet: list[int], result: int) -> bytes:
     """What the SDK has received.
 
     Raises:
@@ -146,7 +146,7 @@ def _whole(packet: list[int], result: int) -> bytes:
     if result == COMM_RX_TIMEOUT:
         raise DeviceTimeoutError(NO_ANSWER)
     if result != COMM_SUCCESS:
-        raise ProtocolError(f"damaged answer {bytes(packet).hex(' ')}: look at cable, ground and other senders")
+        raise ProtocolError(f"damaged answer {bytes(packet).hex(' ')}: check cable, ground and other senders")
     return bytes(packet)
 
 

@@ -32,7 +32,7 @@ def request(servo_id: int, instruction: int, parameters: bytes) -> bytes:
     return _HEADER + body + bytes([checksum(body)])
 
 
-def begun(data: bytes) -> bytes:
+def from_header(data: bytes) -> bytes:
     """What is left of bytes from the first on with which a status may begin."""
     for start in range(len(data)):
         head = data[start : start + 4]
@@ -42,7 +42,7 @@ def begun(data: bytes) -> bytes:
     return b""
 
 
-def whole_length(data: bytes) -> int:
+def packet_length(data: bytes) -> int:
     """How long the status is that begins here; as long as the shortest while that is not known."""
     return data[3] + 4 if len(data) > 3 else _SHORTEST
 
@@ -54,7 +54,7 @@ def status(data: bytes) -> Status:
         ProtocolError: its sum is wrong.
     """
     if data[-1] != checksum(data[2:-1]):
-        raise ProtocolError(f"damaged answer {data.hex(' ')}: look at cable, ground and other senders")
+        raise ProtocolError(f"damaged answer {data.hex(' ')}: check cable, ground and other senders")
     return Status(data[2], data[4], data[5:-1], len(data))
 
 
@@ -87,15 +87,15 @@ class Sts:
 
     def receive(self, line: SerialLine) -> Status:
         """The next status; raises as `PacketFormat.receive`."""
-        heard, came = b"", False
-        while len(heard) < (wanted := whole_length(heard)):
-            more = line.readPort(wanted - len(heard))
+        received, came = b"", False
+        while len(received) < (wanted := packet_length(received)):
+            more = line.readPort(wanted - len(received))
             if not more:
                 if came:
-                    raise ProtocolError(f"damaged answer {heard.hex(' ')}: look at cable, ground and other senders")
+                    raise ProtocolError(f"damaged answer {received.hex(' ')}: check cable, ground and other senders")
                 raise DeviceTimeoutError(NO_ANSWER)
-            heard, came = begun(heard + more), True
-        return status(heard)
+            received, came = from_header(received + more), True
+        return status(received)
 
     def meaning(self, error: int) -> Meaning:
         """What the status byte means: it tells of the servo only, and refuses nothing."""

@@ -12,7 +12,7 @@ from scanners import PITCHING, scanner_at
 from scanwright.cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
 from scanwright.cad.checks.beams import beam_checks
 from scanwright.design.search.with_parts import Refused, Workshop
-from scanwright.design.shadow import AXIS_STEPS, Shadow, own_body_bytes
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion, self_occlusion_bytes
 
 
 def scanner_for(*setting_deg):
@@ -111,12 +111,12 @@ def test_what_cannot_be_built_is_refused_with_the_reason():
 def test_own_body_is_the_same_bytes_and_reads_back(pitching):
     scanner, _, shadow = pitching
     bearings = scanner.lidar.bearings_rad()
-    data = own_body_bytes(shadow, bearings)
-    assert data == own_body_bytes(shadow, bearings)
+    data = self_occlusion_bytes(shadow, bearings)
+    assert data == self_occlusion_bytes(shadow, bearings)
     table = np.load(io.BytesIO(data))
     assert np.array_equal(table["beams"], shadow.beams) and np.array_equal(table["stator"], shadow.stator)
     np.testing.assert_array_equal(table["bearing_rad"], bearings)
-    bare = np.load(io.BytesIO(own_body_bytes(Shadow(shadow.beams, None), bearings)))
+    bare = np.load(io.BytesIO(self_occlusion_bytes(SelfOcclusion(shadow.beams, None), bearings)))
     assert not bare["stator"].any() and bare["stator"].shape == (1081, AXIS_STEPS)
 
 

@@ -19,6 +19,7 @@ from scanwright.design.density.spin import zones
 from scanwright.design.errors import TaskError
 from scanwright.design.objective.problem import FRONT, NODES, nodes_for, problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.task.task import load_task
 
 ANGLES = np.radians([0.0, 0.0, -50.0, 35.0])
@@ -71,7 +72,7 @@ def test_the_error_is_the_worst_of_several_settings(ground, monkeypatch):
     )
     monkeypatch.setattr(work_precision, "OTHERS", 1)
     monkeypatch.setattr("scanwright.design.accuracy.reference.ORDERS", (12, 20, 40))
-    measured = measure_methods(load_task(Path("ground_ahead")), ground, ANGLES, lambda _: None)
+    measured = measure_methods(load_task(Path("ground_ahead")), ground, ANGLES, no_progress)
     (found,) = measured.points
     assert [truth.J for truth in measured.truths[:1]] == [smooth_reference(ground, ANGLES).J]
     assert len({truth.J for truth in measured.truths}) == 2

@@ -11,14 +11,14 @@ import pytest
 
 from scanwright.design.angles import load_angles
 from scanwright.design.concurrency import processes as beside
-from scanwright.design.concurrency.processes import Packed, ctrl_c_held_back, in_turn, processes_beside
+from scanwright.design.concurrency.processes import Packed, in_turn, sigint_deferred, worker_processes
 from scanwright.design.errors import BuildError, TaskError
 
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_work_and_its_errors_are_the_same_with_one_core_and_two(cores, monkeypatch):
     monkeypatch.setattr(beside, "cores", lambda: cores)
-    with processes_beside() as begin:
+    with worker_processes() as begin:
         where, joined, wrong = begin(os.getpid), begin("-".join, ["a", "b"]), begin(load_angles, Path("none.json"))
         assert (where() == os.getpid()) == (cores == 1)
         assert joined() == "a-b"
@@ -28,7 +28,7 @@ def test_work_and_its_errors_are_the_same_with_one_core_and_two(cores, monkeypat
 
 def test_processes_come_from_one_mould_and_are_deaf_to_ctrl_c(monkeypatch):
     monkeypatch.setattr(beside, "cores", lambda: 2)
-    with processes_beside(2) as begin:
+    with worker_processes(2) as begin:
         slow, moulds = begin(time.sleep, 0.1), [begin(os.getppid) for _ in range(2)]
         assert signal.SIGINT in begin(signal.pthread_sigmask, signal.SIG_BLOCK, ())()
         slow()
@@ -51,7 +51,7 @@ def test_what_is_given_is_as_it_was_when_work_began():
 def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, tmp_path):
     monkeypatch.setattr(beside, "cores", lambda: 2)
     began, at_work = time.monotonic(), tmp_path / "at_work"
-    with contextlib.suppress(KeyboardInterrupt), processes_beside() as begin:
+    with contextlib.suppress(KeyboardInterrupt), worker_processes() as begin:
         process, mould = begin(os.getpid)(), begin(os.getppid)()
         begin(exec, f"import pathlib, time; pathlib.Path({str(at_work)!r}).touch(); time.sleep(900)")
         while not at_work.exists():  # a second, where the computer is not busy
@@ -61,7 +61,7 @@ def test_ctrl_c_ends_it_at_once_and_its_death_is_told_in_one_line(monkeypatch, t
     assert time.monotonic() - began < 600
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
-    with pytest.raises(BuildError, match="was killed"), processes_beside() as begin:
+    with pytest.raises(BuildError, match="was killed"), worker_processes() as begin:
         assert begin(os.getppid)() != mould  # nor is that left, still loading, with the terminal in its hands
         begin(os._exit, 1)()
 
@@ -75,7 +75,7 @@ def test_ctrl_c_waits_for_the_end_of_the_block_by_whichever_thread_it_comes():
 
     other = threading.Thread(target=press)  # it was there before, and nothing is blocked in it
     other.start()
-    with pytest.raises(KeyboardInterrupt), ctrl_c_held_back():
+    with pytest.raises(KeyboardInterrupt), sigint_deferred():
         go.set()
         other.join()
         done.append("all")

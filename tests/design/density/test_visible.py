@@ -9,7 +9,7 @@ from scanwright.design.density.spin import mean_count
 from scanwright.design.density.sweep import SweepLines, mean_count_swept
 from scanwright.design.density.visible import free_lines, mean_count_free
 from scanwright.design.motion import Sweep
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.sphere.directions import spiral
 
 BEARINGS = np.radians(np.arange(-60.0, 61.0, 2.0))
@@ -32,7 +32,7 @@ def blocked(share=0.3):
 
 def simulated(table, motion, phases=8):
     """Mean counts of scans at evenly spread start phases, by the ball search."""
-    shadow = Shadow(np.zeros(len(BEARINGS), bool), table)
+    shadow = SelfOcclusion(np.zeros(len(BEARINGS), bool), table)
     total = np.zeros(len(DIRECTIONS))
     for k in range(phases):
         if isinstance(motion, SweepLines):

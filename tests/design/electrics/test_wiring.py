@@ -8,7 +8,7 @@ import pytest
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
-from scanwright.design.electrics.rules import broken_rules
+from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_a, wire_drop_v, wire_for
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import scanner_of
@@ -45,7 +45,7 @@ def test_every_combination_keeps_the_rules_unless_its_ring_is_too_weak(servo):
         device = CATALOGUE.get(lidar, Lidar)
         most = max(device.peak_a or 0.0, device.inrush_a or 0.0)
         weak = ring is not None and max(group.amps for group in CATALOGUE.get(ring, SlipRing).ways) < most
-        known = {fault.where for fault in broken_rules(made) if not made.unknown}
+        known = {fault.subject for fault in check_network(made) if not made.unknown}
         assert known == ({"ring"} if weak else set()), (lidar, ring, known)
 
 
@@ -90,7 +90,9 @@ def test_a_supply_that_no_converter_gives_is_refused():
     scanner = scanner_of(angle_set(), "fdm-0.4", CATALOGUE)
     odd = scanner.servo.model_copy(update={"supply_v": (6.0, 8.4)})
     made = network_of(replace(scanner, servo=odd))
-    assert "MX-64R: gets 11.71 V, wants 6 to 8.4" in [f"{fault.where}: {fault.message}" for fault in broken_rules(made)]
+    assert "MX-64R: gets 11.71 V, wants 6 to 8.4" in [
+        f"{fault.subject}: {fault.message}" for fault in check_network(made)
+    ]
     assert "Do not connect MX-64R: it accepts 6 to 8.4 V" in " ".join(made.cautions)
 
 
@@ -104,7 +106,7 @@ def test_the_inrush_sizes_circuit_fuse_converter_and_supply_and_the_start_the_vo
     drop = next(drop for drop in made.drops if drop.device == "RPLIDAR S2")
     assert drop.idle_v == 5.1 and drop.volts == pytest.approx(5.1 - 1.5 * (0.1 + 2 * 0.0178 / branch.mm2))
     weak = network("RPLIDAR A3", ring="SRC022A-6")
-    assert "carries 2.5 A, rated 2" in broken_rules(weak)[0].message
+    assert "carries 2.5 A, rated 2" in check_network(weak)[0].message
 
 
 def test_power_takes_the_circuits_that_carry_it():
@@ -113,7 +115,7 @@ def test_power_takes_the_circuits_that_carry_it():
     strong = SlipRing.model_validate(scanner.slip_ring.model_dump() | {"ways": ways})
     made = network_of(replace(scanner, slip_ring=strong))
     assert {circuit.net: circuit.rated_a for circuit in made.circuits if circuit.net in ("+", "-")} == {"+": 3, "-": 3}
-    assert broken_rules(made) == []
+    assert check_network(made) == []
 
 
 @pytest.mark.parametrize("ring", [*names(SlipRing), None])
@@ -122,9 +124,9 @@ def test_a_pin_that_must_be_tied_is_a_wire_and_a_one_way_line_has_no_rx(lidar, r
     made = network(lidar, ring=ring)
     ties = [wire for wire in made.wires if wire.start == ("lidar", "PWM")]
     assert [wire.end for wire in ties] == [("lidar", "GND")]
-    assert broken_rules(made) == []
+    assert check_network(made) == []
     loose = replace(made, wires=tuple(wire for wire in made.wires if wire not in ties))
-    assert "pin PWM is not connected" in [fault.message for fault in broken_rules(loose)]
+    assert "pin PWM is not connected" in [fault.message for fault in check_network(loose)]
     assert ("lidar", "RX") not in {wire.end for wire in made.wires}
     (sent,) = (wire for wire in made.wires if wire.start[0] == "plug" and wire.net == "TX")
     assert sent.start == ("plug", "RX")  # what the lidar sends the computer receives
@@ -135,7 +137,7 @@ def test_the_default_scanner_by_hand():
     made = network()
     assert [branch.peak_a for branch in made.branches] == pytest.approx([1.0, 4.1, 3 * 5 / 12 / 0.85])
     assert [branch.fuse_a for branch in made.branches] == [2.0, 5.0, 2.0] and made.supply_a == 8.5
-    assert made.branches[1].lasting_a == pytest.approx(0.1 + 4.1 / 5)
+    assert made.branches[1].continuous_a == pytest.approx(0.1 + 4.1 / 5)
     used = {circuit.net: circuit for circuit in made.circuits if circuit.net}
     assert list(used) == ["+", "-", "VBUS", "D-", "D+", "GND", "shield"]
     assert {net: circuit.rated_a for net, circuit in used.items()} == {"+": 10, "-": 10} | dict.fromkeys(
@@ -151,21 +153,21 @@ def test_the_default_scanner_by_hand():
 def test_six_circuits_take_a_lidar_on_usb_without_its_shield():
     made = network(ring="SRC022A-6")
     assert [circuit.net for circuit in made.circuits] == ["+", "-", "VBUS", "D-", "D+", "GND"]
-    assert ("lidar", "shield") not in {wire.end for wire in made.wires} and broken_rules(made) == []
+    assert ("lidar", "shield") not in {wire.end for wire in made.wires} and check_network(made) == []
     assert "Ethernet" in network("UST-10LX", ring="SRC022A-6").risks[0]
     assert network(ring=None).circuits == () and network(ring=None).risks == ()
 
 
 def test_each_rule_sees_what_it_is_there_for():
     made = network()
-    assert broken_rules(made) == []
+    assert check_network(made) == []
 
     def said(**change):
-        return [f"{fault.where}: {fault.message}" for fault in broken_rules(replace(made, **change))]
+        return [f"{fault.subject}: {fault.message}" for fault in check_network(replace(made, **change))]
 
     assert "servo: pin V is not connected" in said(wires=tuple(w for w in made.wires if w.end != ("servo", "V")))
     astray = (*made.wires, replace(made.wires[0], end=("servo", "VCC")))
-    assert "servo: a wire ends in VCC, which is no pin of it" in said(wires=astray)
+    assert "servo: a wire ends in VCC, which is not a pin of it" in said(wires=astray)
     short = (*made.wires, replace(made.wires[0], net="0 V"))
     assert "supply: pin + joins 0 V and 12 V" in said(wires=short)
     weak = tuple(replace(circuit, rated_a=0.5) for circuit in made.circuits)

@@ -13,7 +13,7 @@ from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.with_parts import score_with
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import load_task
 
@@ -38,7 +38,7 @@ def shadow_for(problem):
     off_rad = abs(problem.bearings_rad)
     stator = np.zeros((len(off_rad), AXIS_STEPS), bool)
     stator[off_rad < np.radians(50), : int(MOST * AXIS_STEPS)] = True
-    return Shadow(off_rad < np.radians(25), stator)
+    return SelfOcclusion(off_rad < np.radians(25), stator)
 
 
 @pytest.mark.parametrize("motion", [SPIN, SWEEP], ids=["spin", "sweep"])
@@ -88,10 +88,10 @@ def test_the_record_is_of_the_scanner_with_its_parts_and_of_mounts_without(motio
 def test_points_on_a_plane_are_those_that_no_part_blocks():
     loaded = task(SPIN, weight=[GROUND])
     problem = problem_of(loaded)
-    none = Shadow(np.zeros(len(problem.bearings_rad), bool), None)
+    none = SelfOcclusion(np.zeros(len(problem.bearings_rad), bool), None)
     (plain,), (same,) = on_planes(loaded, problem, SETTING), on_planes(loaded, problem, SETTING, none)
     assert plain == same
-    half = Shadow(problem.bearings_rad < 0, None)
+    half = SelfOcclusion(problem.bearings_rad < 0, None)
     (fewer,) = on_planes(loaded, problem, SETTING, half)
     assert fewer.points < plain.points
 
@@ -99,4 +99,4 @@ def test_points_on_a_plane_are_those_that_no_part_blocks():
 def test_a_shadow_of_another_lidar_is_refused():
     problem = problem_of(task(SPIN))
     with pytest.raises(BuildError, match="made for a lidar of 7 beams, the task has"):
-        mean_density_at(problem, SETTING, DIRECTIONS, Shadow(np.zeros(7, bool), None))
+        mean_density_at(problem, SETTING, DIRECTIONS, SelfOcclusion(np.zeros(7, bool), None))

@@ -15,7 +15,7 @@ from scanwright.design.objective.score import score
 from scanwright.design.objective.self_check import require_counted
 from scanwright.design.search.search import search
 from scanwright.design.search.with_parts import checked_score
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.sphere import polar_rule
 from scanwright.design.sphere.corners import Corners
 from scanwright.design.task.task import LoadedTask, Task, load_task
@@ -91,7 +91,7 @@ def half_hidden():
     stator[len(bearings) // 2 :, : AXIS_STEPS // 2] = True
     beams = np.zeros(len(bearings), dtype=bool)
     beams[: len(bearings) // 4] = True
-    return Shadow(beams, stator)
+    return SelfOcclusion(beams, stator)
 
 
 def test_a_score_with_parts_is_counted_with_them():

@@ -227,7 +227,7 @@ def test_a_folder_is_no_mesh(tmp_path):
 def test_a_unit_that_the_file_contradicts_is_refused(tmp_path):
     path = tmp_path / "box.glb"
     trimesh.creation.box().export(path)
-    with pytest.raises(SceneError, match=r"unit_m = 0.001, but the file says that one unit is 1 m"):
+    with pytest.raises(SceneError, match=r"unit_m = 0.001, but the file states that one unit is 1 m"):
         load_scene(path, 0.001)
     with pytest.raises(SceneError, match="unit_m = 0:"):
         load_scene(path, 0)

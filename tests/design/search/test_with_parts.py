@@ -15,7 +15,7 @@ from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.search.families import Family
 from scanwright.design.search.with_parts import Refused, choose_with_parts, equivalents, score_with
-from scanwright.design.shadow import AXIS_STEPS, Shadow
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.sphere.directions import weighted_samples
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import Limits, LoadedTask, Task
@@ -51,7 +51,7 @@ class ConeRegion:
         if any(np.allclose(np.degrees(setting_rad), setting) for setting in self.refuses):
             return Refused("tilted too far")
         beams = beam_directions_rot(self.p.bearings_rad, *setting_rad[2:])
-        return Shadow(beams[:, 2] < -np.cos(self.half_rad), None)
+        return SelfOcclusion(beams[:, 2] < -np.cos(self.half_rad), None)
 
     shadow = bound
 
@@ -67,7 +67,7 @@ def test_J_with_hidden_beams_is_that_of_a_ball_search_without_them(still):
     if still:
         stator[100:420, 90:260] = True
         stator[:, rng.integers(0, AXIS_STEPS, 5)] = True
-    found = score_with(p, setting, Shadow(beams, stator))
+    found = score_with(p, setting, SelfOcclusion(beams, stator))
     assert found.J > score(p, setting).J + 0.02
     samples = weighted_samples(p.field, 4000)
     J = []

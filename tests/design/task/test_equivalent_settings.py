@@ -71,8 +71,8 @@ def test_everything_beyond_a_range_has_an_equivalent_within_all_of_them(name):
     [
         (
             {"alpha_laser_deg": 145},
-            "alpha_laser_deg = 145 is not within -90 .. 90; sees the same as alpha_laser_deg = 35, where the servo "
-            "goes round; in a sweep as alpha_laser_deg = -35 and limits_deg with the other sign",
+            "alpha_laser_deg = 145 is not within -90 .. 90; sees the same as alpha_laser_deg = 35, if the servo "
+            "turns all around; in a sweep as alpha_laser_deg = -35 and limits_deg with the other sign",
         ),
         (
             {"alpha_rot_deg": 200},
@@ -80,12 +80,12 @@ def test_everything_beyond_a_range_has_an_equivalent_within_all_of_them(name):
         ),
         (
             {"alpha_laser_deg": (45, 145)},
-            "what lies in [90, 145] sees the same as alpha_laser_deg = [35, 90], where the servo goes round",
+            "what lies in [90, 145] sees the same as alpha_laser_deg = [35, 90], if the servo turns all around",
         ),
         ({"alpha_rot_deg": (170, 190)}, "what lies in [180, 190] sees the same as alpha_rot_deg = [-180, -170]"),
         (
             {"alpha_rot_deg": 10, "beta_rot_deg": 100, "alpha_laser_deg": 5, "beta_laser_deg": 0},
-            "; sees the same as alpha_rot_deg = -170, beta_rot_deg = 80, where the servo goes round; in a sweep as "
+            "; sees the same as alpha_rot_deg = -170, beta_rot_deg = 80, if the servo turns all around; in a sweep as "
             "alpha_rot_deg = -170, beta_rot_deg = 80 and limits_deg 180 deg further",
         ),
     ],

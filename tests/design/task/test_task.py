@@ -250,7 +250,7 @@ def test_a_byte_order_mark_is_no_statement_and_utf_16_is_named(tmp_path):
     with pytest.raises(TaskError, match=r"task\.toml:1: nmae: unknown key"):
         load_task(path)
     path.write_text(BASE, encoding="utf-16")
-    with pytest.raises(TaskError, match=r"task\.toml: not a TOML file: UTF-16 text: save it as UTF-8$"):
+    with pytest.raises(TaskError, match=r"task\.toml: cannot read the task file: UTF-16 text: save it as UTF-8$"):
         load_task(path)
 
 
@@ -273,8 +273,8 @@ def test_what_is_there_and_is_no_task_file_is_called_what_it_is(tmp_path):
     loop.symlink_to(loop)
     built.mkdir()
     for path, says in (
-        (loop, "loop: this is a link that leads to no file"),
-        (Path("/dev/null"), "/dev/null: this is no regular file, so no task file"),
+        (loop, "loop: a link to a file that does not exist"),
+        (Path("/dev/null"), "/dev/null: not a regular file, so not a task file"),
         (built, "built: this is a folder without a task.toml, not a task file"),
     ):
         with pytest.raises(TaskError, match=re.escape(says)):
@@ -519,7 +519,7 @@ def test_a_servo_that_cannot_turn_that_fast_is_refused_and_the_period_named_is_o
     table = {"name": "fast", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "UH1256-02-0610-06S"}
     with pytest.raises(TaskError, match=r"rpm, and servo = 'MX-64R' turns at 63 rpm at most") as refused:
         load_task(table | {"motion": motion | {"period_s": period_s}})
-    least_s = float(re.search(r"take ([\d.]+) or more", str(refused.value))[1])
+    least_s = float(re.search(r"use ([\d.]+) or more", str(refused.value))[1])
     load_task(table | {"motion": motion | {"period_s": least_s}})
-    with pytest.raises(TaskError, match="take"):
+    with pytest.raises(TaskError, match="use"):
         load_task(table | {"motion": motion | {"period_s": least_s - 0.002}})

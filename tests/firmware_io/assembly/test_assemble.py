@@ -99,7 +99,7 @@ def test_the_beams_of_another_sensor_are_told(tmp_path, sensor, first_deg, last_
     recording = write(tmp_path / "r.mcap", [scan], a_log(0.0, 1.0))
     angles = angle_set().model_copy(update={"sensor": sensor})
     said = [
-        line for line in assemble_recording(recording, angles, tmp_path / "o.ply").said if "another scanner" in line
+        line for line in assemble_recording(recording, angles, tmp_path / "o.ply").notes if "another scanner" in line
     ]
     assert len(said) == other
     assert all(sensor in line and f"from {first_deg} to {last_deg:.4g} deg" in line for line in said)
@@ -213,7 +213,7 @@ def test_each_turn_becomes_a_cloud_and_together_they_are_the_recording(tmp_path)
         assert [part.size for part in rows] == [20 * height for height in heights]
         assert b"".join(part.tobytes() for part in rows) == read_ply(tmp_path / "w.ply").tobytes()
         assert f"comment height {heights[-1]}\n".encode() in summary.clouds[-1].read_bytes()[:400]
-        told = [line.partition(": leave it out")[0] for line in summary.said if "leave it out" in line]
+        told = [line.partition(": leave it out")[0] for line in summary.notes if "leave it out" in line]
         small = ["warning: half_005 holds 2 of the usual 10 scans of half a turn"]
         assert told == (small if per == "half" else []), "12 of 20 scans are more than half of a turn"
 
@@ -233,10 +233,10 @@ def test_a_turn_without_a_point_is_no_cloud(tmp_path):
     first=angle_deg,
     ways_rad=st.lists(st.floats(0.1, 20), min_size=1, max_size=4),
     sign=st.sampled_from([1, -1]),
-    whole_rad=st.sampled_from([np.pi, 2 * np.pi]),
+    turn_rad=st.sampled_from([np.pi, 2 * np.pi]),
     noise_rad=st.sampled_from([0.0, 0.004]),
 )
-def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign, whole_rad, noise_rad):
+def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign, turn_rad, noise_rad):
     """There, back, there again ... at 1 rad/s; noise of the encoder is no turning point."""
     corner_s = np.concatenate([[0], np.cumsum(ways_rad)])
     signs = sign * (-1.0) ** np.arange(len(ways_rad))
@@ -252,8 +252,8 @@ def test_turns_begin_at_whole_turns_and_at_turning_points(first, ways_rad, sign,
     )
     expected = list(corner_s[1:-1])
     for begin_s, way_rad in zip(corner_s[:-1], ways_rad, strict=True):
-        expected += [begin_s + k * whole_rad for k in range(1, int(way_rad / whole_rad) + 1)]
-    found_s = (turn_starts(log, int(time_ns[0]), whole_rad) - START) / 1e9
+        expected += [begin_s + k * turn_rad for k in range(1, int(way_rad / turn_rad) + 1)]
+    found_s = (turn_starts(log, int(time_ns[0]), turn_rad) - START) / 1e9
     # a whole turn that ends within the noise of a turning point may be seen or not
     sure = [t for t in expected if np.abs(corner_s[1:] - t).min() > 0.03 or t in corner_s]
     assert all(np.abs(found_s - t).min() < 0.02 for t in sure)
@@ -342,7 +342,7 @@ def test_a_gyro_says_how_the_platform_turned_between_two_poses(tmp_path, command
     words += ["--imu", tmp_path / "imu.csv"]
     posed = [*words, "--poses", tmp_path / "poses.tum"]
     assert "name the --poses too" in command(*words)[2][0]
-    assert "say how it stands there by --imu-rpy-deg" in command(*posed)[2][0]
+    assert "pass its orientation on the platform as imu_rpy_deg" in command(*posed)[2][0]
     code, printed, complaints = command(*posed, "--imu-rpy-deg", 0, 0, 0)
     assert (code, complaints) == (0, [])
     assert "poses: 3, usually 1 s apart, going straight between them is off by 0 mm at most" in printed
@@ -357,7 +357,7 @@ def test_far_poses_and_gaps_between_them_are_told(tmp_path):
     recording = write(tmp_path / "r.mcap", [a_scan()], a_log(0.0, 1.0))
     time_ns = START + np.append(np.arange(-30, 0), [50, 51]) * 100_000_000
     poses = Trajectory(time_ns, np.full((32, 3), 5e5), np.tile([0, 0, 0, 1.0], (32, 1)))
-    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", poses=poses).said
+    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", poses=poses).notes
     assert "going straight between them is off by 0 mm and 0 deg at most" in said[1]
     assert "between two poses lie up to 5.10 s" in said[2]
     assert "500 km from 0, where float32 steps by 1 mm or more" in said[3]
@@ -395,7 +395,7 @@ def test_time_without_a_scan_is_said_but_not_the_way_between_two_stops(tmp_path,
             for k, time_s in enumerate(times_s):
                 writer.scan(a_scan(k, stamp_ns=START + round(time_s * 1e9)))
         summary = assemble_recording(tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply")
-        told = [line for line in summary.said if "without a scan" in line]
+        told = [line for line in summary.notes if "without a scan" in line]
         expected = (
             [] if stops and hold == "true" else ["warning: 2.0 s without a scan at 0.9 s (usually 0.100 s apart)"]
         )

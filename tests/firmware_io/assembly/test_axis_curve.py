@@ -79,7 +79,7 @@ def test_a_log_without_steps_is_followed_closely():
 
 @pytest.mark.parametrize("log", [turning(20)[0], JointLog(START + np.arange(2), np.array([1.0, 2.0]))])
 def test_the_curve_covers_the_log_and_no_more(log):
-    curve, _ = axis_curve(log, held=False)
+    curve, _ = axis_curve(log, at_rest=False)
     ends = np.array([log.time_ns[0], log.time_ns[-1]])
     assert np.isfinite(curve.angle_at(ends)).all()
     assert np.isnan(curve.angle_at(ends + np.array([-1, 1]))).all()
@@ -106,7 +106,7 @@ def stamped_when_received():
 
 
 @pytest.mark.parametrize(
-    ("log", "held", "says"),
+    ("log", "at_rest", "says"),
     [
         (turning(20)[0], True, "held during each scan"),
         (turning(20, duration_s=0.3)[0], False, "30 samples are too few"),
@@ -115,8 +115,8 @@ def stamped_when_received():
         (stop_and_go(), False, "rests 1.1 s on each value: does the axis stop"),
     ],
 )
-def test_where_smoothing_would_invent_it_goes_straight_and_says_why(log, held, says):
-    curve, said = axis_curve(log, held=held)
+def test_where_smoothing_would_invent_it_goes_straight_and_says_why(log, at_rest, says):
+    curve, said = axis_curve(log, at_rest=at_rest)
     assert says in said
     np.testing.assert_allclose(curve.angle_at(log.time_ns), log.position_rad, atol=1e-9)
 

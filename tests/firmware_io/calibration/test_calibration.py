@@ -121,7 +121,7 @@ def test_a_late_log_is_found_where_the_axis_turns_both_ways():
     assert stated[found.choice.free.tolist().index(KEYS.index("lag_s"))] == pytest.approx(inside_s, rel=0.02)
     assert (stated[:4] < [5e-4, 5e-4, 1e-3, 1e-3]).all()
     assert np.abs(errors(found, truth)).max() < 4
-    assert [held.why for held in found.choice.held] == [
+    assert [fixed.why for fixed in found.choice.fixed] == [
         "both ways at one speed: half of it, divided by the speed, is inside the time offset, whose stated error "
         "allows for 0.33 deg of it"
     ]
@@ -131,7 +131,7 @@ def test_backlash_is_told_from_a_late_log_by_a_second_speed():
     setup = Setup(beams=120, sweeps=((20.0, 360.0), (-20.0, 360.0), (60.0, 360.0), (-60.0, 360.0)))
     truth = Truth(lag_s=-0.01, backlash_rad=float(np.radians(1 / 3)))
     found, *_ = calibrated(setup, truth, 0)
-    assert found.choice.held == ()
+    assert found.choice.fixed == ()
     assert found.x[KEYS.index("lag_s")] == pytest.approx(-0.01, abs=3e-4)
     assert np.degrees(found.x[KEYS.index("backlash_rad")]) == pytest.approx(1 / 3, abs=0.02)
 
@@ -220,7 +220,7 @@ def test_wrong_input_is_one_line(room, tmp_path, command, out, says):
 def test_the_same_beams_do_not_count_twice(room, tmp_path, command):
     code, _, complaints = command("calibrate", room[0], room[0], "--angles", room[1], "-o", tmp_path / "a.json")
     assert (code, len(complaints)) == (2, 1)
-    assert "named twice" in complaints[0]
+    assert "given twice" in complaints[0]
 
 
 def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, command):

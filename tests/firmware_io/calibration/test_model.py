@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
 from scanwright.firmware_io.assembly.deskew import deskew, place
 from scanwright.firmware_io.assembly.own_body import OwnBody
@@ -18,12 +19,13 @@ from scanwright.firmware_io.calibration.model import (
     PARAMETERS,
     Mount,
     ReturnedBeams,
+    backlash_rad,
     beam_rays,
     gather,
-    play_rad,
     start_vector,
 )
 from scanwright.firmware_io.calibration.solve import WIDTH, Grouping, bulge_m, covariance, reduced, sums
+from scanwright.firmware_io.calibration.surfaces import group
 from scanwright.firmware_io.calibration.tiles import flat_tiles
 from scanwright.firmware_io.samples import JointLog, Scan, straight
 
@@ -54,7 +56,7 @@ class Recorded:
     """A recording that was never a file."""
 
     path = "r.mcap"
-    held = False
+    at_rest = False
 
     def __init__(self, scans, joint_log):
         self.joint_log = joint_log
@@ -246,6 +248,8 @@ def test_tiles_hold_flat_looks_of_one_pass():
     turned = tiles.normal_laser @ angles.R_rot_laser().T
     facing = np.cos(tiles.middle.joint_rad) * turned[:, 0] - np.sin(tiles.middle.joint_rad) * turned[:, 1]
     assert (facing < -np.cos(5 * tiles.normal_sd_rad + 1e-3)).all()
+    with pytest.raises(RecordingError, match="no flat patches lie in one plane"):  # as of scans far apart
+        group(replace(tiles, normal_sd_rad=np.full(tiles.count.size, 1.0)), mount, x, 0.02, 0.1, 0.1)
 
 
 def test_every_parameter_is_named_once():
@@ -253,7 +257,7 @@ def test_every_parameter_is_named_once():
 
 
 def test_the_play_that_may_hide_in_a_lag_is_that_of_the_servo():
-    plays = {servo: np.degrees(play_rad(servo)) for servo in ("MX-64R", "STS3215", "XL330-M288", "home-made")}
+    plays = {servo: np.degrees(backlash_rad(servo)) for servo in ("MX-64R", "STS3215", "XL330-M288", "home-made")}
     assert plays["MX-64R"] == pytest.approx(0.333)
     assert plays["STS3215"] == pytest.approx(0.9)
     assert plays["XL330-M288"] == plays["home-made"] == pytest.approx(0.9)  # nobody tells it: the most of any

@@ -15,8 +15,8 @@ from scanwright.firmware_io.calibration.entropy import _areas, _between, witness
 from scanwright.firmware_io.calibration.estimate import estimate
 from scanwright.firmware_io.calibration.model import beam_rays, gather, start_vector
 from scanwright.firmware_io.calibration.report import lines
+from scanwright.firmware_io.calibration.scene_motion.overlapping_views import overlapping_views
 from scanwright.firmware_io.calibration.tiles import fan_side
-from scanwright.firmware_io.calibration.unrest.second_looks import second_looks
 from scanwright.firmware_io.recording.recording import open_recording
 
 ALPHA_ROT, BETA_ROT, ALPHA_LASER, BETA_LASER = STANDARD_DEG["pitching"]
@@ -26,8 +26,8 @@ PITCHING = Setup(
 TRUE = np.array([getattr(faulty(2), name) for name in NAMES])
 
 
-def calibrated(folder, unrest, setup=PITCHING):
-    recording = write(folder / "r.mcap", simulate(FURNISHED, setup, faulty(2), 7, unrest))
+def calibrated(folder, scene_motion, setup=PITCHING):
+    recording = write(folder / "r.mcap", simulate(FURNISHED, setup, faulty(2), 7, scene_motion))
     return calibrate_recordings([recording], designed(setup), folder / "a.json").record
 
 
@@ -75,14 +75,14 @@ def test_people_that_walk_are_named(tmp_path):
 
 
 def looked(beams):
-    return second_looks(mount_of(PITCHING)[0], TRUE, beams, 0.01)
+    return overlapping_views(mount_of(PITCHING)[0], TRUE, beams, 0.01)
 
 
 def test_at_rest_no_beam_goes_through_what_another_met(beams):
     """A fan of 270 deg on a pitching axis looks at half of its sphere once in a turn."""
     looks = looked(beams)
     assert looks.seen_through == 0
-    assert 0.45 < looks.compared / looks.asked < 0.7
+    assert 0.45 < looks.compared / looks.tested < 0.7
 
 
 def stood_there(beams, when):
@@ -107,7 +107,7 @@ def test_the_other_look_may_be_the_way_back_or_the_next_turn(tmp_path, sweeps):
     recording = open_recording(write(tmp_path / "r.mcap", simulate(FURNISHED, setup, faulty(2), 6)))
     beams = gather([recording], one_place=True)[0]
     looks = looked(beams)
-    assert looks.compared > 0.8 * looks.asked
+    assert looks.compared > 0.8 * looks.tested
     assert looks.seen_through == 0
     nearer, met = stood_there(beams, (0.2, 0.25))
     assert looked(nearer).seen_through > 0.4 * met
@@ -119,7 +119,7 @@ def test_a_slot_between_things_is_no_place_where_something_was(tmp_path):
     recording = open_recording(write(tmp_path / "r.mcap", simulate(room, setup, truth)))
     beams = gather([recording], one_place=True)[0]
     x = np.array([getattr(truth, name) for name in NAMES])
-    assert second_looks(mount_of(setup)[0], x, beams, 0.01).seen_through == 0
+    assert overlapping_views(mount_of(setup)[0], x, beams, 0.01).seen_through == 0
 
 
 def test_beams_that_end_early_one_by_one_are_nobody(beams):
@@ -132,7 +132,7 @@ def test_a_lidar_that_is_read_the_other_way_round_tells_the_same(beams):
     """Bearings that fall in a scan, as of a lidar that turns the other way."""
     first = np.flatnonzero(np.diff(beams.bearing_rad, prepend=np.inf) < 0)
     back = np.concatenate([np.arange(a, b)[::-1] for a, b in zip(first, [*first[1:], beams.range_m.size], strict=True)])
-    assert looked(beams.taken(back)) == looked(beams)
+    assert looked(beams.select(back)) == looked(beams)
 
 
 def test_residuals_are_those_of_beams_on_their_own_surfaces(crept):
@@ -165,7 +165,7 @@ def test_the_stated_sampling_error_is_that_of_other_samples(beams):
     changes, stated = [], []
     sixth = np.random.default_rng(0).integers(0, 6, beams.range_m.size)
     for k in range(6):
-        part = beams.taken(sixth == k)
+        part = beams.select(sixth == k)
         seen = witness(mount, part, fan_side(part, mount), start, TRUE, 0.01)
         changes.append(seen.after - seen.before)
         stated.append(seen.change_sd)
@@ -212,6 +212,6 @@ def test_recordings_of_two_places_that_are_given_as_one_are_named(tmp_path):
     ]
     record = calibrate_recordings(paths, designed(PITCHING), tmp_path / "a.json", one_place=True).record
     assert any(
-        "somebody walked, something was moved, or the scanner itself was, in spite of --one-place" in said
+        "a person walked through the scene, an object was moved, or the scanner was moved between recordings" in said
         for said in record["notes"]
     )

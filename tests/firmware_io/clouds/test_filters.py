@@ -1,11 +1,9 @@
 """Filters of clouds against the plain loops that they stand for, and against shapes whose normals are known."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.clouds.filters import normals, one_to_a_voxel, outliers
 
 counts = st.integers(1, 60)
@@ -60,6 +58,6 @@ def test_normals_of_a_ball_point_to_who_stands_inside_or_outside():
     assert np.isnan(normals(points[:2], np.zeros(3))).all()
 
 
-def test_more_voxels_than_can_be_numbered_are_refused():
-    with pytest.raises(RecordingError, match=r"voxels of 1e-06 m: a point lies 2 m from 0"):
-        one_to_a_voxel(np.array([[2.0, 0, 0]]), 1e-6)
+def test_voxels_may_be_as_small_and_the_cloud_as_wide_as_you_like():
+    points_m = np.array([[6.4e6, 0, 0], [6.4e6, 0, 1e-5], [0, 0, 0], [0, 0, 4e-7]])
+    assert one_to_a_voxel(points_m, 1e-6).tolist() == [0, 1, 2]

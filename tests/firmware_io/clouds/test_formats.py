@@ -45,7 +45,7 @@ def through(tmp_path, cloud, suffix, organised=False):
     (back,), unread = read_clouds(path)
     assert unread == []
     assert wrote.rows == len(back.points_m)
-    return back, list(wrote.said)
+    return back, list(wrote.notes)
 
 
 def same(back, cloud):

@@ -1,4 +1,4 @@
-"""How the twin's horn turns: closed forms, tolerances, laziness, and what the paper says of both servos (3.2)."""
+"""How the emulator's horn turns: closed forms, tolerances, laziness, and what the paper says of both servos (3.2)."""
 
 import math
 from dataclasses import replace

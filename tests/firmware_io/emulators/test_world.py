@@ -1,4 +1,4 @@
-"""The twin of the world: the frame chain both ways round, the sensor's noise and silence."""
+"""The emulator of the world: the frame chain both ways round, the sensor's noise and silence."""
 
 import numpy as np
 import pytest

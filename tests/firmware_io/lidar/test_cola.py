@@ -89,7 +89,7 @@ def test_bytes_of_cola_a():
 )
 def test_errors_of_all_writings_have_the_manuals_words(sent):
     (told,) = TelegramSplitter().feed(bytes.fromhex(sent))
-    assert (told.word, cola.error_words(cola.error_code(told))) == (b"sFA", "error 1: access denied: it wants a login")
+    assert (told.word, cola.error_words(cola.error_code(told))) == (b"sFA", "error 1: access denied: login required")
 
 
 def test_captured_scans():

@@ -247,6 +247,6 @@ def test_answers_that_contradict_each_other_are_refused():
 
 def test_a_synchronisation_is_as_narrow_as_its_ways_its_ticks_and_its_drift():
     """Asked every 10 ms, 2 ms there and back: half of 2 ms and a tick, and 200 ppm of half a second."""
-    asked_ns = 10**12 + np.arange(50) * 10_000_000
-    exchanges = [Exchange(int(ns), int(ns + 10**6) // 10**6, int(ns) + 2 * 10**6) for ns in asked_ns]
+    sent_ns = 10**12 + np.arange(50) * 10_000_000
+    exchanges = [Exchange(int(ns), int(ns + 10**6) // 10**6, int(ns) + 2 * 10**6) for ns in sent_ns]
     assert 1_590_000 < synchronised(exchanges).half_width_ns < 1_600_000

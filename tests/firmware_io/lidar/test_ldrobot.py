@@ -1,4 +1,4 @@
-"""LDROBOT lidars: bytes against the maker's example, the driver against the twin, whatever breaks on the way."""
+"""LDROBOT lidars: bytes against the maker's example, the driver against the emulator, whatever breaks on the way."""
 
 import os
 
@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from scanwright.firmware_io.emulators import ldrobot as twins
-from scanwright.firmware_io.emulators.ldrobot import LdrobotTwin
+from scanwright.firmware_io.emulators import ldrobot as emulators
+from scanwright.firmware_io.emulators.ldrobot import LdrobotEmulator
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.lidar.ldrobot import driver, protocol
 
@@ -22,8 +22,8 @@ EXAMPLE = bytes.fromhex(
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """Twins share a computer with the tests: ten times as long."""
-    monkeypatch.setattr(driver, "_HEARD_S", 5.0)
+    """Emulators share a computer with the tests: ten times as long."""
+    monkeypatch.setattr(driver, "_FIRST_PACKETS_S", 5.0)
     monkeypatch.setattr(driver, "_TURN_S", 10.0)
 
 
@@ -35,7 +35,7 @@ def wall_m(bearing_rad):
     return 2.0 + np.sin(bearing_rad)
 
 
-class Sight:
+class Ranging:
     """A smooth wall all around with a gap, and what was looked at when."""
 
     def __init__(self):
@@ -66,9 +66,9 @@ def test_the_example_of_the_documents_is_read():
     assert (packet.range_m[0], packet.intensity[0]) == (np.float32(0.224), 228)
 
 
-def test_the_twin_writes_the_example_of_the_documents():
+def test_the_emulator_writes_the_example_of_the_documents():
     points = [[int(mm), int(level)] for mm, level in zip(*_read(EXAMPLE), strict=True)]
-    assert twins.write_packet(2152, 324.27, 334.70, 6714, points) == EXAMPLE
+    assert emulators.write_packet(2152, 324.27, 334.70, 6714, points) == EXAMPLE
 
 
 def _read(data):
@@ -85,7 +85,7 @@ def test_a_flipped_bit_is_a_wrong_packet(at):
 
 
 def test_a_packet_over_the_front_goes_on_at_zero():
-    data = twins.write_packet(3600, 356.0, 4.8, 29_999, [[1000, 9]] * 11 + [[0, 0]])
+    data = emulators.write_packet(3600, 356.0, 4.8, 29_999, [[1000, 9]] * 11 + [[0, 0]])
     packet = protocol.packet(data)
     np.testing.assert_allclose(packet.angle_deg, (356 + 0.8 * np.arange(12)) % 360)
     assert np.isnan(packet.range_m[-1]) and packet.stamp_ms == 29_999
@@ -126,9 +126,9 @@ def test_damaged_streams_give_packets_or_nothing(data):
 
 @pytest.mark.parametrize("model", ["LD06", "LD19", "STL27L"])
 def test_turns_come_as_they_were_seen_and_when(model):
-    sight = Sight()
-    twin = LdrobotTwin(lidar(model), sight, rate_error=5e-5, first_ms=29_700)
-    with twin, open_lidar(twin.port, model) as ours:
+    ranging = Ranging()
+    emulator = LdrobotEmulator(lidar(model), ranging, rate_error=5e-5, first_ms=29_700)
+    with emulator, open_lidar(emulator.port, model) as ours:
         assert (ours.model, ours.scan_rate_hz) == (model, 10.0)
         ours.start(intensity=True)
         timed = [ours.read() for _ in range(12)]
@@ -144,26 +144,26 @@ def test_turns_come_as_they_were_seen_and_when(model):
         np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=6e-4)
         assert scan.intensity.size == scan.range_m.size
         assert scan.time_ns[-1] < one.arrival_ns
-    errors_ns = [sight.error_ns(one.scan) for one in timed[2:]]
+    errors_ns = [ranging.error_ns(one.scan) for one in timed[2:]]
     assert np.abs(errors_ns).max() < 2e6  # a busy computer lets packets wait
 
 
 def test_nobody_can_tell_the_first_two_apart_but_the_third():
-    with LdrobotTwin(lidar("STL27L"), Sight()) as twin:
-        with open_lidar(twin.port) as ours:
+    with LdrobotEmulator(lidar("STL27L"), Ranging()) as emulator:
+        with open_lidar(emulator.port) as ours:
             assert ours.model == "STL27L"
         with pytest.raises(DeviceError, match="points/s: this is a STL27L, not a LD19"):
-            open_lidar(twin.port, "LD19")
-    with LdrobotTwin(lidar("LD19"), Sight()) as twin, open_lidar(twin.port) as ours:
+            open_lidar(emulator.port, "LD19")
+    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port) as ours:
         assert ours.model in ("LD06", "LD19")
 
 
 def test_bad_packets_are_counted_and_never_handed_out():
-    with LdrobotTwin(lidar("LD19"), Sight()) as twin, open_lidar(twin.port, "LD19") as ours:
+    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port, "LD19") as ours:
         ours.start()
         ours.read()
-        twin.garble(5)
-        twin.cut(5)
+        emulator.garble(5)
+        emulator.cut(5)
         for _ in range(6):
             scan = ours.read().scan
             seen = ~np.isnan(scan.range_m)
@@ -173,25 +173,28 @@ def test_bad_packets_are_counted_and_never_handed_out():
 
 
 def test_an_unplugged_sensor_is_told_and_found_again():
-    with LdrobotTwin(lidar("LD19"), Sight()) as twin, open_lidar(twin.port, "LD19") as ours:
+    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port, "LD19") as ours:
         ours.start()
         ours.read()
-        twin.unplug()
+        emulator.unplug()
         with pytest.raises(DeviceError):
             for _ in range(5):
                 ours.read(0.3)
         with pytest.raises(DeviceError, match=r"did not come back in 0\.1 s"):
             ours.reconnect(0.1)
-        twin.plug()
+        emulator.plug()
         ours.reconnect(20.0)
         assert ours.read().scan.range_m.size > 400
 
 
 def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
-    with LdrobotTwin(lidar("LD19"), Sight(), first_ms=17_000) as twin, open_lidar(twin.port, "LD19") as ours:
+    with (
+        LdrobotEmulator(lidar("LD19"), Ranging(), first_ms=17_000) as emulator,
+        open_lidar(emulator.port, "LD19") as ours,
+    ):
         ours.start()
         ours.read()
-        twin.power_cycle()
+        emulator.power_cycle()
         with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
             for _ in range(8):
                 ours.read(0.1)
@@ -201,13 +204,13 @@ def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
 
 
 def test_a_port_where_something_else_or_nothing_talks(monkeypatch):
-    monkeypatch.setattr(driver, "_HEARD_S", 0.2)
+    monkeypatch.setattr(driver, "_FIRST_PACKETS_S", 0.2)
     master, slave = os.openpty()
     try:
-        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor talks there"):
+        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor answers"):
             open_lidar(os.ttyname(slave), "LD19")
         os.write(master, bytes(range(256)) * 8)
-        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor talks there"):
+        with pytest.raises(DeviceTimeoutError, match="no LDROBOT sensor answers"):
             open_lidar(os.ttyname(slave), "LD19")
     finally:
         os.close(master)
@@ -216,10 +219,10 @@ def test_a_port_where_something_else_or_nothing_talks(monkeypatch):
 
 def test_what_it_cannot_is_said():
     assert not family_of("LD19").stamp_choice
-    with LdrobotTwin(lidar("LD19"), Sight()) as twin:
+    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator:
         with pytest.raises(DeviceError, match="stamp_at"):
-            open_lidar(twin.port, "LD19", "rear")
-        with open_lidar(twin.port, "LD19") as ours:
+            open_lidar(emulator.port, "LD19", "rear")
+        with open_lidar(emulator.port, "LD19") as ours:
             with pytest.raises(DeviceError, match="cluster = 2"):
                 ours.start(cluster=2)
             with pytest.raises(DeviceError, match="not started"):

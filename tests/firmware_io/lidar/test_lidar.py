@@ -1,4 +1,4 @@
-"""The lidar driver against the twin: whatever state the sensor is in, whatever breaks on the way."""
+"""The lidar driver against the emulator: whatever state the sensor is in, whatever breaks on the way."""
 
 import itertools
 import os
@@ -11,7 +11,7 @@ import pytest
 
 from scanwright.design.errors import DeviceError, DeviceTimeoutError
 from scanwright.firmware_io.emulators import hokuyo_models, lidar_machine
-from scanwright.firmware_io.emulators.lidar import LidarTwin
+from scanwright.firmware_io.emulators.lidar import LidarEmulator
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.scip import dialogue, protocol
 from scanwright.firmware_io.lidar.scip.driver import ScipLidar, open_scip
@@ -34,39 +34,39 @@ def check(raw, count):
 @pytest.mark.parametrize("way", ["port", "address"])
 @pytest.mark.parametrize(("model", "beams"), [("UTM-30LX", 1081), ("URG-04LX", 682)])
 def test_scans_come_as_they_were_seen(way, model, beams):
-    with LidarTwin(model, look) as twin, open_scip(getattr(twin, way)) as lidar:
-        assert (lidar.model, lidar.firmware) == (model, twin.machine.identity.firmware)
-        assert lidar.serial_number == twin.machine.identity.serial_number
-        assert lidar.parameters == twin.machine.identity.parameters
-        intensity = twin.machine.identity.intensity
+    with LidarEmulator(model, look) as emulator, open_scip(getattr(emulator, way)) as lidar:
+        assert (lidar.model, lidar.firmware) == (model, emulator.machine.identity.firmware)
+        assert lidar.serial_number == emulator.machine.identity.serial_number
+        assert lidar.parameters == emulator.machine.identity.parameters
+        intensity = emulator.machine.identity.intensity
         lidar.start(intensity=intensity)
         scans = [lidar.read_raw() for _ in range(4)]
         for raw in scans:
             check(raw, beams)
             assert raw.intensity.tolist() == (list(range(beams)) if intensity else [])
         steps_ms = np.diff([raw.stamp_ms for raw in scans])
-        period_ms = lidar.parameters.scan_period_s * 1002  # the motor's error is a default of the twin
+        period_ms = lidar.parameters.scan_period_s * 1002  # the motor's error is a default of the emulator
         assert np.all(np.abs(steps_ms - period_ms) <= 1)
         assert (lidar.dropped, lidar.bad_packets) == (0, 0)
-    assert not twin.machine.laser  # `with` puts the laser out
+    assert not emulator.machine.laser  # `with` puts the laser out
 
 
 @pytest.mark.parametrize("state", ["scanning", "scip_1", "adjusting its time", "half a request"])
 def test_the_sensor_may_be_in_any_state(state):
     options = {state: True} if state in ("scanning", "scip_1") else {}
-    with LidarTwin("UTM-30LX", look, **options) as twin:
+    with LidarEmulator("UTM-30LX", look, **options) as emulator:
         if state == "adjusting its time":
-            twin.machine.answer(b"TM0", time.monotonic_ns())
+            emulator.machine.answer(b"TM0", time.monotonic_ns())
         if state == "half a request":
-            Path(twin.port).write_bytes(b"MD0000")
-        with open_scip(twin.port) as lidar:
+            Path(emulator.port).write_bytes(b"MD0000")
+        with open_scip(emulator.port) as lidar:
             lidar.start()
             check(lidar.read_raw(), 1081)
             assert lidar.bad_packets == 0
 
 
 def test_clusters_and_skips():
-    with LidarTwin("UTM-30LX", look) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("UTM-30LX", look) as emulator, open_scip(emulator.port) as lidar:
         lidar.start(cluster=5, skip=1)
         first, second = lidar.read_raw(), lidar.read_raw()
         assert second.stamp_ms - first.stamp_ms in (50, 51)
@@ -91,7 +91,10 @@ def test_first_beams_get_their_true_times(model, intensity):
         true_ns.append(int(time_ns[0]))
         return look(time_ns)
 
-    with LidarTwin(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as twin, open_scip(twin.port) as lidar:
+    with (
+        LidarEmulator(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as emulator,
+        open_scip(emulator.port) as lidar,
+    ):
         assert lidar.sync is not None
         lidar.start(intensity=intensity)
         true_ns.clear()
@@ -99,30 +102,30 @@ def test_first_beams_get_their_true_times(model, intensity):
         for _ in range(12):
             told_ns = lidar.read().scan.stamp_ns
             wrapped |= lidar.read_raw().stamp_ms >= 1 << 24
-            errors_ns.append(min(abs(told_ns - time_ns) for time_ns in true_ns))  # a busy twin leaves turns out
+            errors_ns.append(min(abs(told_ns - time_ns) for time_ns in true_ns))  # a busy emulator leaves turns out
         assert wrapped
         # Within what the synchronisation allows: a busy machine answers late, and no scan here comes early.
         assert max(errors_ns) < lidar.sync.half_width_ns + 1_500_000
 
 
 def test_bad_packets_are_counted_and_never_handed_out():
-    with LidarTwin("UTM-30LX", look) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("UTM-30LX", look) as emulator, open_scip(emulator.port) as lidar:
         lidar.start(intensity=True)
         lidar.read_raw()
-        twin.garble(3)
-        twin.cut(3)
+        emulator.garble(3)
+        emulator.cut(3)
         for _ in range(8):
             check(lidar.read_raw(), 1081)
         assert 6 <= lidar.bad_packets <= 9  # a lost end takes the next one with it
-        assert lidar.dropped >= 3  # on a busy computer the twin leaves out some more
+        assert lidar.dropped >= 3  # on a busy computer the emulator leaves out some more
 
 
 @pytest.mark.parametrize("way", ["port", "address"])
 def test_an_unplugged_sensor_is_told_and_comes_back(way):
-    with LidarTwin("UTM-30LX", look) as twin, open_scip(getattr(twin, way)) as lidar:
+    with LidarEmulator("UTM-30LX", look) as emulator, open_scip(getattr(emulator, way)) as lidar:
         lidar.start(intensity=True)
         lidar.read_raw()
-        twin.unplug()
+        emulator.unplug()
         with pytest.raises(DeviceError, match="plug") as told:
             for _ in range(10):
                 lidar.read_raw()
@@ -132,7 +135,7 @@ def test_an_unplugged_sensor_is_told_and_comes_back(way):
             lidar.reconnect(0.1)
         with pytest.raises(DeviceError, match="plug it in again"):
             lidar.read_raw()
-        twin.plug()
+        emulator.plug()
         lidar.reconnect(30.0)
         raw = lidar.read_raw()
         check(raw, 1081)
@@ -141,7 +144,10 @@ def test_an_unplugged_sensor_is_told_and_comes_back(way):
 
 def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
     name = tmp_path / "ttyACM0"
-    with LidarTwin("UTM-30LX", look) as ours, LidarTwin("UTM-30LX", lambda t: (look(t)[0] + 1, look(t)[1])) as other:
+    with (
+        LidarEmulator("UTM-30LX", look) as ours,
+        LidarEmulator("UTM-30LX", lambda t: (look(t)[0] + 1, look(t)[1])) as other,
+    ):
         other.machine.identity = replace(other.machine.identity, serial_number="00900001")
         name.symlink_to(ours.port)
         with ScipLidar(str(name), search=lambda: [other.port, str(tmp_path / "gone"), ours.port]) as lidar:
@@ -160,11 +166,11 @@ def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
 
 
 def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
-    with LidarTwin("UTM-30LX", look, clock_ms=1_000_000) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("UTM-30LX", look, clock_ms=1_000_000) as emulator, open_scip(emulator.port) as lidar:
         lidar.start()
         lidar.read()
         before = lidar.read_raw()
-        twin.power_cycle()
+        emulator.power_cycle()
         with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
             for _ in range(5):
                 lidar.read_raw(0.1)
@@ -178,17 +184,17 @@ def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
 
 
 def test_a_fault_of_the_sensor_is_told_and_the_laser_is_put_out():
-    with LidarTwin("UTM-30LX", look) as twin:
-        with pytest.raises(DeviceError, match="hardware fault"), open_scip(twin.port) as lidar:
+    with LidarEmulator("UTM-30LX", look) as emulator:
+        with pytest.raises(DeviceError, match="hardware fault"), open_scip(emulator.port) as lidar:
             lidar.start()
-            answer = twin.machine.next_scan
-            twin.machine.next_scan = lambda: answer()[:0] + protocol.reply(lidar._request, "55")
+            answer = emulator.machine.next_scan
+            emulator.machine.next_scan = lambda: answer()[:0] + protocol.reply(lidar._request, "55")
             lidar.read_raw()
-        assert not twin.machine.laser
+        assert not emulator.machine.laser
 
 
 def test_what_a_sensor_cannot_do_is_told():
-    with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("URG-04LX", look) as emulator, open_scip(emulator.port) as lidar:
         with pytest.raises(DeviceError, match="ME0044072501000: status 0E"):
             lidar.start(intensity=True)
         with pytest.raises(DeviceError, match="cluster = 0"):
@@ -198,16 +204,16 @@ def test_what_a_sensor_cannot_do_is_told():
 def test_absent_ports_and_ports_in_use_are_told(tmp_path):
     with pytest.raises(DeviceError, match="ttyACM7: no such port; serial ports here: "):
         open_scip(str(tmp_path / "ttyACM7"))
-    with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: look at address"):
+    with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: check address"):
         open_scip("127.0.0.1:1")
     with pytest.raises(DeviceError, match="this is no serial port"):
         open_scip("/dev/null")
     with (
-        LidarTwin("UTM-30LX", look) as twin,
-        open_scip(twin.port),
+        LidarEmulator("UTM-30LX", look) as emulator,
+        open_scip(emulator.port),
         pytest.raises(DeviceError, match="another program has it open"),
     ):
-        open_scip(twin.port)
+        open_scip(emulator.port)
 
 
 def test_a_port_where_no_lidar_answers(monkeypatch):
@@ -243,7 +249,7 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     monkeypatch.setattr(SlowPort, "fastest", fastest)
     monkeypatch.setattr(dialogue, "_ANSWER_S", 0.4)
-    with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("URG-04LX", look) as emulator, open_scip(emulator.port) as lidar:
         assert lidar._dialogue.line.stream.listens == lidar._dialogue.line.stream.baud == 115_200
         lidar.start()
         assert (
@@ -265,7 +271,7 @@ class BadLine(byte_stream.SerialStream):
 def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
     monkeypatch.setattr(dialogue, "_ANSWER_S", 0.2)
-    with LidarTwin("URG-04LX", look) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("URG-04LX", look) as emulator, open_scip(emulator.port) as lidar:
         lidar.start()
         assert lidar._dialogue.line.stream.baud == 115_200
         check(lidar.read_raw(), 682)
@@ -281,7 +287,7 @@ def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypa
         return answer(self, request, now_ns)
 
     monkeypatch.setattr(lidar_machine.LidarMachine, "answer", listening)
-    with LidarTwin("UTM-30LX", look) as twin, open_scip(twin.port) as lidar:
+    with LidarEmulator("UTM-30LX", look) as emulator, open_scip(emulator.port) as lidar:
         assert lidar.sync is None
         lidar.start()
         check(lidar.read_raw(), 1081)

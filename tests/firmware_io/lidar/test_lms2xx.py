@@ -1,4 +1,4 @@
-"""SICK LMS 2xx: bytes against published ones, the driver against the twin by a clock of their own."""
+"""SICK LMS 2xx: bytes against published ones, the driver against the emulator by a clock of their own."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from virtual_line import VirtualLine
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceFaultError, ProtocolError
-from scanwright.firmware_io.emulators.sick.lms_twin import LmsTwin, lms_twin, write_telegram
+from scanwright.firmware_io.emulators.sick.lms_emulator import LmsEmulator, lms_emulator, write_telegram
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lms2xx import driver, protocol
@@ -29,7 +29,7 @@ REQUESTS = [
 @pytest.mark.parametrize(("ours", "published"), REQUESTS)
 def test_requests_are_those_that_are_published(ours, published):
     assert ours == bytes.fromhex(published)
-    assert write_telegram(ours[4:-2], address=0) == ours  # the twin's sum is another program
+    assert write_telegram(ours[4:-2], address=0) == ours  # the emulator's sum is another program
 
 
 def telegrams(ranges, kind=0x4000, status=0x10):
@@ -178,7 +178,7 @@ def test_a_slow_line_loses_turns_and_says_so(opened):
     lidar._baud = 9600
     lidar.start()
     timed = [lidar.read() for _ in range(8)]
-    assert "at 9600 baud most of its turns are lost" in timed[-1].warning
+    assert "at 9600 baud most turns are lost" in timed[-1].warning
     assert lidar.dropped > 100
     assert wall.error_ns(timed[-1].scan).max() < 10_000_000
 
@@ -199,7 +199,7 @@ def test_what_it_cannot_is_said(opened):
     lidar, line, _ = opened()
     line.machine.baud = 500_000
     for wish in ({"intensity": True}, {"cluster": 2}):
-        with pytest.raises(DeviceError, match="tells ranges only"):
+        with pytest.raises(DeviceError, match="one range for each beam"):
             lidar.start(**wish)
     with pytest.raises(DeviceError, match="not started"):
         lidar.read()
@@ -294,13 +294,13 @@ class SlowPort(byte_stream.SerialStream):
 
 def test_the_speed_of_a_serial_line_is_found_and_raised_as_far_as_the_adapter_can(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
-    with lms_twin(load_catalogue().products["LMS 200"], Wall()) as twin:
-        assert isinstance(twin, LmsTwin)
-        monkeypatch.setattr(SlowPort, "machine", twin.machine)
-        twin.machine.baud = 19_200
+    with lms_emulator(load_catalogue().products["LMS 200"], Wall()) as emulator:
+        assert isinstance(emulator, LmsEmulator)
+        monkeypatch.setattr(SlowPort, "machine", emulator.machine)
+        emulator.machine.baud = 19_200
         monkeypatch.setattr(driver, "_ANSWER_S", 0.3)
-        with open_lidar(twin.port, "LMS 200") as lidar:
+        with open_lidar(emulator.port, "LMS 200") as lidar:
             lidar.start()
-            assert twin.machine.baud == 38_400
+            assert emulator.machine.baud == 38_400
             assert "38400 baud" in lidar.read(20.0).warning
-        assert twin.machine.scanning is None
+        assert emulator.machine.scanning is None

@@ -1,4 +1,4 @@
-"""The SICK driver against its twin: both dialects, both ways, and whatever breaks on the way."""
+"""The SICK driver against its emulator: both dialects, both ways, and whatever breaks on the way."""
 
 import time
 
@@ -8,7 +8,7 @@ import pytest
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from scanwright.firmware_io.emulators.sick.cola_twin import SickMachine, SickTwin
+from scanwright.firmware_io.emulators.sick.cola_emulator import SickEmulator, SickMachine
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.sick import driver
 from scanwright.firmware_io.lidar.sick.dialogue import RefusedError
@@ -23,9 +23,9 @@ def look(_time_ns, bearing_rad):
     return range_m, np.arange(bearing_rad.size, dtype=float)
 
 
-def twin(model="LMS111", sight=look, jitter_s=0.0, **state):
+def emulator(model="LMS111", ranging=look, jitter_s=0.0, **state):
     lidar = load_catalogue().get(model, Lidar)
-    return SickTwin(SickMachine(lidar, sight, time.monotonic_ns(), **state), jitter_s=jitter_s)
+    return SickEmulator(SickMachine(lidar, ranging, time.monotonic_ns(), **state), jitter_s=jitter_s)
 
 
 def check(scan, model):
@@ -47,7 +47,7 @@ def until_fine(lidar):
 @pytest.mark.parametrize("dialects", [(True,), (False,), (True, False)], ids=["B", "A", "both"])
 @pytest.mark.parametrize("model", ["TiM551", "TiM571", "LMS111"])
 def test_scans_come_as_they_were_seen(model, dialects):
-    with twin(model, dialects=dialects) as sensor, open_lidar(sensor.address, model) as lidar:
+    with emulator(model, dialects=dialects) as sensor, open_lidar(sensor.address, model) as lidar:
         assert (lidar.model, lidar.serial_number, lidar.firmware) == (model, "18030000", "V1.00")
         lidar.start(intensity=True)
         for _ in range(3):
@@ -61,7 +61,7 @@ def test_scans_come_as_they_were_seen(model, dialects):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_sensor_says_which_model_it_is(model):
-    with twin(model) as sensor, open_sick(sensor.port) as lidar:
+    with emulator(model) as sensor, open_sick(sensor.port) as lidar:
         assert (lidar.model, lidar.scan_rate_hz) == (model, load_catalogue().get(model, Lidar).scan_rate_hz)
 
 
@@ -76,7 +76,7 @@ def test_first_beams_get_their_true_times(stamps_end):
         return range_m, level
 
     state = {"rate_error": 5e-5, "clock_us": (1 << 32) - 300_000, "stamps_end": stamps_end}
-    with twin(sight=timed, **state) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(ranging=timed, **state) as sensor, open_sick(sensor.address) as lidar:
         lidar.start()
         read = [lidar.read() for _ in range(40)]  # its clock wraps meanwhile
     meant_ns = [true_ns[round(100 * (float(each.scan.range_m[0]) - 1))] for each in read]
@@ -87,7 +87,7 @@ def test_first_beams_get_their_true_times(stamps_end):
 
 
 def test_damage_is_counted_and_never_handed_out():
-    with twin(dialects=(True,)) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(dialects=(True,)) as sensor, open_sick(sensor.address) as lidar:
         lidar.start()
         lidar.read()
         sensor.garble(3)
@@ -99,12 +99,12 @@ def test_damage_is_counted_and_never_handed_out():
 
 
 def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
-    with twin(status=2) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(status=2) as sensor, open_sick(sensor.address) as lidar:
         lidar.start()
         timed = lidar.read()
         check(timed.scan, "LMS111")
-        assert timed.warning == "its window is dirty, though it still sees: clean it"
-        for status, words in ((5, "too dirty to see through: clean it"), (1, "fault of its own")):
+        assert timed.warning == "its window is dirty, but it still measures: clean it"
+        for status, words in ((5, "too dirty to measure: clean it"), (1, "it reports a fault")):
             sensor.machine.status = status
             with pytest.raises(DeviceFaultError, match=words):
                 for _ in range(1000):
@@ -116,7 +116,7 @@ def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
 @pytest.mark.parametrize("dialects", [(True,), (False,)], ids=["B", "A"])
 def test_it_tells_its_hours_where_it_counts_them(dialects):
     """The numbers 4F4 and A7 are those of a sensor in the notes of a driver: 126.8 hours, 167 times."""
-    with twin(dialects=dialects, run_tenth_h=0x4F4, starts=0xA7) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(dialects=dialects, run_tenth_h=0x4F4, starts=0xA7) as sensor, open_sick(sensor.address) as lidar:
         assert lidar.condition() == ("it has run for 126.8 h", "it was switched on 167 times")
         sensor.machine.refusals = [3, 1]  # it knows no such variable, or this level may not read it
         assert lidar.condition() == ()
@@ -125,7 +125,7 @@ def test_it_tells_its_hours_where_it_counts_them(dialects):
 
 
 def test_an_unplugged_sensor_is_told_and_comes_back():
-    with twin() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
         lidar.start(intensity=True)
         lidar.read()
         sensor.unplug()
@@ -143,7 +143,7 @@ def test_an_unplugged_sensor_is_told_and_comes_back():
 
 
 def test_silence_is_a_timeout_and_a_restarted_sensor_scans_on():
-    with twin() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
         lidar.start()
         lidar.read()
         sensor.power_cycle()
@@ -155,7 +155,7 @@ def test_silence_is_a_timeout_and_a_restarted_sensor_scans_on():
 
 
 def test_a_busy_sensor_is_waited_for(monkeypatch):
-    with twin() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
         sensor.machine.busy_until_ns = time.monotonic_ns() + 200_000_000
         lidar.start()
         assert time.monotonic_ns() >= sensor.machine.busy_until_ns
@@ -167,10 +167,10 @@ def test_a_busy_sensor_is_waited_for(monkeypatch):
 
 
 def test_refusals_have_the_sensors_words(monkeypatch):
-    with twin() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
         with pytest.raises(DeviceError, match="cluster"):
             lidar.start(cluster=2)
-        with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: it wants a login"):
+        with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: login required"):
             lidar._dialogue.ask(lidar._dialogue.writer("sMN LMCstartmeas"))
         with monkeypatch.context() as other:
             other.setattr(driver, "_PASSWORD", 1)
@@ -179,7 +179,7 @@ def test_refusals_have_the_sensors_words(monkeypatch):
 
 
 def test_a_busy_method_is_asked_again_and_other_codes_are_told_by_their_words():
-    with twin() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
         sensor.machine.refusals[:] = [0x0D, 0x0D]
         lidar.start()
         check(lidar.read().scan, "LMS111")
@@ -191,7 +191,7 @@ def test_a_busy_method_is_asked_again_and_other_codes_are_told_by_their_words():
 
 
 def test_a_sensor_of_unknown_name_wants_its_model():
-    with twin() as sensor:
+    with emulator() as sensor:
         sensor.machine.lidar = sensor.machine.lidar.model_copy(update={"name": "LMS1xx"})
         with pytest.raises(DeviceError, match=r"calls itself 'LMS1xx'.*name its model; known: LMS111"):
             open_sick(sensor.address)
@@ -200,7 +200,7 @@ def test_a_sensor_of_unknown_name_wants_its_model():
 
 
 def test_skipped_turns_are_not_missing():
-    with twin() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
         lidar.start(skip=1)
         scans = [lidar.read().scan for _ in range(16)]  # a busy computer moves single ones
         assert scans[0].scan_time_s == pytest.approx(0.04)
@@ -209,5 +209,5 @@ def test_skipped_turns_are_not_missing():
 
 
 def test_what_speaks_no_cola_is_told():
-    with twin(dialects=()) as sensor, pytest.raises(DeviceTimeoutError, match="no SICK sensor answers"):
+    with emulator(dialects=()) as sensor, pytest.raises(DeviceTimeoutError, match="no SICK sensor answers"):
         open_sick(sensor.address)

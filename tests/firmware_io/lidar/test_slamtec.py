@@ -1,4 +1,4 @@
-"""RPLIDARs: bytes against published ones, the driver against the twin, whatever breaks on the way."""
+"""RPLIDARs: bytes against published ones, the driver against the emulator, whatever breaks on the way."""
 
 import socket
 import time
@@ -12,7 +12,7 @@ from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
-from scanwright.firmware_io.emulators.slamtec import IDENTITIES, SlamtecTwin
+from scanwright.firmware_io.emulators.slamtec import IDENTITIES, SlamtecEmulator
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
 
@@ -39,7 +39,7 @@ DESCRIPTORS = [
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """Twins share a computer with the tests: ten times as long; what old firmware leaves unanswered is waited for."""
+    """Emulators share a computer with the tests: wait ten times as long."""
     monkeypatch.setattr(dialogue, "_ANSWER_S", 2.0)
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
@@ -54,7 +54,7 @@ def wall_m(bearing_rad):
     return 2.0 + np.sin(bearing_rad)
 
 
-def sight(time_ns, bearing_rad):
+def ranging(time_ns, bearing_rad):
     gap = np.abs(np.remainder(bearing_rad + np.pi, 2 * np.pi) - np.pi) > 3.0
     return np.where(gap, np.inf, wall_m(bearing_rad)), np.full(time_ns.size, 800.0)
 
@@ -72,12 +72,12 @@ def test_descriptors_are_those_that_are_published(published, told):
     assert protocol.descriptor(bytes.fromhex(published)) == told
 
 
-def test_a_twin_answers_published_requests_with_published_descriptors():
-    twin = SlamtecTwin(lidar("RPLIDAR A1"), sight)
+def test_a_emulator_answers_published_requests_with_published_descriptors():
+    emulator = SlamtecEmulator(lidar("RPLIDAR A1"), ranging)
     for request, published, size in (("A5 50", DESCRIPTORS[0], 20), ("A5 52", DESCRIPTORS[1], 3)):
-        told, rest = twin.machine.hear(bytes.fromhex(request), twin.machine.began_ns)
+        told, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
         assert told[:7] == bytes.fromhex(published[0]) and (len(told), rest) == (7 + size, b"")
-    wrong, _ = twin.machine.hear(bytes.fromhex("A5 82 05 00 00 00 00 00 23"), twin.machine.began_ns)
+    wrong, _ = emulator.machine.hear(bytes.fromhex("A5 82 05 00 00 00 00 00 23"), emulator.machine.began_ns)
     assert wrong == b""
 
 
@@ -105,12 +105,12 @@ def test_a_cabin_is_read_by_its_bits():
 
 
 def stream_of(model, turns=0.3):
-    twin = SlamtecTwin(lidar(model), sight)
+    emulator = SlamtecEmulator(lidar(model), ranging)
     start = protocol.request(protocol.SCAN if model == "RPLIDAR C1" else protocol.EXPRESS_SCAN, bytes(5))
-    twin.machine.hear(start, twin.machine.began_ns)
+    emulator.machine.hear(start, emulator.machine.began_ns)
     data = b""
     while len(data) < 84 * 12 * turns:
-        data += b"".join(packet for _, packet in twin.machine.next_packets())
+        data += b"".join(packet for _, packet in emulator.machine.next_packets())
     return data
 
 
@@ -155,15 +155,15 @@ def test_anything_is_an_answer_or_a_typed_error(read, data):
 
 @pytest.mark.parametrize("model", sorted(IDENTITIES))
 def test_turns_come_as_they_were_seen(model):
-    with SlamtecTwin(lidar(model), sight) as twin:
-        with open_lidar(twin.port, model) as ours:
+    with SlamtecEmulator(lidar(model), ranging) as emulator:
+        with open_lidar(emulator.port, model) as ours:
             assert ours.model == model and ours.firmware == "1.29" and len(ours.serial_number) == 32
             ours.start(intensity=True)
             timed = [ours.read() for _ in range(5)]
             steps = np.diff([one.scan.stamp_ns for one in timed]) * lidar(model).scan_rate_hz / 1e9
-            missing = np.rint(steps - 1).sum()  # on a busy computer the twin leaves some out
+            missing = np.rint(steps - 1).sum()  # on a busy computer the emulator leaves some out
             assert ours.bad_packets == 0 and abs(ours.dropped - missing) <= 1
-        until(lambda: twin.machine.scanning is None)  # `with` puts it out
+        until(lambda: emulator.machine.scanning is None)  # `with` puts it out
     usual = IDENTITIES[model].points_s / lidar(model).scan_rate_hz
     for one in timed:
         scan = one.scan
@@ -176,20 +176,20 @@ def test_turns_come_as_they_were_seen(model):
 
 
 def test_another_model_is_refused_and_none_named_is_found():
-    with SlamtecTwin(lidar("RPLIDAR A1"), sight) as twin:
+    with SlamtecEmulator(lidar("RPLIDAR A1"), ranging) as emulator:
         with pytest.raises(DeviceError, match="this is a RPLIDAR A1, not a RPLIDAR C1"):
-            open_lidar(twin.port, "RPLIDAR C1")
-        with driver.open_slamtec(twin.port) as ours:
+            open_lidar(emulator.port, "RPLIDAR C1")
+        with driver.open_slamtec(emulator.port) as ours:
             assert ours.model == "RPLIDAR A1"
 
 
 @pytest.mark.parametrize("model", ["RPLIDAR A2", "RPLIDAR S2"])
 def test_bad_capsules_are_counted_and_never_handed_out(model):
-    with SlamtecTwin(lidar(model), sight) as twin, open_lidar(twin.port, model) as ours:
+    with SlamtecEmulator(lidar(model), ranging) as emulator, open_lidar(emulator.port, model) as ours:
         ours.start()
         ours.read()
-        twin.garble(4)
-        twin.cut(4)
+        emulator.garble(4)
+        emulator.cut(4)
         for _ in range(4):
             scan = ours.read().scan
             seen = ~np.isnan(scan.range_m)
@@ -198,19 +198,19 @@ def test_bad_capsules_are_counted_and_never_handed_out(model):
 
 
 def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
-    with SlamtecTwin(lidar("RPLIDAR C1"), sight) as twin:
-        twin.machine.hear(protocol.request(protocol.SCAN), time.monotonic_ns())
-        with open_lidar(twin.port, "RPLIDAR C1") as ours:
+    with SlamtecEmulator(lidar("RPLIDAR C1"), ranging) as emulator:
+        emulator.machine.hear(protocol.request(protocol.SCAN), time.monotonic_ns())
+        with open_lidar(emulator.port, "RPLIDAR C1") as ours:
             ours.start()
             ours.read()
-            twin.unplug()
+            emulator.unplug()
             with pytest.raises(DeviceError):
                 for _ in range(5):
                     ours.read(0.3)
-            twin.plug()
+            emulator.plug()
             ours.reconnect(20.0)
             assert ours.read().scan.range_m.size > 400
-            twin.power_cycle()
+            emulator.power_cycle()
             with pytest.raises(DeviceError, match="nothing came in time"):
                 for _ in range(9):
                     ours.read(0.1)
@@ -219,19 +219,19 @@ def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
 
 
 def test_a_warning_of_its_health_is_told_with_the_turns():
-    with SlamtecTwin(lidar("RPLIDAR S1"), sight) as twin, open_lidar(twin.port, "RPLIDAR S1") as ours:
-        twin.machine.health = 1
+    with SlamtecEmulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
+        emulator.machine.health = 1
         ours.start()
-        assert ours.read().warning == "it reports a warning of its own health, 0x8002: it still scans"
+        assert ours.read().warning == "health warning 0x8002; it still scans"
         ours.stop()
-        twin.machine.health = 0
+        emulator.machine.health = 0
         ours.start()
         assert not ours.read().warning
 
 
 def test_a_fault_is_told():
-    with SlamtecTwin(lidar("RPLIDAR S1"), sight) as twin, open_lidar(twin.port, "RPLIDAR S1") as ours:
-        twin.machine.health = 2
+    with SlamtecEmulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
+        emulator.machine.health = 2
         with pytest.raises(DeviceError, match="it reports fault 0x8002"):
             ours.start()
 

@@ -63,8 +63,8 @@ def test_capsules_of_a_motor_that_starts_from_rest_are_placed():
 
 def test_a_lost_turn_that_no_angle_tells_breaks_the_count():
     count = PointCount(protocol.CAPSULES, CAPSULE_NS / 32, 256_000)
-    heard = [one for one in capsules(600, lambda n: 7.2 * n) if not 200 <= one[0] < 250]  # 50 are a turn
-    for number, capsule in heard:
+    received = [one for one in capsules(600, lambda n: 7.2 * n) if not 200 <= one[0] < 250]  # 50 are a turn
+    for number, capsule in received:
         count.placed([(capsule, 0)], (number + 1) * CAPSULE_NS)
         assert number < 250 or (number - 250) * CAPSULE_NS < 0.5e9
         if count.broken:

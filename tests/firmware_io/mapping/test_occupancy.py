@@ -137,7 +137,7 @@ def test_the_floor_is_found_under_furniture(eye_z):
 
 def test_where_there_is_no_floor_a_line_says_why():
     room = seen(boxes([LOW, HIGH]), np.zeros(3), 20_000)
-    with pytest.raises(RecordingError, match=r"what lies lowest shares no level: 0 m2 at z = 0\.00 m.*--floor-m"):
+    with pytest.raises(RecordingError, match=r"what lies lowest shares no level: 0 m2 at z = 0\.00 m.*floor_m"):
         find_floor(room[np.abs(room[:, 2]) < 0.02] * [1, 1, 0])  # a fan that lies level
     with pytest.raises(RecordingError, match=r"% of the points lie below the widest level, z = 1\.[56]"):
         find_floor(room[room[:, 2] > 0])
@@ -151,7 +151,7 @@ def test_where_there_is_no_floor_a_line_says_why():
 
 def test_a_grid_that_no_computer_holds_is_refused():
     points = np.array([[0.0, 0, 0], [1e7, 0, 0]])
-    with pytest.raises(RecordingError, match=r"--resolution-m = 0\.05: 200,000,003 x 3 cells") as told:
+    with pytest.raises(RecordingError, match=r"resolution_m = 0\.05: 200,000,003 x 3 cells") as told:
         occupancy_grid(points, np.full_like(points, np.nan), HEIGHTS, CELL_M)
     assert "\n" not in str(told.value)
     with pytest.raises(RecordingError, match=r"no point and no beam between 0\.1 and 1\.8 m above the floor"):

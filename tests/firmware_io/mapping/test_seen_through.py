@@ -69,10 +69,10 @@ def test_the_order_and_the_frame_do_not_matter():
 
 @pytest.mark.parametrize("beyond_m", [0.0, -1.0, np.inf, np.nan])
 def test_a_bound_that_is_none_is_refused(beyond_m):
-    with pytest.raises(RecordingError, match=rf"--seen-through-m = {beyond_m}: a number above 0"):
+    with pytest.raises(RecordingError, match=rf"seen_through_m = {beyond_m}: must be above 0"):
         seen_through([Stand(wall(), np.zeros(3))] * 2, beyond_m)
 
 
 def test_one_cloud_tells_nothing_of_what_moved():
-    with pytest.raises(RecordingError, match="1 clouds whose scanner's place is known, 2 at least"):
+    with pytest.raises(RecordingError, match="1 clouds with a known scanner position, minimum 2"):
         seen_through([Stand(wall(), np.zeros(3)), Stand(wall(), np.full(3, np.nan))])

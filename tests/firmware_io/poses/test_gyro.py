@@ -81,7 +81,7 @@ def test_the_integral_converges_with_the_square_of_the_step():
 def test_where_the_gyro_is_silent_it_goes_on_as_without():
     hole = gyro(keep=lambda seconds: (seconds < 4.05) | (seconds > 4.95))
     trajectory, said = oriented(poses(), hole, MOUNT.as_matrix())
-    assert "warning: 5 of 49 ways from pose to pose have no gyro" in said[1]
+    assert "warning: 5 of 49 intervals between poses have no gyro rate" in said[1]
     assert error_deg(trajectory, 0, 4).max() < 0.03
     np.testing.assert_allclose(error_deg(trajectory, 4, 5), error_deg(poses(), 4, 5), atol=1e-6)
 

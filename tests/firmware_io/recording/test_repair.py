@@ -91,13 +91,13 @@ def test_a_flipped_bit_costs_no_message_that_is_whole(tmp_path, journal, first):
         damaged = data[:place] + bytes([data[place] ^ 1 << bit % 8]) + data[place + 1 :]
         path.write_bytes(damaged)
         summary = repair(path)
-        if summary.whole:
+        if summary.intact:
             called_whole += 1
             assert messages(path) == sent, bit
             open_recording(path)
         else:
             assert messages(out) == whole_after(data, sent, place), bit
-            assert repair(out, tmp_path / "again.mcap").whole
+            assert repair(out, tmp_path / "again.mcap").intact
             open_recording(out)
         assert path.read_bytes() == damaged
     assert called_whole < 5  # a letter of the note, which nothing vouches for
@@ -111,7 +111,7 @@ def test_wherever_it_is_cut_every_whole_chunk_is_kept(tmp_path_factory, journal,
     cut = round(share * len(data))
     path.write_bytes(data[:cut])
     if cut == len(data):
-        assert repair(path).whole
+        assert repair(path).intact
         return
     # the message indexes after a chunk are not needed: a chunk counts as soon as it is there itself
     whole = sum(end <= cut for end in ends)
@@ -136,7 +136,7 @@ def test_torn_bytes_never_become_a_message(tmp_path_factory, journal, share, run
     except RecordingError as error:
         assert str(path) in str(error)
         return
-    kept = messages(path if summary.whole else repaired_place(path))
+    kept = messages(path if summary.intact else repaired_place(path))
     assert [message for message in sent if message in kept] == kept
     untouched = [k for k, (checksum, _, end) in enumerate(chunks(data)) if end <= begin or checksum - 33 >= begin + run]
     if len(untouched) < 4:
@@ -158,12 +158,12 @@ def test_every_packing_survives_a_damaged_head(tmp_path, packing):
     path = tmp_path / "r.mcap"
     path.write_bytes(data)
     sent = messages(path)
-    assert repair(path).whole
+    assert repair(path).intact
     assert len(chunks(data)) > 2
     checksum, begin, _ = chunks(data)[1]
     for place in [place for place in range(checksum - 33, begin) if not checksum <= place < checksum + 4]:
         path.write_bytes(data[:place] + bytes([data[place] ^ 0xFF]) + data[place + 1 :])
-        assert not repair(path).whole
+        assert not repair(path).intact
         assert messages(repaired_place(path)) == sent, place
 
 
@@ -182,7 +182,7 @@ def test_a_file_without_chunks_loses_what_is_damaged_and_no_more(tmp_path):
     place = data.index(bytes([4]) * 50) - 30  # the length of the fifth
     path.write_bytes(data[:place] + b"\xff" + data[place + 1 :])
     summary = repair(path)
-    assert (summary.lost_messages, summary.whole) == (1, False)
+    assert (summary.lost_messages, summary.intact) == (1, False)
     assert messages(repaired_place(path)) == sent[:4] + sent[5:]
 
 

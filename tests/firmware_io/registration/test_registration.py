@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.firmware_io.registration import building, room, scan, shell
 from scanwright.design import frames
 from scanwright.design.errors import RecordingError
+from scanwright.design.progress import no_progress
 from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 from scanwright.firmware_io.registration.cube_map import cells_of, depth_map, solid_angles_sr
@@ -267,7 +268,7 @@ def test_a_building_closes_within_a_centimetre():
         slip = pose(rng.normal(0, 2), *rng.normal(0, 0.2, 2), 0.0)
         walked.append(walked[-1] @ np.linalg.inv(here) @ there @ slip)
     assert off_by(walked[-1], stands[-1])[0] > 0.5
-    found = register(views, walked, lambda _: None)
+    found = register(views, walked, no_progress)
     assert found.complete
     assert max(off_by(T, truth)[0] for T, truth in zip(found.T_world, stands, strict=True)) < 0.01
     believed = {(pair.a, pair.b) for pair in found.pairs if not pair.why_not}
@@ -329,11 +330,11 @@ def test_wrong_input_is_one_line(command, tmp_path):
     (tmp_path / "p.tum").write_text("0 1 2 3 0 0 0 1\n")
     (tmp_path / "r.mcap").touch()
     for words, says in (
-        ([one], "1 cloud: registering takes two at least"),
+        ([one], "1 cloud: register needs at least two"),
         ([one, other, "--start", tmp_path / "p.tum"], "1 poses for 2 clouds"),
         ([one, other, "--spacing-m", "0"], "spacing 0.0 m: must be above 0"),
         ([one, other, "--poses", tmp_path / "no/p.tum"], "does not exist"),
-        ([one, one], "named twice"),
+        ([one, one], "given twice"),
         ([one, tmp_path], "this is a folder"),
         ([one, tmp_path / "r.mcap"], "`scanwright assemble`"),
         ([one, tmp_path / "absent.las"], "absent.las: not a LAS file"),
@@ -370,7 +371,7 @@ def test_the_real_room_from_no_start(command, data, tmp_path):
     paths = [data / "clouds" / f"room_scan{k}.pcd" for k in (1, 2)]
     code, out, _ = command("register", *paths, "-o", tmp_path / "map.ply")
     assert code == 0, out
-    assert "the sigmas take" not in out  # nobody knows whose angles they were
+    assert "sigmas assume" not in out  # nobody knows whose angles they were
     _, T = read_poses(tmp_path / "map.tum", ["room_scan1", "room_scan2"])
     one, two = (read_clouds(path)[0][0].points_m.astype(float) for path in paths)
     start = frames.rigid(frames.Rz(0.6931), [1.79387, 0.720047, 0])

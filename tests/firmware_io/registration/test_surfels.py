@@ -141,7 +141,7 @@ def test_what_the_sigmas_leave_out_is_said_of_our_own_clouds(command, tmp_path):
         write_clouds(path, [Cloud(points, {"joint_rad": np.zeros(len(points), np.float32)})])
     code, out, _ = command("register", *paths, "-o", tmp_path / "map.ply")
     assert code == 0
-    assert "note: the sigmas take the scanner's angles as true" in out
+    assert "note: sigmas assume exact scanner angles" in out
     assert "a: at (0.0000, 0.0000, 0.0000) m, the frame of the map" in out
 
 

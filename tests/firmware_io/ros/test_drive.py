@@ -53,7 +53,7 @@ def test_a_recording_is_told_at_its_pace_and_a_scan_after_its_last_angle(tmp_pat
             assert 0 <= last_ns - thing.time_ns[-1] < 5_000_000  # angles come every 4 ms
             scans.append(thing.stamp_ns)
     assert scans == [scan.stamp_ns for scan in simulated.scans]
-    with pytest.raises(RecordingError, match="--rate = 0"):
+    with pytest.raises(RecordingError, match="rate = 0"):
         replay(path, listener, rate=0.0)
 
 
@@ -73,7 +73,7 @@ class Steered:
         self.story.append(f"wait {seconds:g}")
         self.running = True
 
-    def told(self, line):
+    def message(self, line):
         self.story.append(f"told {line}")
 
 
@@ -83,7 +83,7 @@ class Viewer:
     def __init__(self):
         self.lines = []
 
-    def told(self, line):
+    def message(self, line):
         self.lines.append(line)
 
 
@@ -92,7 +92,7 @@ def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch
     outcomes = iter([DeviceError("the lidar is gone"), driving.Interrupted(), KeyboardInterrupt()])
 
     def acquire(plan, _say, watch):
-        watch.told(f"{plan.motion.period_s:g} s")
+        watch.message(f"{plan.motion.period_s:g} s")
         motions.append(plan.motion.period_s)
         steered.period_s = 4.0
         raise next(outcomes)

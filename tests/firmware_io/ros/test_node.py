@@ -117,9 +117,9 @@ def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_p
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
     with subprocess.Popen(
         [sys.executable, "-m", "scanwright", "emulate", str(tmp_path)], stdout=subprocess.DEVNULL
-    ) as twins:
+    ) as emulators:
         try:
-            until(lambda: (tmp_path / "emulated.json").exists() or twins.poll() is not None)
+            until(lambda: (tmp_path / "emulated.json").exists() or emulators.poll() is not None)
             (tmp_path / "scanner.urdf").write_text(URDF)
             killed = listening(domain, 10**6, tmp_path / "none.npz")
             node = started("-m", "scanwright", "ros2", tmp_path, "--straight", domain=domain, stderr=subprocess.PIPE)
@@ -136,7 +136,7 @@ def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_p
             assert node.returncode == 130, told
             assert "stopped, as a parameter asks" in told
         finally:
-            twins.terminate()
+            emulators.terminate()
     found = np.load(tmp_path / "found.npz")
     assert found["lines"] >= 20  # of 30: who joins late has not heard all topics at first
     gaps_s = np.diff(found["stamp_ns"]) / 1e9

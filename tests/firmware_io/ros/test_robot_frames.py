@@ -90,12 +90,12 @@ def test_a_build_folder_runs_with_the_calibration_of_its_own_mount(tmp_path):
     (tmp_path / "angles.calibrated.json").write_text(CALIBRATED.to_json())
     in_use = angles_in_use(tmp_path)
     assert (in_use.angles, in_use.path.name) == (CALIBRATED, "angles.calibrated.json")
-    assert "as calibrated" in in_use.said
+    assert "as calibrated" in in_use.description
     moved = DESIGNED.model_copy(update={"t_world_rot_mm": (10, -20, 131)})  # built again
     (tmp_path / "angles.json").write_text(moved.to_json())
     in_use = angles_in_use(tmp_path)
     assert (in_use.angles, in_use.path.name) == (moved, "angles.json")
-    assert "is of another mount" in in_use.said
+    assert "is of another mount" in in_use.description
 
 
 def test_the_urdf_is_named_after_the_angle_set(tmp_path):

@@ -1,4 +1,4 @@
-"""The doctor on the twins: it reads and nothing else; what `--fix` sets is named, kept, and set back."""
+"""The doctor on the emulators: it reads and nothing else; what `--fix` sets is named, kept, and set back."""
 
 import fcntl
 import json
@@ -15,7 +15,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.firmware_io import device_ports, serial_port
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
 from scanwright.firmware_io.emulators.servo.dynamixel_packets import take
-from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.scan import doctor
 from scanwright.firmware_io.servo.families import all_tables
@@ -37,54 +37,54 @@ def instructions(said, protocol):
     return found
 
 
-def spoil(twin):
+def spoil(emulator):
     """Everything that the driver would set is otherwise; in counts, by address."""
     spoilt = {"1.0": {20: 500, 22: 2, 5: 200}, "2.0": {10: 1, 20: -500, 9: 200}, "STS": {31: 500, 30: 2, 7: 200}}
-    for address, count in spoilt[table_of(twin).protocol].items():
-        twin.memory[address] = count
+    for address, count in spoilt[table_of(emulator).protocol].items():
+        emulator.memory[address] = count
 
 
-def kept(twin):
-    """The settings of a twin that outlast its power."""
-    return bytes(twin.memory.data[: table_of(twin).ram])
+def kept(emulator):
+    """The settings of an emulator that outlast its power."""
+    return bytes(emulator.memory.data[: table_of(emulator).ram])
 
 
-def table_of(twin):
-    return twin.servo.table
+def table_of(emulator):
+    return emulator.servo.table
 
 
 @pytest.mark.parametrize(
     ("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("AX-12A", "1.0"), ("STS3215", "STS")]
 )
 def test_in_the_whole_dialogue_there_are_only_questions(model, protocol, command, virtual_bus):
-    twin = virtual_bus(model, protocol)
+    emulator = virtual_bus(model, protocol)
     if model != "AX-12A":
-        spoil(twin)
-    torque = table_of(twin).torque.address
-    twin.memory[torque] = 1  # somebody's arm hangs on it
-    before = bytes(twin.memory.data)
-    code, said, _ = command("doctor", "--servo", twin.port)
-    assert bytes(twin.memory.data[: len(kept(twin)) + 2]) == before[: len(kept(twin)) + 2]
-    assert twin.memory[torque] == 1
-    delay = table_of(twin).return_delay_ns
-    assert set(instructions(twin.heard, "1.0")) | set(instructions(twin.heard, "2.0")) <= {PING, READ}
+        spoil(emulator)
+    torque = table_of(emulator).torque.address
+    emulator.memory[torque] = 1  # somebody's arm hangs on it
+    before = bytes(emulator.memory.data)
+    code, said, _ = command("doctor", "--servo", emulator.port)
+    assert bytes(emulator.memory.data[: len(kept(emulator)) + 2]) == before[: len(kept(emulator)) + 2]
+    assert emulator.memory[torque] == 1
+    delay = table_of(emulator).return_delay_ns
+    assert set(instructions(emulator.heard, "1.0")) | set(instructions(emulator.heard, "2.0")) <= {PING, READ}
     frames = "2.0" if protocol == "2.0" else "1.0"  # the frames of the STS are those of 1.0
-    assert READ in instructions(twin.heard, frames)
+    assert READ in instructions(emulator.heard, frames)
     assert "has its torque on" in said
     assert code == 1  # there is no lidar
     if model != "AX-12A":
-        assert f"{delay} is 200, so that its answers come" in said
-        assert f"`scanwright servo-setup {twin.port}` sets it" in said
+        assert f"{delay} is 200, so that its answers are" in said
+        assert f"`scanwright servo-setup {emulator.port}` sets it" in said
 
 
 def test_a_servo_that_answers_only_pings_is_not_told_to(command, virtual_bus):
-    twin = virtual_bus("MX-64R")
-    twin.memory[16] = 0
-    _, said, _ = command("doctor", "--servo", twin.port)
-    assert twin.memory[16] == 0
-    assert set(instructions(twin.heard, "1.0")) | set(instructions(twin.heard, "2.0")) <= {PING, READ}
+    emulator = virtual_bus("MX-64R")
+    emulator.memory[16] = 0
+    _, said, _ = command("doctor", "--servo", emulator.port)
+    assert emulator.memory[16] == 0
+    assert set(instructions(emulator.heard, "1.0")) | set(instructions(emulator.heard, "2.0")) <= {PING, READ}
     assert "servo 1: status_return_level (register 16) is 0, so that it answers nothing but pings; 2 is right" in said
-    assert f"`scanwright servo-setup {twin.port}` sets it" in said
+    assert f"`scanwright servo-setup {emulator.port}` sets it" in said
 
 
 def test_where_something_speaks_first_nothing_is_said(command):
@@ -108,18 +108,18 @@ def test_where_something_speaks_first_nothing_is_said(command):
         os.read(master, 1)
     os.close(master)
     os.close(slave)
-    assert "bytes came unasked" in said and "nothing was sent" in said
+    assert "bytes came before any request" in said and "nothing was sent" in said
 
 
 @pytest.mark.parametrize(("model", "protocol"), [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")])
 def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path, virtual_bus):
-    twin = virtual_bus(model, protocol)
-    spoil(twin)
-    before = kept(twin)
-    code, said, _ = command("doctor", "--fix", "--servo", twin.port)
+    emulator = virtual_bus(model, protocol)
+    spoil(emulator)
+    before = kept(emulator)
+    code, said, _ = command("doctor", "--fix", "--servo", emulator.port)
     (file,) = tmp_path.glob("servo-*.json")
-    assert kept(twin) != before
-    assert f"`scanwright servo-setup {twin.port} --undo {file.name}`" in said
+    assert kept(emulator) != before
+    assert f"`scanwright servo-setup {emulator.port} --undo {file.name}`" in said
     for setting in json.loads(file.read_text())["settings"]:
         name = rf"{setting['register']} \(register \d+\)"
         assert re.search(rf"servo 1: {name}: {setting['before']} -> {setting['after']}$", said, re.MULTILINE)
@@ -128,47 +128,47 @@ def test_a_fix_is_told_kept_and_taken_back(model, protocol, command, tmp_path, v
         assert "protocol 2.0 at 1000000 baud" in said
     code, said, _ = command("doctor", "--restore", file)
     assert code == 0
-    assert kept(twin) == before
+    assert kept(emulator) == before
     assert "return_delay_time" in said and "0 -> 200" in said
 
 
 def test_what_is_already_right_is_not_written(command, tmp_path, virtual_bus):
-    twin = virtual_bus("MX-64R")
-    twin.memory[5] = 0
-    _, said, _ = command("doctor", "--fix", "--servo", twin.port)
-    assert "every setting is as it should be" in said
+    emulator = virtual_bus("MX-64R")
+    emulator.memory[5] = 0
+    _, said, _ = command("doctor", "--fix", "--servo", emulator.port)
+    assert "every setting is right" in said
     assert not list(tmp_path.glob("servo-*"))
-    assert WRITE not in instructions(twin.heard, "1.0")
+    assert WRITE not in instructions(emulator.heard, "1.0")
 
 
 @pytest.mark.parametrize("protocol", ["1.0", "2.0"])
 def test_a_mute_servo_is_unmuted_by_a_fix_and_mute_again_after_the_restore(protocol, command, tmp_path, virtual_bus):
     level = 16 if protocol == "1.0" else 68
-    twin = virtual_bus("MX-64R", protocol)
-    twin.memory[level] = 0
-    _, said, _ = command("doctor", "--fix", "--servo", twin.port)
-    assert twin.memory[level] == 2
+    emulator = virtual_bus("MX-64R", protocol)
+    emulator.memory[level] = 0
+    _, said, _ = command("doctor", "--fix", "--servo", emulator.port)
+    assert emulator.memory[level] == 2
     assert f"status_return_level (register {level}): 0 -> 2" in said
     (file,) = tmp_path.glob("servo-*.json")
     code, said, _ = command("doctor", "--restore", file)
     assert code == 0
-    assert twin.memory[level] == 0
+    assert emulator.memory[level] == 0
     assert "2 -> 0; it was not read back" in said
 
 
 def test_a_fix_takes_nobodys_torque_and_guesses_no_port(command, tmp_path, monkeypatch, virtual_bus):
-    twin = virtual_bus("MX-64R")
-    twin.memory[24] = 1
-    before = bytes(twin.memory.data[:36])
-    code, said, _ = command("doctor", "--fix", "--servo", twin.port)
-    assert bytes(twin.memory.data[:36]) == before
-    assert code == 1 and "has its torque on, and holds or turns something" in said
-    plugged = [SimpleNamespace(device=twin.port, vid=0x0403, pid=0x6014)]
+    emulator = virtual_bus("MX-64R")
+    emulator.memory[24] = 1
+    before = bytes(emulator.memory.data[:36])
+    code, _, complaints = command("doctor", "--fix", "--servo", emulator.port)
+    assert bytes(emulator.memory.data[:36]) == before
+    assert code == 2 and "has its torque on, and holds or turns something" in complaints[0]
+    plugged = [SimpleNamespace(device=emulator.port, vid=0x0403, pid=0x6014)]
     monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
-    twin.memory[24] = 0
-    code, said, _ = command("doctor", "--fix")
-    assert bytes(twin.memory.data[:24]) == before[:24]
-    assert code == 1 and "a servo is set up only on a port that was named" in said
+    emulator.memory[24] = 0
+    code, _, complaints = command("doctor", "--fix")
+    assert bytes(emulator.memory.data[:24]) == before[:24]
+    assert code == 2 and "a servo is set up only on a port that is named" in complaints[0]
     assert not list(tmp_path.glob("servo-*"))
 
 
@@ -193,10 +193,9 @@ def test_a_file_of_settings_that_is_none_changes_nothing(change, says, command, 
     right["settings"] = [{"register": "baud_rate", "before": 34, "after": 1}]
     file = tmp_path / "servo.json"
     file.write_text(json.dumps(right | change))
-    code, said, _ = command("doctor", "--restore", file)
-    assert code == 1
-    assert str(file) in said and says in said
-    assert len(said.splitlines()) == 1
+    code, said, (complaint,) = command("doctor", "--restore", file)
+    assert (code, said) == (2, "")
+    assert str(file) in complaint and says in complaint
 
 
 def test_only_ports_whose_usb_ids_are_in_the_catalogue_are_looked_at(monkeypatch):
@@ -218,8 +217,8 @@ def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
         return ioctl(fd, request, *rest)
 
     monkeypatch.setattr("serial.serialposix.fcntl.ioctl", listening)
-    with ServoTwin("MX-64R") as twin:
-        serial_port.open_serial_port(twin.port, 57600).close()
+    with ServoEmulator("MX-64R") as emulator:
+        serial_port.open_serial_port(emulator.port, 57600).close()
     assert not set(asked) & {termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET}
 
 
@@ -237,16 +236,20 @@ def test_every_setting_that_can_be_changed_has_a_name_of_its_own():
     ("model", "says"),
     [
         ("LMS111", ["it has run for 664.1 h", "it was switched on 597 times"]),
-        ("UTM-30LX", ["it says: Sensor works well."]),
+        ("UTM-30LX", ["status: Sensor works well."]),
     ],
 )
 def test_a_lidar_tells_its_age_and_state(model, says, monkeypatch, tmp_path):
-    monkeypatch.setattr(doctor, "_LOOK_S", 0.3)
+    monkeypatch.setattr(doctor, "_MEASURED_S", 0.3)
     angles_deg = {"alpha_rot": 0, "beta_rot": 0, "alpha_laser": 0, "beta_laser": 50}
     angles = AngleSet.model_validate({"task": "t", "angles_deg": angles_deg, "sensor": model, "servo": "MX-64R"})
     (tmp_path / "angles.json").write_text(angles.to_json())
-    with emulated_scanner(angles, room(None)) as twins:
-        told = [finding.says for finding in doctor.examine(tmp_path, twins.ports.lidar, twins.ports.servo, None)]
+    with emulated_scanner(angles, room(None)) as emulators:
+        received = [
+            finding.message for finding in doctor.examine(tmp_path, emulators.ports.lidar, emulators.ports.servo, None)
+        ]
     for line in says:
-        assert f"{twins.ports.lidar}: {line}" in told
-    assert any(re.search(r": \d+\.\d V, \d+ deg C$", line) for line in told), "the servo its voltage and temperature"
+        assert f"{emulators.ports.lidar}: {line}" in received
+    assert any(re.search(r": \d+\.\d V, \d+ deg C$", line) for line in received), (
+        "the servo its voltage and temperature"
+    )

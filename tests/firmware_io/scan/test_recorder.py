@@ -60,7 +60,7 @@ def test_a_recording_is_whole_after_an_exception(tmp_path):
         recorder.joint(1, 1.0)
         recorder.scan(a_scan(1))
         raise KeyboardInterrupt
-    assert repair(path).whole
+    assert repair(path).intact
 
 
 def test_a_recording_is_never_written_over(tmp_path):
@@ -102,7 +102,7 @@ def test_kill_9_costs_less_than_a_second(tmp_path):
     with pytest.raises(RecordingError, match="cut off \\(`scanwright repair` mends it"):
         open_recording(path)
     summary = repair(path)
-    assert not summary.whole
+    assert not summary.intact
     assert killed_ns - summary.times_ns[1] < 10 * 10**9  # a second, and ten on a busy computer
     assert sum(1 for _ in open_recording(repaired_place(path)).scans()) == summary.messages["/scan"] > 20
 

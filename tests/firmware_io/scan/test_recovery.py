@@ -19,6 +19,7 @@ from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
 from scanwright.firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
 from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 from scanwright.firmware_io.scan import doctor, lidar_scans
+from scanwright.firmware_io.scan.reporter import Reporter
 
 MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561", "LMS 200")
 MOST_LOST_S = 1.0
@@ -38,7 +39,7 @@ class Scanner:
 
     def __init__(self, line, lidar):
         self.line, self.lidar, self.said, self.axis = line, lidar, [], []
-        self.scans = lidar_scans.LidarScans(lidar, self.said.append)
+        self.scans = lidar_scans.LidarScans(lidar, Reporter(watch=SimpleNamespace(message=self.said.append)))
         self.scans.axis = SimpleNamespace(stop=lambda: not self.axis.append("stop"), go=lambda: self.axis.append("go"))
 
     def next(self):
@@ -128,9 +129,9 @@ def test_unplugged_and_back_it_scans_on(scanner, monkeypatch):
 def test_one_that_stays_away_is_a_typed_error_of_one_line(scanner):
     scanner.line.unplug()
     pulled_ns = scanner.line.now_ns
-    with pytest.raises(DeviceError, match=r"did not come back in 10\.0 s") as told:
+    with pytest.raises(DeviceError, match=r"did not come back in 10\.0 s") as received:
         scanner.next()
-    assert "\n" not in str(told.value) and not isinstance(told.value, DeviceFaultError)
+    assert "\n" not in str(received.value) and not isinstance(received.value, DeviceFaultError)
     assert scanner.axis == ["stop"]
     assert scanner.line.now_ns - pulled_ns < 11e9
     scanner.line.plugged = True  # so that leaving it is no error
@@ -147,8 +148,8 @@ def test_noise_without_end_is_a_timeout(scanner, monkeypatch):
 @pytest.mark.parametrize(
     ("line", "state", "value", "says"),
     [
-        ("RPLIDAR A2", "health", 1, "it reports a warning of its own health, 0x8002"),
-        ("UTM-30LX", "state", "Trouble!! Error No. 00->33", "it says of itself: Trouble!! Error No. 00->33"),
+        ("RPLIDAR A2", "health", 1, "health warning 0x8002"),
+        ("UTM-30LX", "state", "Trouble!! Error No. 00->33", "status: Trouble!! Error No. 00->33"),
         ("TiM561", "status", DIRT_WARNING, "its window is dirty"),
         ("LMS 200", "status", 0x90, "its window is dirty"),
     ],
@@ -164,7 +165,7 @@ def test_what_a_sensor_warns_of_is_told_once_by_a_scan_and_is_no_good_finding_of
     (said,) = scanner.said
     assert said.startswith(f"warning: {line.model}: {says}")
     findings = list(doctor._examine_lidar("virtual", SimpleNamespace(sensor=line.model)))
-    assert [finding.verdict for finding in findings if says in finding.says] == ["wrong"]
+    assert [finding.severity for finding in findings if says in finding.message] == ["error"]
 
 
 @pytest.mark.parametrize(
@@ -177,9 +178,10 @@ def test_a_sensor_that_reports_a_fault_is_a_typed_error_before_a_servo_turns_and
     said, began_ns = [], line.now_ns
     with open_lidar("virtual", line.model) as lidar, pytest.raises(DeviceFaultError, match="fault"):
         lidar.start()
-        lidar_scans.settle_clock(lidar_scans.LidarScans(lidar, said.append), said.append)
+        reporter = Reporter(lambda step, _=None: said.append(step))
+        lidar_scans.settle_clock(lidar_scans.LidarScans(lidar, reporter), reporter)
     assert line.now_ns - began_ns < MOST_LOST_S * 1e9
-    assert said in ([], ["learning the sensor's clock"])
+    assert said in ([], ["estimating the sensor's clock"])
 
 
 @pytest.mark.parametrize(

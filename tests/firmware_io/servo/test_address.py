@@ -1,4 +1,4 @@
-"""`servo-setup`: number and speed on twins of each family, and what is refused before anything is changed."""
+"""`servo-setup`: number and speed on emulators of each family, and what is refused before anything is changed."""
 
 import pytest
 
@@ -14,78 +14,78 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def kept(twin):
-    return bytes(twin.memory.data[: twin.servo.table.ram])
+def kept(emulator):
+    return bytes(emulator.memory.data[: emulator.servo.table.ram])
 
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_number_and_speed_are_set_read_back_and_restored(model, protocol, command, here, virtual_bus):
-    twin = virtual_bus(model, protocol)
-    before = kept(twin)
-    code, said, _ = command("servo-setup", twin.port, "--id", "7", "--baud", "115200")
+    emulator = virtual_bus(model, protocol)
+    before = kept(emulator)
+    code, said, _ = command("servo-setup", emulator.port, "--id", "7", "--baud", "115200")
     assert code == 0
-    assert (twin.servo.id, round(twin.servo.baud / 115200, 1)) == (7, 1.0)
+    assert (emulator.servo.id, round(emulator.servo.baud / 115200, 1)) == (7, 1.0)
     assert "id (register " in said and ": 1 -> 7" in said
-    found = find_servo(open_bus(twin.port), None, 7)
+    found = find_servo(open_bus(emulator.port), None, 7)
     assert (found.table.model, found.bus.baud) == (model, 115200)
     (file,) = here.glob("servo-*.json")
-    delay = twin.servo.table.return_delay_ns.address
-    twin.memory[delay] = before[delay]  # which opening it has set
-    twin.servo.memory[twin.servo.table.torque.address] = 0
+    delay = emulator.servo.table.return_delay_ns.address
+    emulator.memory[delay] = before[delay]  # which opening it has set
+    emulator.servo.memory[emulator.servo.table.torque.address] = 0
     code, said, _ = command("doctor", "--restore", file)
     assert code == 0, said
-    assert kept(twin) == before
+    assert kept(emulator) == before
     assert "7 -> 1" in said
 
 
 def test_a_kept_setting_outlasts_the_power_of_a_servo_with_a_lock(command, virtual_bus):
-    twin = virtual_bus("STS3215")
-    twin.memory[8] = 0  # it answers questions only
-    assert command("servo-setup", twin.port, "--id", "7", "--baud", "500000")[0] == 0
-    twin.brown_out()
-    assert (twin.servo.id, twin.servo.baud, twin.memory[55], twin.memory[8]) == (7, 500_000, 1, 0)
+    emulator = virtual_bus("STS3215")
+    emulator.memory[8] = 0  # it answers questions only
+    assert command("servo-setup", emulator.port, "--id", "7", "--baud", "500000")[0] == 0
+    emulator.brown_out()
+    assert (emulator.servo.id, emulator.servo.baud, emulator.memory[55], emulator.memory[8]) == (7, 500_000, 1, 0)
 
 
 @pytest.mark.parametrize(
-    ("beside", "arguments", "says"),
+    ("others", "arguments", "says"),
     [
         ([("MX-28", 3)], ("--id", "7"), "several servos answer (1 at 57600 baud, 3 at 57600 baud): leave one"),
         ([("MX-28", 3)], ("--id", "3", "--from-id", "1"), "a servo 3 answers at 57600 baud already; nothing was"),
         ([], ("--id", "7", "--dry-run"), "--id and --baud, --undo, --scanner and --dry-run: one at a time"),
-        ([], ("--id", "253"), "--id = 253: servos have numbers from 0 to 252"),
+        ([], ("--id", "253"), "new_id = 253: servos have numbers from 0 to 252"),
         ([], ("--baud", "123456"), "123456 baud: MX-64R knows 9600, 19200"),
         ([], ("--id", "2", "--from-id", "9"), "servo 9 does not answer"),
     ],
 )
-def test_what_is_refused_changes_nothing(beside, arguments, says, command, here, virtual_bus):
-    twin = virtual_bus("MX-64R", beside=beside)
-    before = kept(twin)
-    code, _, complaints = command("servo-setup", twin.port, *arguments)
+def test_what_is_refused_changes_nothing(others, arguments, says, command, here, virtual_bus):
+    emulator = virtual_bus("MX-64R", others=others)
+    before = kept(emulator)
+    code, _, complaints = command("servo-setup", emulator.port, *arguments)
     assert code == 2 and says in complaints[0]
-    assert kept(twin) == before
+    assert kept(emulator) == before
     assert not list(here.glob("servo-*"))
 
 
 def test_of_several_the_one_that_is_named_is_set(command, virtual_bus):
-    twin = virtual_bus("MX-64R", beside=[("MX-28", 3)])
-    assert command("servo-setup", twin.port, "--id", "7", "--from-id", "3", "--from-baud", "57600")[0] == 0
-    assert [servo.id for servo in twin.servos] == [1, 7]
+    emulator = virtual_bus("MX-64R", others=[("MX-28", 3)])
+    assert command("servo-setup", emulator.port, "--id", "7", "--from-id", "3", "--from-baud", "57600")[0] == 0
+    assert [servo.id for servo in emulator.servos] == [1, 7]
 
 
 def test_a_servo_that_holds_something_is_left_alone_and_one_that_is_right_is_not_written(command, here, virtual_bus):
-    twin = virtual_bus("MX-64R")
-    code, said, _ = command("servo-setup", twin.port, "--id", "1", "--baud", "57600")
-    assert code == 0 and "it has that number and speed already" in said
-    twin.memory[24] = 1
-    code, _, complaints = command("servo-setup", twin.port, "--id", "7")
+    emulator = virtual_bus("MX-64R")
+    code, said, _ = command("servo-setup", emulator.port, "--id", "1", "--baud", "57600")
+    assert code == 0 and "number and speed are right already" in said
+    emulator.memory[24] = 1
+    code, _, complaints = command("servo-setup", emulator.port, "--id", "7")
     assert code == 2 and "has its torque on" in complaints[0]
-    assert twin.memory[3] == 1
+    assert emulator.memory[3] == 1
     assert not list(here.glob("servo-*"))
 
 
-def test_the_speeds_of_the_tables_are_those_of_their_twins(virtual_bus):
+def test_the_speeds_of_the_tables_are_those_of_their_emulators(virtual_bus):
     for table in all_tables():
-        twin = virtual_bus(table.model, table.protocol)
+        emulator = virtual_bus(table.model, table.protocol)
         for count, baud in table.bauds.items():
-            twin.memory[table.baud.address] = count
-            assert abs(twin.servo.baud / baud - 1) < 0.03
+            emulator.memory[table.baud.address] = count
+            assert abs(emulator.servo.baud / baud - 1) < 0.03

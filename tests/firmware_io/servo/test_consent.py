@@ -13,8 +13,8 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.device_ports import announced
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.servo.machine import Request
-from scanwright.firmware_io.emulators.servo.twin import ServoTwin
 from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.ros import drive as ros_drive
 from scanwright.firmware_io.servo import servo as servo_driver
@@ -52,11 +52,11 @@ def here(tmp_path, monkeypatch):
 @pytest.fixture
 def spoilt(virtual_bus):
     def make(model, protocol):
-        twin = virtual_bus(model, protocol)
+        emulator = virtual_bus(model, protocol)
         for address, count in SPOILT[protocol].items():
-            twin.memory[address] = count
-        twin.memory[twin.servo.table.torque.address] = 1  # it holds something
-        return twin
+            emulator.memory[address] = count
+        emulator.memory[emulator.servo.table.torque.address] = 1  # it holds something
+        return emulator
 
     return make
 
@@ -76,17 +76,17 @@ def person(monkeypatch):
     return asked
 
 
-def kept(twin):
+def kept(emulator):
     """What the power does not take, by address."""
-    return dict(enumerate(twin.memory.data[: twin.servo.table.ram]))
+    return dict(enumerate(emulator.memory.data[: emulator.servo.table.ram]))
 
 
-def kept_writes(twin):
+def kept_writes(emulator):
     """The addresses of the requests that write what outlasts the power, from the bytes on the wire."""
     found = set()
-    for sent in twin.writes:
-        if request := twin.servo.take(bytearray(sent)):
-            found |= set(_addresses(request, twin.servo.table))
+    for sent in emulator.writes:
+        if request := emulator.servo.take(bytearray(sent)):
+            found |= set(_addresses(request, emulator.servo.table))
     return found
 
 
@@ -103,24 +103,24 @@ def _addresses(request: Request, table):
 @pytest.mark.parametrize("spins", [True, False])
 @pytest.mark.parametrize(("model", "protocol"), MODELS)
 def test_unasked_nothing_is_written_that_outlasts_the_power(model, protocol, spins, spoilt):
-    twin = spoilt(model, protocol)
-    before = kept(twin)
+    emulator = spoilt(model, protocol)
+    before = kept(emulator)
     with pytest.raises(ServoSetupError) as caught:
-        open_servo(twin.port, model, spins=spins)
-    assert kept_writes(twin) == set() and kept(twin) == before
-    assert twin.memory[twin.servo.table.torque.address] == 0
+        open_servo(emulator.port, model, spins=spins)
+    assert kept_writes(emulator) == set() and kept(emulator) == before
+    assert emulator.memory[emulator.servo.table.torque.address] == 0
     for change in caught.value.changes:
         assert f"{change.register.name} (register {change.register.address}) is {change.now}, " in str(caught.value)
-        assert change.now != change.needed and twin.servo.table.is_kept(change.register)
+        assert change.now != change.needed and emulator.servo.table.is_permanent(change.register)
 
 
 @pytest.mark.parametrize("spins", [True, False])
 @pytest.mark.parametrize(("model", "protocol"), MODELS)
 def test_a_scan_with_a_servo_that_is_set_up_writes_nothing_that_outlasts_the_power(model, protocol, spins, virtual_bus):
-    twin = virtual_bus(model, protocol)
-    ServoTwin.set_up(SimpleNamespace(_servo=twin.servo, memory=twin.memory), spins=spins)
-    before = kept(twin)
-    with open_servo(twin.port, model, spins=spins) as servo:
+    emulator = virtual_bus(model, protocol)
+    ServoEmulator.set_up(SimpleNamespace(_servo=emulator.servo, memory=emulator.memory), spins=spins)
+    before = kept(emulator)
+    with open_servo(emulator.port, model, spins=spins) as servo:
         servo.hold()
         servo.release()
         for turn in (0.5, 1.0):
@@ -128,29 +128,29 @@ def test_a_scan_with_a_servo_that_is_set_up_writes_nothing_that_outlasts_the_pow
             servo.read()
             servo.hold()
         assert not servo.warnings()
-    assert kept_writes(twin) == set() and kept(twin) == before
+    assert kept_writes(emulator) == set() and kept(emulator) == before
 
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_a_driver_that_may_not_write_does_not_change_the_mode(model, protocol, virtual_bus):
-    twin = virtual_bus(model, protocol)
-    with open_servo(twin.port) as servo:
+    emulator = virtual_bus(model, protocol)
+    with open_servo(emulator.port) as servo:
         servo.sweep_to(0.3, 0.5)
         with pytest.raises(ServoSetupError, match="so that it does not turn continuously"):
             servo.spin(0.5)
-        assert twin.memory[twin.servo.table.torque.address] == 0
-    assert kept_writes(twin) == set()
+        assert emulator.memory[emulator.servo.table.torque.address] == 0
+    assert kept_writes(emulator) == set()
 
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_who_agrees_gets_what_was_listed_and_can_undo_it(model, protocol, spoilt, person, command, tmp_path):
-    twin = spoilt(model, protocol)
-    before = kept(twin)
+    emulator = spoilt(model, protocol)
+    before = kept(emulator)
     listed = []
 
     def work():
         try:
-            return open_servo(twin.port, model, spins=True)
+            return open_servo(emulator.port, model, spins=True)
         except ServoSetupError as error:
             listed.extend(error.changes)
             raise
@@ -158,94 +158,94 @@ def test_who_agrees_gets_what_was_listed_and_can_undo_it(model, protocol, spoilt
     asking_first(work, tmp_path, None).close()
     assert len(person.questions) == 1 and f"{len(listed)} register" in person.questions[0].replace("this", "1")
     listed_bytes = {change.register.address + k for change in listed for k in range(change.register.size)}
-    assert kept_writes(twin) == listed_bytes
-    after = kept(twin)
+    assert kept_writes(emulator) == listed_bytes
+    after = kept(emulator)
     assert {address for address in before if before[address] != after[address]} <= listed_bytes
     (file,) = tmp_path.glob("servo-*.json")
     assert [tuple(one.values()) for one in json.loads(file.read_text())["settings"]] == [
         (change.register.name, change.now, change.needed) for change in listed
     ]
-    twin.brown_out()
-    assert kept(twin) == after
-    code, said, _ = command("servo-setup", twin.port, "--undo", file)
+    emulator.brown_out()
+    assert kept(emulator) == after
+    code, said, _ = command("servo-setup", emulator.port, "--undo", file)
     assert code == 0, said
-    twin.brown_out()
-    assert kept(twin) == before
+    emulator.brown_out()
+    assert kept(emulator) == before
 
 
 def test_who_declines_is_told_how_and_nothing_is_written(spoilt, person, tmp_path, capsys):
     person.agrees = False
-    twin = spoilt("XM430-W350", "2.0")
+    emulator = spoilt("XM430-W350", "2.0")
     with pytest.raises(typer.Exit) as stop:
-        asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, 1)
+        asking_first(lambda: open_servo(emulator.port, spins=True), tmp_path, 1)
     assert stop.value.exit_code == 2 and person.questions == ["Write these 3 registers to the servo?"]
-    hint = f"nothing was moved; `scanwright servo-setup {twin.port} --scanner {tmp_path} --from-id 1` writes that"
+    hint = f"nothing was moved; `scanwright servo-setup {emulator.port} --scanner {tmp_path} --from-id 1` writes that"
     assert hint in capsys.readouterr().err
-    assert kept_writes(twin) == set() and not list(tmp_path.glob("servo-*"))
+    assert kept_writes(emulator) == set() and not list(tmp_path.glob("servo-*"))
 
 
 def test_a_mute_servo_is_asked_about_before_it_is_made_to_answer(spoilt, person, tmp_path):
-    twin = spoilt("MX-64R", "1.0")
-    twin.memory[16] = 0
+    emulator = spoilt("MX-64R", "1.0")
+    emulator.memory[16] = 0
     with pytest.raises(ServoSetupError, match=r"model unknown.*\n.*\(register 16\) is 0, so that it answers nothing"):
-        open_servo(twin.port)
-    assert kept_writes(twin) == set() and (twin.memory[16], twin.memory[24]) == (0, 0)
-    asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, None).close()
+        open_servo(emulator.port)
+    assert kept_writes(emulator) == set() and (emulator.memory[16], emulator.memory[24]) == (0, 0)
+    asking_first(lambda: open_servo(emulator.port, spins=True), tmp_path, None).close()
     assert person.questions == ["Write this register to the servo?", "Write these 2 registers to the servo?"]
-    assert len(list(tmp_path.glob("servo-*.json"))) == 2 and twin.memory[16] == 2
+    assert len(list(tmp_path.glob("servo-*.json"))) == 2 and emulator.memory[16] == 2
 
 
 def test_without_a_place_for_the_undo_file_nothing_is_written(spoilt, tmp_path):
-    twin = spoilt("MX-64R", "1.0")
-    twin.memory[16] = 0
-    before = kept(twin)
-    twin.memory[24] = 0
+    emulator = spoilt("MX-64R", "1.0")
+    emulator.memory[16] = 0
+    before = kept(emulator)
+    emulator.memory[24] = 0
     with pytest.raises(DeviceError, match="cannot write, so nothing was changed"):
-        list(set_up(twin.port, None, None, tmp_path / "nowhere"))
-    assert kept(twin) == before
+        list(set_up(emulator.port, None, None, tmp_path / "nowhere"))
+    assert kept(emulator) == before
 
 
 def test_what_is_not_as_it_was_agreed_upon_is_not_written(spoilt, tmp_path):
-    twin = spoilt("STS3215", "STS")
+    emulator = spoilt("STS3215", "STS")
     with pytest.raises(ServoSetupError) as caught:
-        open_servo(twin.port, spins=True)
-    twin.memory[31] = 400  # another servo
+        open_servo(emulator.port, spins=True)
+    emulator.memory[31] = 400  # another servo
     with pytest.raises(DeviceError, match=r"position_offset \(register 31\) is 400, and was 500 before"):
-        list(set_up(twin.port, None, None, tmp_path, agreed=caught.value.changes))
-    assert kept_writes(twin) == set() and not list(tmp_path.glob("servo-*"))
+        list(set_up(emulator.port, None, None, tmp_path, agreed=caught.value.changes))
+    assert kept_writes(emulator) == set() and not list(tmp_path.glob("servo-*"))
 
 
 @pytest.mark.parametrize(("model", "protocol"), [MODELS[4], MODELS[6]])
 @pytest.mark.usefixtures("person")
 def test_what_does_not_last_is_said_and_the_horn_stays(model, protocol, spoilt, tmp_path, monkeypatch):
     """The servo restarts, and has its old mode again, after each setting was read back by itself."""
-    twin = spoilt(model, protocol)
+    emulator = spoilt(model, protocol)
     mode = 11 if protocol == "2.0" else 33
-    answer, was = twin.servo.answer, twin.memory[mode]
+    answer, was = emulator.servo.answer, emulator.memory[mode]
 
     def forgetting(request, now_ns):
         told = answer(request, now_ns)
         if request.instruction == 2 and request.parameters[0] != mode and forgets:
-            twin.memory[mode] = was
+            emulator.memory[mode] = was
         return told
 
     forgets = True
-    monkeypatch.setattr(twin.servo, "answer", forgetting)
+    monkeypatch.setattr(emulator.servo, "answer", forgetting)
     with pytest.raises(
         DeviceError, match=rf"register {mode}\): 1 was written, and it is {was} again.*nothing was moved"
     ):
-        asking_first(lambda: open_servo(twin.port, spins=True), tmp_path, None)
-    assert twin.memory[twin.servo.table.torque.address] == 0
-    assert math.isclose(twin.servo.axis.motion(twin.now_ns).angle_rad, 0.0, abs_tol=1e-9)
+        asking_first(lambda: open_servo(emulator.port, spins=True), tmp_path, None)
+    assert emulator.memory[emulator.servo.table.torque.address] == 0
+    assert math.isclose(emulator.servo.axis.motion(emulator.now_ns).angle_rad, 0.0, abs_tol=1e-9)
     assert list(tmp_path.glob("servo-*.json"))
 
 
 def test_a_setting_that_is_lost_at_once_is_asked_about_once(person, tmp_path, spoilt):
-    twin = spoilt("XM430-W350", "2.0")
+    emulator = spoilt("XM430-W350", "2.0")
 
     def work():
-        twin.memory[20] = -500
-        return open_servo(twin.port, spins=True)
+        emulator.memory[20] = -500
+        return open_servo(emulator.port, spins=True)
 
     with pytest.raises(ServoSetupError) as caught:
         asking_first(work, tmp_path, None)
@@ -253,14 +253,14 @@ def test_a_setting_that_is_lost_at_once_is_asked_about_once(person, tmp_path, sp
 
 
 def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):
-    twin = spoilt("MX-64R", "1.0")
-    before = bytes(twin.memory.data)
-    code, said, _ = command("servo-setup", twin.port, "--dry-run")
+    emulator = spoilt("MX-64R", "1.0")
+    before = bytes(emulator.memory.data)
+    code, said, _ = command("servo-setup", emulator.port, "--dry-run")
     assert code == 0 and "return_delay_time (register 5) is 200" in said
-    assert bytes(twin.memory.data[:36]) == before[:36] and not list(tmp_path.glob("servo-*"))
+    assert bytes(emulator.memory.data[:36]) == before[:36] and not list(tmp_path.glob("servo-*"))
 
 
-def test_a_twin_takes_no_setting_while_its_torque_is_on(virtual_bus):
+def test_a_emulator_takes_no_setting_while_its_torque_is_on(virtual_bus):
     """So the e-manual has it of both protocols; nothing of the kind is published for the STS3215."""
     for model, protocol, address, error in (("MX-64R", "1.0", 6, 8), ("XM430-W350", "2.0", 11, 7)):
         servo = virtual_bus(model, protocol).servo
@@ -288,20 +288,20 @@ SCANNER = AngleSet.model_validate(
 
 def test_scan_stops_where_nobody_can_be_asked(command, tmp_path):
     (tmp_path / "angles.json").write_text(SCANNER.to_json())
-    with emulated_scanner(SCANNER, room(None), factory_servo=True) as twins, announced(tmp_path, twins.ports):
-        before = bytes(twins.servo.memory.data[:24])
+    with emulated_scanner(SCANNER, room(None), factory_servo=True) as emulators, announced(tmp_path, emulators.ports):
+        before = bytes(emulators.servo.memory.data[:24])
         code, _, complaints = command("scan", tmp_path)
         assert code == 2
         assert "1 register that outlasts the power must change first; nothing was written" in complaints[0]
         assert (
             "ccw_angle_limit (register 8) is 4095, so that it does not turn continuously; 0 is right" in complaints[1]
         )
-        assert f"`scanwright servo-setup {twins.ports.servo} --scanner {tmp_path}`" in complaints[2]
+        assert f"`scanwright servo-setup {emulators.ports.servo} --scanner {tmp_path}`" in complaints[2]
         assert len(complaints) == 3
-        assert bytes(twins.servo.memory.data[:24]) == before and not list(tmp_path.glob("servo-*"))
-        code, said, _ = command("servo-setup", twins.ports.servo, "--scanner", tmp_path)
+        assert bytes(emulators.servo.memory.data[:24]) == before and not list(tmp_path.glob("servo-*"))
+        code, said, _ = command("servo-setup", emulators.ports.servo, "--scanner", tmp_path)
         assert code == 0 and "ccw_angle_limit (register 8): 4095 -> 0" in said
-        assert open_servo(twins.ports.servo, spins=True).warnings() == ()
+        assert open_servo(emulators.ports.servo, spins=True).warnings() == ()
 
 
 def test_a_node_does_not_try_again_what_somebody_must_agree_to(monkeypatch):

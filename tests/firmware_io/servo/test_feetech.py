@@ -17,7 +17,7 @@ from scanwright.firmware_io.servo.bus import bus as servo_bus
 from scanwright.firmware_io.servo.bus import serial_line
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.registers import Register
-from scanwright.firmware_io.servo.feetech.packets import STS, begun, request
+from scanwright.firmware_io.servo.feetech.packets import STS, from_header, request
 from scanwright.firmware_io.servo.feetech.tables import TABLES
 
 (STS3215,) = TABLES
@@ -34,7 +34,7 @@ FRAMES = [
 
 @pytest.mark.parametrize(("instruction", "parameters", "asked", "said"), FRAMES)
 def test_frames_are_those_that_others_write(instruction, parameters, asked, said):
-    """The driver sends them, and the twin, which was written apart from it, answers them."""
+    """The driver sends them, and the emulator, which was written apart from it, answers them."""
     wire = bytes.fromhex(asked)
     assert request(1, instruction, parameters) == wire
     servo = machine_of("STS3215", None, Load(), 0, 0.0)
@@ -149,8 +149,8 @@ def whole(data, error=0, servo_id=1):
         (whole(b"\1\2", servo_id=7), DeviceTimeoutError, "no answer"),  # another servo's
         (whole(b"\1\2")[:-1], ProtocolError, "damaged"),
         (whole(b"\1\2")[:-1] + b"\0", ProtocolError, "damaged"),
-        (whole(b""), ProtocolError, "0 bytes where 2"),
-        (whole(b"\1\2\3"), ProtocolError, "3 bytes where 2"),
+        (whole(b""), ProtocolError, "0 bytes instead of 2"),
+        (whole(b"\1\2\3"), ProtocolError, "3 bytes instead of 2"),
         (b"\xff\xff\x01\x00\xfe\x00", ProtocolError, "damaged"),
     ],
 )
@@ -170,9 +170,9 @@ def test_the_status_byte_tells_of_the_servo_and_refuses_nothing(bus):
 )
 def test_a_status_is_found_behind_noise(noise, data):
     wire = whole(data)
-    left = begun(noise + wire)
+    left = from_header(noise + wire)
     assert left.endswith(wire) or noise[-1:] == b"\xff" or b"\xff\xff" in noise
-    assert begun(wire) == wire
+    assert from_header(wire) == wire
 
 
 def test_mutated_answers_are_right_or_typed_errors(bus):

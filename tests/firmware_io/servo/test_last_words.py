@@ -10,9 +10,10 @@ import pytest
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError, DeviceTimeoutError
 from scanwright.design.motion import Spin
-from scanwright.firmware_io.emulators.servo.twin import ServoTwin
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.scan import acquire, axis_thread, lidar_scans
 from scanwright.firmware_io.scan.axis_thread import turning_servo
+from scanwright.firmware_io.scan.reporter import Reporter
 from scanwright.firmware_io.servo import guard
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
@@ -23,16 +24,16 @@ UNHEARD = "could not be stopped: take its power"
 
 @pytest.mark.parametrize("cut", [False, True])
 def test_ctrl_c_tells_what_the_servo_answered(cut):
-    with ServoTwin("MX-64R") as twin:
-        twin.set_up(spins=True)
-        with pytest.raises(KeyboardInterrupt) as caught, open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator("MX-64R") as emulator:
+        emulator.set_up(spins=True)
+        with pytest.raises(KeyboardInterrupt) as caught, open_servo(emulator.port, servo_id=1) as servo:
             servo.spin(math.pi)
             if cut:
-                twin.cut()
+                emulator.cut()
             raise KeyboardInterrupt
         (note,) = caught.value.__notes__
         assert (UNHEARD if cut else OFF) in note
-        assert twin.memory[24] == cut
+        assert emulator.memory[24] == cut
 
 
 @pytest.mark.parametrize("cut", [False, True])
@@ -40,33 +41,33 @@ def test_ctrl_c_again_while_it_is_stopped_tells_it_too(cut, monkeypatch):
     def again(_):
         raise KeyboardInterrupt("again")
 
-    with ServoTwin("MX-64R") as twin:
-        twin.set_up(spins=True)
-        with pytest.raises(KeyboardInterrupt) as caught, open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator("MX-64R") as emulator:
+        emulator.set_up(spins=True)
+        with pytest.raises(KeyboardInterrupt) as caught, open_servo(emulator.port, servo_id=1) as servo:
             servo.spin(math.pi)
             if cut:
-                twin.cut()
+                emulator.cut()
             monkeypatch.setattr(type(servo), "_stop", again)
             raise KeyboardInterrupt
         (note,) = caught.value.__notes__
         assert (UNHEARD if cut else OFF) in note
-        assert twin.memory[24] == cut
+        assert emulator.memory[24] == cut
 
 
 def test_a_neglected_servo_that_its_guard_cannot_reach_is_not_said_to_be_stopped():
-    with ServoTwin("MX-64R") as twin:
-        twin.set_up(spins=True)
-        servo = open_servo(twin.port, servo_id=1)
+    with ServoEmulator("MX-64R") as emulator:
+        emulator.set_up(spins=True)
+        servo = open_servo(emulator.port, servo_id=1)
         servo.spin(math.pi)
-        twin.cut()
+        emulator.cut()
         servo._guard._process.kill()  # as good as a guard that was not answered
         servo._guard._process.wait()
-        servo._guard._said_s = 0.0
+        servo._guard._sent_s = 0.0
         with pytest.raises(DeviceError, match="did not answer when it was to be stopped: take its power"):
             servo.read()
         with pytest.raises(DeviceError, match=UNHEARD):
             servo.close()
-        assert twin.memory[24] == 1
+        assert emulator.memory[24] == 1
 
 
 class Holding:
@@ -105,7 +106,8 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
     servo = Holding(hears)
     with turning_servo(servo, Spin(period_s=2.0)) as axis, pytest.raises(DeviceError, match="did not come back"):
         scans = object.__new__(lidar_scans.LidarScans)
-        scans.lidar, scans.axis, scans.away, scans._say = Away(), axis, 0, said.append
+        scans.lidar, scans.axis, scans.away = Away(), axis, 0
+        scans._reporter = Reporter(watch=SimpleNamespace(message=said.append))
         scans.next()
     assert servo.held >= 1
     assert ("the servo has answered that it holds" in said[0]) == hears
@@ -113,7 +115,7 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
 
 
 def test_a_servo_that_does_not_answer_at_all_is_not_waited_for_for_ever(monkeypatch):
-    monkeypatch.setattr(axis_thread, "_HELD_S", 0.0)
+    monkeypatch.setattr(axis_thread, "_STOP_ANSWER_S", 0.0)
     assert not axis_thread.AxisThread(Spin(period_s=2.0), 0.0, 0.001).stop()
 
 
@@ -134,8 +136,8 @@ def test_ctrl_c_waits_for_the_thread_that_could_turn_the_servo_again():
 @pytest.mark.parametrize(
     ("interrupt", "says"),
     [
-        (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo had not been told to turn"),
-        (None, "what the servo does was not heard: look, and cut its power if it turns"),
+        (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo was not started"),
+        (None, "state of the servo unknown: look, and cut its power if it turns"),
     ],
 )
 def test_ctrl_c_before_the_servo_is_opened_claims_nothing_of_it(tmp_path, command, monkeypatch, interrupt, says):

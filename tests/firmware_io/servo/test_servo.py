@@ -166,14 +166,14 @@ def test_every_answer_is_read_as_it_was_sent(bus, protocol):
         ("1.0", b"", DeviceTimeoutError, "no answer"),
         ("2.0", b"", DeviceTimeoutError, "no answer"),
         ("1.0", status("1.0", 1, 0, b"")[:-1], ProtocolError, "damaged"),
-        ("1.0", status("1.0", 1, 0, b""), ProtocolError, "0 bytes where 2"),  # the SDK: IndexError
-        ("2.0", status("2.0", 1, 0, b""), ProtocolError, "0 bytes where 2"),
+        ("1.0", status("1.0", 1, 0, b""), ProtocolError, "0 bytes instead of 2"),  # the SDK: IndexError
+        ("2.0", status("2.0", 1, 0, b""), ProtocolError, "0 bytes instead of 2"),
         ("1.0", status("1.0", 1, 8, b""), DeviceError, "out of range"),
         ("2.0", status("2.0", 1, 7, b""), DeviceError, "cannot be accessed"),
         ("1.0", status("1.0", 1, 16, b""), ProtocolError, "request arrived damaged"),
         ("2.0", status("2.0", 1, 3, b""), ProtocolError, "request arrived damaged"),
         ("1.0", status("1.0", 1, 0, b"\1\2")[:-1] + b"\0", ProtocolError, "damaged"),
-        ("2.0", status("2.0", 1, 0, b"\1\2\3"), ProtocolError, "3 bytes where 2"),  # the SDK cuts it silently
+        ("2.0", status("2.0", 1, 0, b"\1\2\3"), ProtocolError, "3 bytes instead of 2"),  # the SDK cuts it silently
         ("1.0", status("1.0", 7, 0, b"\1\2"), DeviceTimeoutError, "no answer"),  # another servo's
         ("1.0", b"\xff\xff\x01\x00\xfe\x00", ProtocolError, "damaged|wrong length"),
     ],
@@ -257,7 +257,7 @@ def test_a_try_in_which_this_computer_slept_says_nothing_of_the_servo(bus, monke
 
 def test_of_several_servos_on_a_bus_one_is_named(bus):
     line, wire = bus("1.0", lambda _: status("1.0", 1, 0, b"") + status("1.0", 2, 0, b""))
-    with pytest.raises(DeviceError, match=r"servos \[1, 2\] answer: say which one with --servo-id"):
+    with pytest.raises(DeviceError, match=r"servos \[1, 2\] answer: give servo_id"):
         find_servo(line, None, None)
     held = {0: b"\x36\x01", 3: b"\x02"}  # model number and id
     wire.reply = lambda request: status("1.0", 2, 0, held[request[5]] if request[4] == 2 else b"")
@@ -360,8 +360,8 @@ def test_mutated_answers_are_right_or_typed_errors(bus, protocol):
     ("arguments", "words"),
     [
         ({"port": "/dev/nothing"}, "/dev/nothing: no such port; serial ports here: "),
-        ({"port": "pty", "model": "MX-65"}, "model = 'MX-65': not one this program can drive; known: AX-12A"),
-        ({"port": "pty", "model": "PD42-3-1140"}, "not one this program can drive; removed in 0.2: "),
+        ({"port": "pty", "model": "MX-65"}, "model = 'MX-65': no driver for this model; known: AX-12A"),
+        ({"port": "pty", "model": "PD42-3-1140"}, "no driver for this model; removed in 0.2: "),
     ],
 )
 def test_what_cannot_be_opened_says_why(arguments, words):
@@ -404,7 +404,7 @@ def test_the_guard_stops_a_servo_whose_program_leaves_without_a_word(pair):
     watch._words.close()  # what the kernel does for a killed program
     until(lambda: len(heard) >= 2)  # not answered: it insists
     reply[0] = b"xackx"
-    watch.dismiss(stands=False)
+    watch.dismiss(at_rest=False)
     assert b"".join(heard).replace(b"off", b"") == b""  # on a busy computer one look finds several
 
 
@@ -412,8 +412,8 @@ def test_the_guard_of_a_servo_that_stands_does_nothing(pair):
     slave, heard, _ = pair
     watch = guard.Guard(slave, b"off", b"ack")
     assert watch.turning() and watch.resting()
-    watch.dismiss(stands=True)
-    watch.dismiss(stands=True)
+    watch.dismiss(at_rest=True)
+    watch.dismiss(at_rest=True)
     assert heard == []
 
 
@@ -424,7 +424,7 @@ def test_a_silent_program_hears_that_its_guard_has_acted(pair):
     assert watch.turning()
     until(lambda: heard == [b"off"])
     until(lambda: not watch.turning())
-    watch.dismiss(stands=True)
+    watch.dismiss(at_rest=True)
 
 
 @pytest.mark.parametrize("turns", [True, False])

@@ -128,7 +128,7 @@ def test_a_task_of_brackets(refused, shop):
 @pytest.mark.parametrize("told", [{"lidar": "a", "servo": "b", "pid": 10**30}, {"lidar": 1, "servo": 2, "pid": 1}, []])
 def test_an_emulated_scanner_that_cannot_be(refused, shop, told):
     (shop / "set/emulated.json").write_text(json.dumps(told))
-    assert "--lidar: which lidar?" in refused("scan", "set", "--dry-run")
+    assert "lidar: no port with a known USB id" in refused("scan", "set", "--dry-run")
 
 
 def test_a_cloud_registered_to_itself(refused, shop):

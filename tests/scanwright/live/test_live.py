@@ -24,7 +24,7 @@ from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
 from scanwright.firmware_io.scan import scan_end
 from scanwright.firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
-from scanwright.firmware_io.scan.scan_summary import ON_THE_WAY, ScanSummary
+from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray
@@ -74,7 +74,7 @@ def test_points_of_the_view_are_those_of_the_frame_chain():
         feed.joint(when, angle)
     for scan in scans:
         feed.scan(scan)
-    feed.told("a line")
+    feed.message("a line")
     feed.close()
     reader.join(120)
     expected = np.concatenate([deskew(scan, log, ANGLES) for scan in scans])
@@ -150,11 +150,11 @@ def noted(error, *notes):
 
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
-TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: take its power (no answer)")
+TURNS = UnsafeNote("servo 1 (MX-64R): could not be stopped: cut its power (no answer)")
 SHINES = UnsafeNote("its laser may still be on: no answer")
 ENDS = {
-    "done": (scan_end.finished(summary(left_out={ON_THE_WAY: 8}), ["wrote 90 points"]), "wrote 90 points"),
-    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "left out 12: bad packets"),
+    "done": (scan_end.finished(summary(left_out={BETWEEN_STOPS: 8}), ["wrote 90 points"]), "wrote 90 points"),
+    "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "dropped 12: bad packets"),
     "reconnected": (scan_end.finished(summary(reconnects=2)), "the lidar was away 2 times"),
     "failed": (
         scan_end.failed(noted(DeviceError("<b>nothing</b> came"), OFF)),

@@ -13,7 +13,7 @@ from scanwright.cli.app import run as scanwright_command
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import BuildError, DeviceError
 from scanwright.design.evaluation.comparison_table import write_csv
-from scanwright.design.files.atomic_file import whole_file
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.device_ports import Ports, announced
 from scanwright.pipeline import records
 from scanwright.pipeline.folder import fresh_folder
@@ -141,7 +141,7 @@ def test_everything_that_writes_into_a_folder_of_results_refuses_or_replaces_a_l
     with pytest.raises(BuildError, match=r"abc.json: a symbolic link"):
         Results(folder, "").put("abc", {})
     write_csv(folder / "compare.csv", [])
-    with whole_file(folder / "study.csv", BuildError) as part:
+    with atomic_write(folder / "study.csv", BuildError) as part:
         part.write_text("text")
     put(folder, MANIFEST, '{"files": {}}')
     (folder / f"{MANIFEST}.part").symlink_to(precious)

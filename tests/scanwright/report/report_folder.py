@@ -17,7 +17,7 @@ from scanwright.design.angles import STANDARD_DEG, Angles, AngleSet
 from scanwright.design.evaluation.picture_files import save_picture
 from scanwright.design.left_out import LeftOut
 from scanwright.design.search.mounts.reference import reference_mounts
-from scanwright.design.shadow import AXIS_STEPS, Shadow, own_body_bytes
+from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion, self_occlusion_bytes
 from scanwright.design.task.task import load_task
 from scanwright.pipeline import records as writer
 from scanwright.pipeline.manifest import write_json, write_manifest
@@ -79,7 +79,7 @@ class Page(HTMLParser):
 def own_body(beams=1081):
     stator = np.zeros((beams, AXIS_STEPS), bool)
     stator[500:600, :180] = True
-    return Shadow(np.arange(beams) < 100, stator), np.linspace(-2.3, 2.3, beams)
+    return SelfOcclusion(np.arange(beams) < 100, stator), np.linspace(-2.3, 2.3, beams)
 
 
 def glb(place):
@@ -108,7 +108,7 @@ def write_folder(folder):
     np.savetxt(folder / "axes.csv", AXES, "%.5g", ",", header="alpha_rot_deg,beta_rot_deg,J", comments="")
     writer.write_left_out(folder, [LeftOut("masked directions", EVIL, 12345, "square degrees")])
     save_picture(Figure(figsize=(1, 1)), folder / "density.png")
-    (folder / "own_body.npz").write_bytes(own_body_bytes(*own_body()))
+    (folder / "own_body.npz").write_bytes(self_occlusion_bytes(*own_body()))
     apart = {"base_mount": (0, 0, -0.1), "lidar_body": (0, 0, 0.2)}
     (folder / "assembly.glb").write_bytes(glb(dict.fromkeys(apart, (0, 0, -0.1))))
     (folder / "exploded.glb").write_bytes(glb(apart))

@@ -16,7 +16,7 @@ from report_folder import ANGLES, EVIL, Page, drawn, own_body, sphere
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import NODES, problem_of
 from scanwright.design.objective.score import quick_J, score
-from scanwright.design.shadow import AXIS_STEPS, load_own_body
+from scanwright.design.self_occlusion import AXIS_STEPS, load_self_occlusion
 from scanwright.design.task.task import Limits, load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
 from scanwright.report import page as report_page
@@ -79,7 +79,7 @@ def test_the_manifest_is_in_the_order_of_a_manifest_written_last(folder, tmp_pat
 
 
 def answered(folder):
-    return answer(load_task(folder / "task.toml"), ANGLES, load_own_body(folder / "own_body.npz")[0])
+    return answer(load_task(folder / "task.toml"), ANGLES, load_self_occlusion(folder / "own_body.npz")[0])
 
 
 def test_the_answer_says_what_the_files_say(folder, page):

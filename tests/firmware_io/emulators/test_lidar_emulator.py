@@ -1,4 +1,4 @@
-"""The lidar twin: requests that real sensors were asked, an independent client, true times, every model's codes."""
+"""The lidar emulator: requests that real sensors were asked, an independent client, true times, every model's codes."""
 
 import re
 import socket
@@ -14,7 +14,7 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar as Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
-from scanwright.firmware_io.emulators.lidar import LidarTwin
+from scanwright.firmware_io.emulators.lidar import LidarEmulator
 from scanwright.firmware_io.emulators.lidar_machine import LidarMachine, clustered
 from scanwright.firmware_io.lidar.scip import measurement, protocol
 
@@ -45,7 +45,7 @@ def test_captured_requests_get_the_captured_bytes(data, name):
     requests = (data / "scip" / f"{name}.tx").read_bytes().split()
     scan = measurement.measurement(protocol.Splitter().feed(captured)[-1])
     model = next(model for model in IDENTITIES if model.lower().replace("-", "_") == name)
-    # The numbers of the capture as ranges: those below the least range are the codes that the twin does not choose.
+    # The numbers of the capture as ranges: those below the least range are the codes that the emulator does not choose.
     range_m = np.where(scan.value == IDENTITIES[model].no_return, np.inf, scan.value / 1000)
     sensor = machine(model, lambda _: (range_m, np.resize(scan.intensity, range_m.size)), scan.stamp_ms, laser=True)
     came = b""
@@ -85,7 +85,7 @@ def test_the_models_are_those_of_the_catalogue():
             assert product.scan_rate_hz == pytest.approx(1 / of.scan_period_s)
     assert shared == {one.name for one in catalogue if isinstance(one, Lidar) and one.family == "scip"}
     with pytest.raises(DeviceError, match="did you mean 'UTM-30LX'"):
-        LidarTwin("UTM30LX", plain)
+        LidarEmulator("UTM30LX", plain)
 
 
 @pytest.mark.parametrize(
@@ -197,8 +197,8 @@ def test_a_cluster_is_its_least_range_that_is_none_of_the_codes(value, cluster):
 
 
 def test_an_independent_client_cannot_tell_it_from_hardware():
-    with LidarTwin("UST-10LX", plain) as twin:
-        host, port = twin.address.split(":")
+    with LidarEmulator("UST-10LX", plain) as emulator:
+        host, port = emulator.address.split(":")
         client = HokuyoLX(addr=(host, int(port)), tsync=False, timeout=20, convert_time=False)
         try:
             assert client.model.startswith("UST-10LX")
@@ -234,8 +234,8 @@ def test_scans_arrive_late_and_in_order_but_never_early():
         begun.append(int(time_ns[0]))
         return plain(time_ns)
 
-    with LidarTwin("UTM-30LX", look, jitter_s=0.02) as twin:
-        host, port = twin.address.split(":")
+    with LidarEmulator("UTM-30LX", look, jitter_s=0.02) as emulator:
+        host, port = emulator.address.split(":")
         with socket.create_connection((host, int(port)), timeout=20) as client:
             client.sendall(b"MD0000000401000\n")
             splitter, arrivals = protocol.Splitter(), []
@@ -243,20 +243,20 @@ def test_scans_arrive_late_and_in_order_but_never_early():
                 arrivals += [
                     time.monotonic_ns() for told in splitter.feed(client.recv(4096)) if measurement.is_scan(told)
                 ]
-    late_ms = (np.array(arrivals[:25]) - np.array(begun[:25]) - twin.smallest_delay_ns) / MS
+    late_ms = (np.array(arrivals[:25]) - np.array(begun[:25]) - emulator.smallest_delay_ns) / MS
     assert late_ms.min() >= 0
     assert 3 < np.median(late_ms)  # evenly spread to 20 ms, and more where the machine is busy
-    assert twin.smallest_delay_ns == pytest.approx(1081 / 1440 * 25.05 * MS, abs=1)
+    assert emulator.smallest_delay_ns == pytest.approx(1081 / 1440 * 25.05 * MS, abs=1)
 
 
 def test_a_look_that_fails_is_told_at_the_end():
     def look(_):
         raise ZeroDivisionError("no scene")
 
-    twin = LidarTwin("UTM-30LX", look, scanning=True)
-    with pytest.raises(ZeroDivisionError), twin:
-        twin._thread.join(timeout=60)
-        assert not twin._thread.is_alive()
+    emulator = LidarEmulator("UTM-30LX", look, scanning=True)
+    with pytest.raises(ZeroDivisionError), emulator:
+        emulator._thread.join(timeout=60)
+        assert not emulator._thread.is_alive()
 
 
 def test_a_slow_look_leaves_scans_out_and_blocks_nothing():

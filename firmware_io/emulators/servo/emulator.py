@@ -1,4 +1,4 @@
-"""The twin of a servo, on a pseudo-terminal: programs cannot tell it from a real one.
+"""The emulator of a servo, on a pseudo-terminal: programs cannot tell it from a real one.
 
 It answers in each protocol byte by byte with their timing: bytes take their time at the baud rate, the return delay is
 kept, a client at another speed is not understood. What it answers and how it turns is
@@ -33,7 +33,7 @@ from scanwright.firmware_io.servo.fitness import set_up_counts
 _TICK_S = 0.02  # between two looks of the servo at itself
 
 
-class ServoTwin:
+class ServoEmulator:
     """One servo, powered and on its bus; `port` is what a program opens. A context manager.
 
     Attributes:
@@ -46,7 +46,7 @@ class ServoTwin:
         protocol: as the maker calls it, or None for the one that the model has from the factory.
         load: what hangs on the horn.
         angle_rad: of the horn when it is switched on.
-        beside: other servos on the bus: model and number.
+        others: other servos on the bus: model and number.
         echo: whether the adapter returns what it sends.
         seed: of the bit errors.
     """
@@ -58,29 +58,29 @@ class ServoTwin:
         *,
         load: Load | None = None,
         angle_rad: float = 0.0,
-        beside: Sequence[tuple[str, int]] = (),
+        others: Sequence[tuple[str, int]] = (),
         echo: bool = False,
         seed: int = 0,
     ) -> None:
         now_ns = time.monotonic_ns()
         self._servo = machine_of(model, protocol, Load() if load is None else load, now_ns, angle_rad)
         self._servos = [self._servo]
-        for beside_model, beside_id in beside:
-            other = machine_of(beside_model, self._servo.table.protocol, Load(), now_ns, 0.0)
-            other.memory[other.table.id.address] = beside_id
+        for other_model, other_id in others:
+            other = machine_of(other_model, self._servo.table.protocol, Load(), now_ns, 0.0)
+            other.memory[other.table.id.address] = other_id
             self._servos.append(other)
         self.axis, self.memory = self._servo.axis, self._servo.memory
         self._echo = echo
         self._random = random.Random(seed)
         self._bit_error_rate = 0.0
         self._cut = False
-        self._folder = tempfile.TemporaryDirectory(prefix="servo-twin-")
+        self._folder = tempfile.TemporaryDirectory(prefix="servo-emulator-")
         self.port = str(Path(self._folder.name) / "ttyServo")
         self._master = self._slave = -1
         self._plug()
         self._jobs: SimpleQueue[tuple[Callable[[], None], threading.Event] | None] = SimpleQueue()
         self._wake_read, self._wake_write = os.pipe()
-        self._thread = threading.Thread(target=self._run, name=f"twin of {model}", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=f"emulator of {model}", daemon=True)
         self._thread.start()
 
     def __enter__(self) -> Self:
@@ -90,7 +90,7 @@ class ServoTwin:
         self.close()
 
     def close(self) -> None:
-        """Take the twin off its port. May be called again."""
+        """Take the emulator off its port. May be called again."""
         if self._thread.is_alive():
             self._jobs.put(None)
             os.write(self._wake_write, b".")
@@ -141,7 +141,7 @@ class ServoTwin:
         """The bus is cut: no byte passes; power stays, so in protocol 1.0 the wheel turns on."""
         self._cut = True
 
-    def mend(self) -> None:
+    def reconnect_bus(self) -> None:
         """The bus is whole again."""
         self._cut = False
 
@@ -154,13 +154,13 @@ class ServoTwin:
         self._do(self._plug)
 
     def _do(self, job: Callable[[], None]) -> None:
-        """Let the twin's own thread do it, which alone touches servo and port; wait until it is done."""
+        """Let the emulator's own thread do it, which alone touches servo and port; wait until it is done."""
         done = threading.Event()
         self._jobs.put((job, done))
         os.write(self._wake_write, b".")
         while not done.wait(1.0):
             if not self._thread.is_alive():
-                raise RuntimeError("the twin is closed, or its thread has ended with an error")
+                raise RuntimeError("the emulator is closed, or its thread has ended with an error")
 
     def _plug(self) -> None:
         self._pull()
@@ -177,7 +177,7 @@ class ServoTwin:
         self._master = self._slave = -1
 
     def _run(self) -> None:
-        buffer, heard_ns = bytearray(), 0
+        buffer, received_ns = bytearray(), 0
         while True:
             ports = [] if self._master < 0 else [self._master]
             ready = select.select([self._wake_read, *ports], [], [], _TICK_S)[0]
@@ -195,9 +195,9 @@ class ServoTwin:
                 data = os.read(self._master, 4096)
                 if self._echo:  # the adapter does that, whatever the servo makes of it
                     self._send(data)
-                if now_ns - heard_ns > self._servo.forgets_ns:
+                if now_ns - received_ns > self._servo.forgets_ns:
                     buffer.clear()
-                heard_ns = now_ns
+                received_ns = now_ns
                 if not self._cut and (hearing := self._hearing(now_ns)):
                     buffer += data
                     self._serve(hearing, buffer, now_ns)

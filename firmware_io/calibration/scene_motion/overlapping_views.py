@@ -25,27 +25,29 @@ _SQUARES = (
     1.0,
 )  # how far scans around a beam are off, in units of its neighbours: small for the slim and far ones
 _SCANS = 8  # but so many at most: people walk on
-_ASKED = 200_000  # beams: more tell nothing new
+_TESTED = 200_000  # beams: more tell nothing new
 _APART_RAD = np.radians(10.0)  # a turn less than that is the same look
 _TURN_RAD = 2 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
-class SecondLooks:
+class OverlappingViews:
     """What two looks at one place, at two times, say of each other.
 
     Attributes:
-        asked: beams that could be asked.
+        tested: beams that could be asked.
         compared: those of them at whose place another beam looked, from half a turn or a whole one away.
         seen_through: those whose place that other beam went through, to end well behind it.
     """
 
-    asked: int
+    tested: int
     compared: int
     seen_through: int
 
 
-def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams, noise_m: float) -> SecondLooks:
+def overlapping_views(
+    mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams, noise_m: float
+) -> OverlappingViews:
     """Beams that ended where the beams of another look at the same place went through.
 
     A beam and its four neighbours (in its scan, and in the scans before and after) ended at five points. A beam of
@@ -67,15 +69,15 @@ def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: Return
     scans = Scans.of(now)
     aside = np.hypot(direction[:, 0], direction[:, 1])
     patches = [_patches(scans, aside, square) for square in _SQUARES]
-    asked = np.flatnonzero(np.any([patch[0] >= 0 for patch in patches], axis=0))
-    asked = asked[:: max(1, asked.size // _ASKED)]
-    looks = list(_other_looks(mount, x, now, scans, point, asked))
-    pairs = len(patches) * sum(mine.size for mine, _ in looks)
+    tested = np.flatnonzero(np.any([patch[0] >= 0 for patch in patches], axis=0))
+    tested = tested[:: max(1, tested.size // _TESTED)]
+    views = list(_other_views(mount, x, now, scans, point, tested))
+    pairs = len(patches) * sum(mine.size for mine, _ in views)
     behind_m = noise_m * np.sqrt(2) * norm.isf(1 / _ONCE_IN / max(1, pairs))
     compared, through = np.zeros((2, range_m.size), bool)
-    for patch, (mine, other) in product(patches, looks):
-        whole = (patch[0, mine] >= 0) & (patch[0, other] >= 0)
-        mine, other = mine[whole], other[whole]
+    for patch, (mine, other) in product(patches, views):
+        complete = (patch[0, mine] >= 0) & (patch[0, other] >= 0)
+        mine, other = mine[complete], other[complete]
         five, along = point[patch[:, mine]] - origin[other], direction[other]
         depth = np.einsum("kij,ij->ki", five, along)
         across = five - depth[:, :, None] * along
@@ -83,7 +85,7 @@ def second_looks(mount: Mount, x: Float64[ndarray, " parameters"], beams: Return
         compared[mine] |= between
         clear_m = range_m[patch[:, other]].min(axis=0)
         through[mine] |= between & (clear_m > 2 * depth.max(axis=0) - depth.min(axis=0) + behind_m)
-    return SecondLooks(asked.size, int(compared.sum()), int(through.sum()))
+    return OverlappingViews(tested.size, int(compared.sum()), int(through.sum()))
 
 
 def _patches(scans: Scans, aside: Floats, square: float) -> Ints:
@@ -104,50 +106,50 @@ def _patches(scans: Scans, aside: Floats, square: float) -> Ints:
     apart = np.clip(np.rint(apart), 1, _SCANS).astype(np.int64)
     last, has_last = scans.beam(row[beam] - apart, scans.bearing_rad[beam])
     following, has_following = scans.beam(row[beam] + apart, scans.bearing_rad[beam])
-    whole = has_last & has_following & (scans.run[row[last]] == scans.run[row[following]])
-    found = np.full((5, row.size), -1)
-    found[:, beam[whole]] = np.stack([beam, beam - 1, beam + 1, last, following])[:, whole]
-    return found
+    complete = has_last & has_following & (scans.run[row[last]] == scans.run[row[following]])
+    patches = np.full((5, row.size), -1)
+    patches[:, beam[complete]] = np.stack([beam, beam - 1, beam + 1, last, following])[:, complete]
+    return patches
 
 
-def _other_looks(
-    mount: Mount, x: Floats, now: ReturnedBeams, scans: Scans, point: Floats, asked: Ints
+def _other_views(
+    mount: Mount, x: Floats, now: ReturnedBeams, scans: Scans, point: Floats, tested: Ints
 ) -> Iterator[tuple[Ints, Ints]]:
     """Which beams of those asked another look came near to, and the beam of that look that came nearest."""
-    run = scans.run[scans.scan[asked]]
-    for psi_rad, bearing_rad in _towards(mount, x, point[asked]):
+    run = scans.run[scans.scan[tested]]
+    for psi_rad, bearing_rad in _towards(mount, x, point[tested]):
         joint_rad = 2 * psi_rad - axis_angle(x, psi_rad, np.zeros(psi_rad.size))
-        here_rad = now.joint_rad[asked] + _APART_RAD
+        here_rad = now.joint_rad[tested] + _APART_RAD
         next_rad = here_rad + (joint_rad - here_rad) % _TURN_RAD
-        here_rad = now.joint_rad[asked] - _APART_RAD
+        here_rad = now.joint_rad[tested] - _APART_RAD
         last_rad = here_rad - (here_rad - joint_rad) % _TURN_RAD
         from_first_rad = scans.sense * (bearing_rad - scans.first_rad) % _TURN_RAD
         for r in range(scans.run[-1] + 1):
             rows = np.flatnonzero(scans.run == r)
             place = now.place[np.searchsorted(scans.scan, rows[0])]
             own = (run == r) & np.isfinite(joint_rad)
-            beside = (np.abs(run - r) == 1) & (now.place[asked] == place) & np.isfinite(joint_rad)
+            adjacent = (np.abs(run - r) == 1) & (now.place[tested] == place) & np.isfinite(joint_rad)
             low_rad = scans.joint_rad[rows].min()
             # Of the own run the next look and the last; of the runs before and after it any one
             for mine, wanted_rad in (
                 (own, next_rad),
                 (own, last_rad),
-                (beside, low_rad + (joint_rad - low_rad) % _TURN_RAD),
+                (adjacent, low_rad + (joint_rad - low_rad) % _TURN_RAD),
             ):
-                its, other = _found(now, scans, rows, np.flatnonzero(mine), wanted_rad, from_first_rad)
-                yield asked[its], other
+                its, other = _nearest_beams(now, scans, rows, np.flatnonzero(mine), wanted_rad, from_first_rad)
+                yield tested[its], other
 
 
-def _found(
+def _nearest_beams(
     now: ReturnedBeams, scans: Scans, rows: Ints, mine: Ints, wanted_rad: Floats, bearing_rad: Floats
 ) -> tuple[Ints, Ints]:
     """Those of `mine` whose joint angle the scans `rows` of one run reach, and their beams nearest to it."""
     joint_rad = scans.joint_rad[rows]
-    way = 1 if joint_rad[-1] > joint_rad[0] else -1
+    direction = 1 if joint_rad[-1] > joint_rad[0] else -1
     wanted, bearing = wanted_rad[mine], bearing_rad[mine]
     reached = (wanted >= joint_rad.min()) & (wanted <= joint_rad.max())
     mine, wanted, bearing = mine[reached], wanted[reached], bearing[reached]
-    after = rows[0] + np.searchsorted(way * joint_rad, way * wanted)
+    after = rows[0] + np.searchsorted(direction * joint_rad, direction * wanted)
     best, off = np.zeros(mine.size, np.int64), np.full(mine.size, np.inf)
     for scan in (after - 2, after - 1, after, after + 1):  # a scan takes time: its ends are not at its middle's angle
         beam, near = scans.beam(np.clip(scan, rows[0], rows[-1]), bearing)

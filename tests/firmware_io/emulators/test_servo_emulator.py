@@ -1,4 +1,4 @@
-"""The servo's twin, judged by other people's programs, and the driver on it: motion, faults, and every way out."""
+"""The servo's emulator, judged by other people's programs, and the driver on it: motion, faults, and every way out."""
 
 import math
 import subprocess
@@ -21,9 +21,9 @@ from pyax12.connection import Connection
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io import serial_port
 from scanwright.firmware_io.emulators.servo.dynamixel_packets import crc16, packet_2, status, take
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.servo.machine import answers
 from scanwright.firmware_io.emulators.servo.models import machine_of
-from scanwright.firmware_io.emulators.servo.twin import ServoTwin
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo import servo as servo_driver
 from scanwright.firmware_io.servo.bus.registers import Register
@@ -47,14 +47,14 @@ def pause(condition, seconds=2.0):
         until(condition, seconds)
 
 
-def true_rad(twin, time_ns=None):
-    return float(twin.axis.angle_rad(np.array(time.monotonic_ns() if time_ns is None else time_ns)))
+def true_rad(emulator, time_ns=None):
+    return float(emulator.axis.angle_rad(np.array(time.monotonic_ns() if time_ns is None else time_ns)))
 
 
-def turns(twin):
+def turns(emulator):
     """Whether the horn moves, over the last 20 ms."""
     now_ns = time.monotonic_ns()
-    return abs(true_rad(twin, now_ns) - true_rad(twin, now_ns - 20_000_000)) > 1e-3
+    return abs(true_rad(emulator, now_ns) - true_rad(emulator, now_ns - 20_000_000)) > 1e-3
 
 
 def read_for(servo, seconds):
@@ -79,7 +79,7 @@ def test_requests_come_out_of_noise_whole(servo_id, instruction, parameters, noi
 
 
 @given(data=payload, error=st.integers(0, 127), cut=st.integers(0, 60))
-def test_the_sdk_reads_the_statuses_of_the_twin(data, error, cut):
+def test_the_sdk_reads_the_statuses_of_the_emulator(data, error, cut):
     """Both protocols, and the stream in two parts; where a status is stuffed, as it is on the wire (`servo_bus`)."""
     for protocol, begin in (("1.0", 4), ("2.0", 8)):
         wire = status(protocol, 9, error, data)
@@ -231,8 +231,8 @@ def test_a_strained_servo_protects_itself():
 
 
 def test_pyax12_drives_the_ax_12a(monkeypatch):
-    with ServoTwin("AX-12A") as twin:
-        client = Connection(port=twin.port, baudrate=1_000_000)
+    with ServoEmulator("AX-12A") as emulator:
+        client = Connection(port=emulator.port, baudrate=1_000_000)
         # It sleeps 20 ms and takes what is there: let it sleep until something is, on a busy computer too.
         waiting = SimpleNamespace(sleep=lambda _: pause(lambda: client.serial_connection.in_waiting))
         monkeypatch.setattr("pyax12.connection.time", waiting)
@@ -242,20 +242,20 @@ def test_pyax12_drives_the_ax_12a(monkeypatch):
                 *(12, 512, 12.0),
             )
             client.goto(1, 30, speed=512, degrees=True)
-            until(lambda: math.degrees(true_rad(twin)) > 29)
+            until(lambda: math.degrees(true_rad(emulator)) > 29)
             until(lambda: abs(client.get_present_position(1, degrees=True) - 30) < 1)
         finally:
             client.close()
 
 
 def test_rustypot_drives_the_mx_64_and_the_xm430():
-    with ServoTwin("MX-64R") as twin:
-        client = rustypot.MxPyController(twin.port, 57600, 10.0)
+    with ServoEmulator("MX-64R") as emulator:
+        client = rustypot.MxPyController(emulator.port, 57600, 10.0)
         assert client.read_model_number(1) == [310]
         client.write_goal_position(1, 0.5)
         until(lambda: abs(client.read_present_position(1)[0] - 0.5) < 0.05)
-    with ServoTwin("XM430-W350") as twin:
-        second = rustypot.Xl430PyController(twin.port, 57600, 10.0)
+    with ServoEmulator("XM430-W350") as emulator:
+        second = rustypot.Xl430PyController(emulator.port, 57600, 10.0)
         assert second.ping(1)
         assert second.sync_read_present_position([1]) == [2048]
         second.set_fast_sync_read(True)
@@ -267,14 +267,14 @@ def test_rustypot_drives_the_mx_64_and_the_xm430():
 
 @pytest.fixture
 def patient_sdk(monkeypatch):
-    """Its 34 ms are short for a twin that shares a busy machine with it."""
+    """Its 34 ms are short for an emulator that shares a busy machine with it."""
     monkeypatch.setattr(dynamixel_sdk.port_handler, "LATENCY_TIMER", 2000)
 
 
 @pytest.mark.usefixtures("patient_sdk")
 def test_the_official_sdk_drives_the_mx_64_of_protocol_2():
-    with ServoTwin("MX-64R", "2.0") as twin:
-        port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
+    with ServoEmulator("MX-64R", "2.0") as emulator:
+        port, handler = dynamixel_sdk.PortHandler(emulator.port), dynamixel_sdk.PacketHandler(2.0)
         assert port.setBaudRate(57600)
         try:
             assert handler.ping(port, 1) == (311, 0, 0)
@@ -295,8 +295,8 @@ def test_the_official_sdk_drives_the_mx_64_of_protocol_2():
 
 @pytest.mark.usefixtures("patient_sdk")
 def test_the_sdk_reads_several_servos_of_one_bus_at_a_time():
-    with ServoTwin("XM430-W350", beside=[("XL430-W250", 2), ("MX-106", 7)]) as twin:
-        port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
+    with ServoEmulator("XM430-W350", others=[("XL430-W250", 2), ("MX-106", 7)]) as emulator:
+        port, handler = dynamixel_sdk.PortHandler(emulator.port), dynamixel_sdk.PacketHandler(2.0)
         assert port.openPort() and port.setBaudRate(57600)
         try:
             assert sorted(handler.broadcastPing(port)[0]) == [1, 2, 7]
@@ -307,17 +307,17 @@ def test_the_sdk_reads_several_servos_of_one_bus_at_a_time():
                 assert [group.getData(number, 0, 2) for number in (1, 2, 7)] == [1020, 1060, 321]
         finally:
             port.closePort()
-        with pytest.raises(DeviceError, match=r"servos \[1, 2, 7\] answer: say which one with --servo-id"):
-            open_servo(twin.port)
-        with open_servo(twin.port, servo_id=7) as servo:
+        with pytest.raises(DeviceError, match=r"servos \[1, 2, 7\] answer: give servo_id"):
+            open_servo(emulator.port)
+        with open_servo(emulator.port, servo_id=7) as servo:
             assert servo.model == "MX-106"
 
 
 @pytest.mark.usefixtures("patient_sdk")
 def test_bytes_take_their_time_and_the_return_delay_is_kept(monkeypatch):
-    with ServoTwin("MX-64R", "2.0") as twin:
-        twin.memory[9] = 254
-        port, handler = dynamixel_sdk.PortHandler(twin.port), dynamixel_sdk.PacketHandler(2.0)
+    with ServoEmulator("MX-64R", "2.0") as emulator:
+        emulator.memory[9] = 254
+        port, handler = dynamixel_sdk.PortHandler(emulator.port), dynamixel_sdk.PacketHandler(2.0)
         port.setBaudRate(57600)
         try:
             begin = time.monotonic()
@@ -330,7 +330,7 @@ def test_bytes_take_their_time_and_the_return_delay_is_kept(monkeypatch):
             port.closePort()
 
 
-# The driver on the twin
+# The driver on the emulator
 
 
 @pytest.fixture(autouse=True)
@@ -346,27 +346,27 @@ def open_servo(port, model=None, servo_id=None):
 
 @pytest.mark.parametrize(("model", "protocol"), MODELS)
 def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
-    with ServoTwin(model, protocol, angle_rad=-3.0) as twin, open_servo(twin.port, model) as servo:
+    with ServoEmulator(model, protocol, angle_rad=-3.0) as emulator, open_servo(emulator.port, model) as servo:
         assert (servo.model, servo.protocol, servo.id) == (model, protocol, 1)
         assert servo.baud == BAUDS.get(protocol, 57600)
         servo.spin(-RATE)
         states = read_for(servo, 0.3)
         for state in states:
-            assert abs(state.position_rad - true_rad(twin, state.time_ns)) < slack_rad(servo, state)
+            assert abs(state.position_rad - true_rad(emulator, state.time_ns)) < slack_rad(servo, state)
         assert states[-1].position_rad < -3.5  # on and on, through the encoder's end
         assert states[-1].velocity_rad_s == pytest.approx(-RATE, rel=0.02)
         servo.hold()
-        until(lambda: not turns(twin))
+        until(lambda: not turns(emulator))
         volts = VOLTS.get(model, 12.0)
         assert (states[-1].voltage_V, states[-1].temperature_degC) == (pytest.approx(volts), 30)
         servo.sweep_to(2.0, 3.0)
         until(lambda: abs(servo.read().position_rad - 2.0) < 0.03)
-        assert abs(math.remainder(true_rad(twin) - 2.0, 2 * math.pi)) < 0.03 + servo.step_rad
+        assert abs(math.remainder(true_rad(emulator) - 2.0, 2 * math.pi)) < 0.03 + servo.step_rad
 
 
 @pytest.mark.parametrize("model", MODELS_2)
-def test_the_tables_of_driver_and_twin_are_of_one_servo(model):
-    """Every register that the driver uses is one that the twin has, with its size."""
+def test_the_tables_of_driver_and_emulator_are_of_one_servo(model):
+    """Every register that the driver uses is one that the emulator has, with its size."""
     table = next(table for table in TABLES if (table.model, table.protocol) == (model, "2.0"))
     servo = machine_of(model, "2.0", Load(), 0, 0.0)
     named = [getattr(table, field.name) for field in fields(table)]
@@ -385,18 +385,18 @@ def slack_rad(servo, state):
 
 
 def test_the_dead_sector_is_marked_and_never_guessed():
-    with ServoTwin("AX-12A") as twin, open_servo(twin.port) as servo:
+    with ServoEmulator("AX-12A") as emulator, open_servo(emulator.port) as servo:
         assert servo.baud == 1_000_000
         servo.spin(5.0)
         states = read_for(servo, 1.6)
     dead_rad = math.radians(150)
     seen = set()
     for state in states:
-        truth = true_rad(twin, state.time_ns)
+        truth = true_rad(emulator, state.time_ns)
         slack = slack_rad(servo, state)
         within = abs(math.remainder(truth, 2 * math.pi))
         if math.isnan(state.position_rad):
-            assert within > dead_rad - 4 * slack  # two readings and what the twin itself is late
+            assert within > dead_rad - 4 * slack  # two readings and what the emulator itself is late
             seen.add("dead")
         else:
             assert within < dead_rad + slack
@@ -408,23 +408,23 @@ def test_the_dead_sector_is_marked_and_never_guessed():
 
 def test_turns_are_counted_across_a_pause_at_rest():
     """The speeds before and after say nothing of the time in between."""
-    with ServoTwin() as twin, open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator() as emulator, open_servo(emulator.port, servo_id=1) as servo:
         servo.spin(6.0)
         read_for(servo, 0.1)
         servo.hold()
         due_s = time.monotonic() + 1.5
         until(lambda: time.monotonic() > due_s)
-        assert abs(servo.read().position_rad - true_rad(twin)) < 0.01
+        assert abs(servo.read().position_rad - true_rad(emulator)) < 0.01
         servo.spin(-6.0)
         read_for(servo, 0.1)
         servo.hold()
-        until(lambda: not turns(twin))
-        assert abs(servo.read().position_rad - true_rad(twin)) < 0.01
+        until(lambda: not turns(emulator))
+        assert abs(servo.read().position_rad - true_rad(emulator)) < 0.01
 
 
 def test_a_servo_stuck_in_its_dead_sector_stalls():
-    with ServoTwin("AX-12A", angle_rad=math.pi) as twin, open_servo(twin.port) as servo:
-        twin.stall()
+    with ServoEmulator("AX-12A", angle_rad=math.pi) as emulator, open_servo(emulator.port) as servo:
+        emulator.stall()
         servo.spin(6.0)
         with pytest.raises(DeviceFaultError, match="stall: stuck in the dead sector where"):
             read_for(servo, 60.0)
@@ -432,49 +432,49 @@ def test_a_servo_stuck_in_its_dead_sector_stalls():
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_an_adapter_that_echoes_and_flips_bits(model, protocol):
-    with ServoTwin(model, protocol, echo=True, seed=3) as twin, open_servo(twin.port) as servo:
-        twin.bit_errors(0.001)
+    with ServoEmulator(model, protocol, echo=True, seed=3) as emulator, open_servo(emulator.port) as servo:
+        emulator.bit_errors(0.001)
         servo.spin(RATE)
         for state in read_for(servo, 0.3):
-            assert abs(state.position_rad - true_rad(twin, state.time_ns)) < slack_rad(servo, state)
+            assert abs(state.position_rad - true_rad(emulator, state.time_ns)) < slack_rad(servo, state)
 
 
 def test_opening_sets_what_it_relies_on_if_it_may_and_says_so():
-    with ServoTwin("XM430-W350") as twin:
-        memory = twin.memory
+    with ServoEmulator("XM430-W350") as emulator:
+        memory = emulator.memory
         memory[7], memory[8], memory[20], memory[68], memory[10] = 42, 2, -500, 0, 1
         with pytest.raises(ServoSetupError, match=r"homing_offset \(register 20\) is -500"):
-            servo_driver.open_servo(twin.port)
+            servo_driver.open_servo(emulator.port)
         assert (memory[20], memory[68], memory[10], memory[9], memory[64]) == (-500, 2, 1, 250, 0)
-        with open_servo(twin.port) as servo:
+        with open_servo(emulator.port) as servo:
             assert (servo.id, servo.baud) == (42, 115200)
             notes = " ".join(servo.warnings())
             assert "homing_offset (register 20) was -500" in notes and "drive_mode (register 10) was 1" in notes
             assert "return_delay_time (register 9) is 250, so that its answers come 500 us late" in notes
             assert (memory[20], memory[68], memory[10], memory[9]) == (0, 2, 0, 250)
         memory[9] = 0
-        with open_servo(twin.port, servo_id=42) as servo:
+        with open_servo(emulator.port, servo_id=42) as servo:
             assert servo.warnings() == ()
         with pytest.raises(DeviceError, match="the model of servo 42 is XM430-W350, not MX-64R"):
-            open_servo(twin.port, "MX-64R")
+            open_servo(emulator.port, "MX-64R")
 
 
 def test_a_locked_memory_is_said():
-    with ServoTwin("MX-64R") as twin:
-        twin.memory[47] = 1
-        with open_servo(twin.port) as servo:
+    with ServoEmulator("MX-64R") as emulator:
+        emulator.memory[47] = 1
+        with open_servo(emulator.port) as servo:
             servo.sweep_to(0.1, 1.0)
             with pytest.raises(DeviceError, match=r"refused|memory is locked"):
                 servo.spin(1.0)
 
 
 def test_the_latency_timer_is_looked_at(tmp_path, monkeypatch):
-    with ServoTwin() as twin:
-        adapter = tmp_path / Path(twin.port).resolve().name
+    with ServoEmulator() as emulator:
+        adapter = tmp_path / Path(emulator.port).resolve().name
         adapter.mkdir()
         (adapter / "latency_timer").write_text("16\n")
         monkeypatch.setattr(serial_port, "_ADAPTERS", tmp_path)
-        with open_servo(twin.port) as servo:
+        with open_servo(emulator.port) as servo:
             assert any("gathers bytes for 16 ms" in note and "udev" in note for note in servo.warnings())
 
 
@@ -488,15 +488,19 @@ def test_the_latency_timer_is_looked_at(tmp_path, monkeypatch):
     ],
 )
 def test_what_the_servo_cannot_do_is_refused_before_it_moves(do, words):
-    with ServoTwin() as twin, open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator() as emulator, open_servo(emulator.port, servo_id=1) as servo:
         with pytest.raises(DeviceError, match=words):
             do(servo)
-        assert not turns(twin)
+        assert not turns(emulator)
 
 
 def test_two_programs_cannot_share_a_port():
-    with ServoTwin() as twin, open_servo(twin.port, servo_id=1), pytest.raises(DeviceError, match="another program"):
-        open_servo(twin.port)
+    with (
+        ServoEmulator() as emulator,
+        open_servo(emulator.port, servo_id=1),
+        pytest.raises(DeviceError, match="another program"),
+    ):
+        open_servo(emulator.port)
 
 
 # Faults: whatever happens, the servo stands, and the error says what to do
@@ -516,19 +520,19 @@ TROUBLE = [(*of, *what) for of in FAMILIES for what in FAULTS]
 @pytest.mark.parametrize(("model", "protocol", "fault", "words"), TROUBLE)
 def test_a_fault_stops_the_turn_and_says_what_to_do(model, protocol, fault, words):
     words = words.replace("{volts}", str(VOLTS.get(model, 12.0)))
-    with ServoTwin(model, protocol) as twin:
-        with open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator(model, protocol) as emulator:
+        with open_servo(emulator.port, servo_id=1) as servo:
             servo.spin(RATE)
             read_for(servo, 0.1)
-            twin.set_voltage(3.5 if protocol == "STS" else 5.0) if fault == "low" else getattr(twin, fault)()
+            emulator.set_voltage(3.5 if protocol == "STS" else 5.0) if fault == "low" else getattr(emulator, fault)()
             with pytest.raises(DeviceFaultError, match=words):
                 read_on(servo, 60.0)
-        until(lambda: not turns(twin))
-        assert not has_torque(twin)
+        until(lambda: not turns(emulator))
+        assert not has_torque(emulator)
 
 
-def has_torque(twin):
-    return bool(twin.memory[twin._servo.table.torque.address])
+def has_torque(emulator):
+    return bool(emulator.memory[emulator._servo.table.torque.address])
 
 
 def read_on(servo, seconds):
@@ -541,28 +545,28 @@ def read_on(servo, seconds):
 
 def test_after_an_overload_it_can_be_opened_and_turns_again():
     for protocol in ("1.0", "2.0"):
-        with ServoTwin("MX-64R", protocol) as twin:
+        with ServoEmulator("MX-64R", protocol) as emulator:
             for again in (False, True):
-                with open_servo(twin.port) as servo:
+                with open_servo(emulator.port) as servo:
                     assert again == any("it reported overload and was reset" in note for note in servo.warnings())
                     servo.spin(RATE)
                     read_for(servo, 0.1)
-                    assert turns(twin)
+                    assert turns(emulator)
                     if not again:
-                        twin.overload()
+                        emulator.overload()
                         with pytest.raises(DeviceFaultError):
                             servo.read()
 
 
 @pytest.mark.parametrize("kind", [KeyboardInterrupt, ZeroDivisionError])
 def test_it_stands_however_the_program_leaves(kind):
-    with ServoTwin() as twin:
-        with pytest.raises(kind), open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator() as emulator:
+        with pytest.raises(kind), open_servo(emulator.port, servo_id=1) as servo:
             servo.spin(RATE)
             read_for(servo, 0.1)
             raise kind
-        until(lambda: not turns(twin))
-        with open_servo(twin.port, servo_id=1):
+        until(lambda: not turns(emulator))
+        with open_servo(emulator.port, servo_id=1):
             pass  # the port is free
 
 
@@ -580,37 +584,37 @@ with open_servo(sys.argv[1], servo_id=1, undo_folder=Path()) as servo:
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_it_stands_when_its_program_is_killed(model, protocol):
-    with ServoTwin(model, protocol) as twin:
-        with subprocess.Popen([sys.executable, "-c", PROGRAM, twin.port], stdout=subprocess.PIPE) as program:
+    with ServoEmulator(model, protocol) as emulator:
+        with subprocess.Popen([sys.executable, "-c", PROGRAM, emulator.port], stdout=subprocess.PIPE) as program:
             assert program.stdout.readline() == b"turning\n"
-            until(lambda: turns(twin))
+            until(lambda: turns(emulator))
             program.kill()
-        until(lambda: not turns(twin))
-        assert not has_torque(twin)
+        until(lambda: not turns(emulator))
+        assert not has_torque(emulator)
 
 
 def test_closing_insists_while_the_bus_is_disturbed():
     """The driver gives up after three tries; its guard goes on for two seconds."""
-    with ServoTwin() as twin:
-        with open_servo(twin.port, servo_id=1) as servo:
+    with ServoEmulator() as emulator:
+        with open_servo(emulator.port, servo_id=1) as servo:
             servo.spin(RATE)
             read_for(servo, 0.1)
-            twin.cut()
+            emulator.cut()
             close = servo._bus.close
-            servo._bus.close = lambda: (close(), twin.mend())  # the driver has given up
+            servo._bus.close = lambda: (close(), emulator.reconnect_bus())  # the driver has given up
         servo.close()
-        until(lambda: not turns(twin))
+        until(lambda: not turns(emulator))
 
 
 def test_it_stands_when_its_program_does_not_listen_and_when_its_bus_is_cut():
     """Two seconds for all three; a cut bus of protocol 1.0 is the one case that nobody can help."""
     with ExitStack() as stack:
-        twins = [stack.enter_context(ServoTwin("MX-64R", protocol)) for protocol in ("1.0", "1.0", "2.0")]
-        silent, helpless, watched = twins
-        servos = [stack.enter_context(open_servo(twin.port, servo_id=1)) for twin in twins]
+        emulators = [stack.enter_context(ServoEmulator("MX-64R", protocol)) for protocol in ("1.0", "1.0", "2.0")]
+        silent, helpless, watched = emulators
+        servos = [stack.enter_context(open_servo(emulator.port, servo_id=1)) for emulator in emulators]
         for servo in servos:
             servo.spin(RATE)
-        until(lambda: all(turns(twin) for twin in twins))
+        until(lambda: all(turns(emulator) for emulator in emulators))
         helpless.cut()
         watched.cut()
         until(lambda: not turns(silent) and not turns(watched))
@@ -622,29 +626,29 @@ def test_it_stands_when_its_program_does_not_listen_and_when_its_bus_is_cut():
         for servo in servos[1:]:
             with pytest.raises(DeviceError, match="could not be stopped: take its power"):
                 servo.close()
-        helpless.mend()
+        helpless.reconnect_bus()
         with open_servo(helpless.port, servo_id=1):
             until(lambda: not turns(helpless))  # opening it takes the torque
 
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_unplugged_is_said_and_plugged_in_it_is_found_again(model, protocol):
-    with ServoTwin(model, protocol) as twin:
-        with pytest.raises(DeviceTimeoutError, match="the port is gone") as caught, open_servo(twin.port) as servo:
+    with ServoEmulator(model, protocol) as emulator:
+        with pytest.raises(DeviceTimeoutError, match="the port is gone") as caught, open_servo(emulator.port) as servo:
             servo.spin(RATE)
             read_for(servo, 0.1)
-            twin.unplug()
+            emulator.unplug()
             read_for(servo, 60.0)
         assert any("could not be stopped: take its power" in note for note in caught.value.__notes__)
         with pytest.raises(DeviceError, match="no such port"):
-            open_servo(twin.port)
-        twin.replug()
-        with open_servo(twin.port) as servo:
-            until(lambda: not turns(twin))
+            open_servo(emulator.port)
+        emulator.replug()
+        with open_servo(emulator.port) as servo:
+            until(lambda: not turns(emulator))
             servo.spin(RATE)
             read_for(servo, 0.05)
 
 
 def test_a_servo_that_was_removed_is_refused_with_what_to_use_instead():
-    with pytest.raises(DeviceError, match=r"no twin of a servo PD42-3-1140; removed in 0\.2: "):
+    with pytest.raises(DeviceError, match=r"no emulator of a servo PD42-3-1140; removed in 0\.2: "):
         machine_of("PD42-3-1140", None, Load(), 0, 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import ProtocolError
-from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, Writer, framed
 from scanwright.firmware_io.lidar.sick.scan_data import WRAP_US, Channel, ScanData, telegram_of
 from scanwright.firmware_io.lidar.sick.values import Reader
@@ -37,7 +37,7 @@ class SickMachine:
 
     Attributes:
         lidar: which model.
-        sight: what it sees.
+        ranging: what it sees.
         began_ns: true time at which its clock showed `clock_us`.
         clock_us: what it showed then.
         rate_error: of its clock, 5e-5 is 50 ppm fast.
@@ -53,7 +53,7 @@ class SickMachine:
     """
 
     lidar: Lidar
-    sight: Sight
+    ranging: Ranging
     began_ns: int
     clock_us: int = 0
     rate_error: float = 0.0
@@ -90,11 +90,11 @@ class SickMachine:
     def hear(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
         """Answers to whole requests, and what is none yet."""
         splitter = TelegramSplitter()
-        asked = splitter.feed(received)
+        requests = splitter.feed(received)
         if now_ns < self.silent_until_ns:
             return b"", splitter.rest
-        told = [framed(self._answer(request, now_ns)) for request in asked if request.binary in self.dialects]
-        return b"".join(told), splitter.rest
+        answers = [framed(self._answer(request, now_ns)) for request in requests if request.binary in self.dialects]
+        return b"".join(answers), splitter.rest
 
     def next_ns(self) -> int:
         """When the next scan is sent."""
@@ -134,7 +134,7 @@ class SickMachine:
         lidar = self.lidar
         steps = np.arange(lidar.last_step - lidar.first_step + 1)
         first_ns = self._first_beam_ns(turn)
-        range_m, shown = self.sight(first_ns + np.rint(steps * self.beam_ns).astype(np.int64), lidar.bearings_rad())
+        range_m, shown = self.ranging(first_ns + np.rint(steps * self.beam_ns).astype(np.int64), lidar.bearings_rad())
         seen = np.isfinite(range_m)
         raw = np.rint(np.where(seen, range_m, 0.0) * 1e3).clip(0, 65535).astype(np.uint16)
         start, step = self._angles()
@@ -164,20 +164,20 @@ class SickMachine:
         per_step = 3_600_000 / self.lidar.steps_per_turn
         return 900_000 + round((self.lidar.first_step - self.lidar.front_step) * per_step), int(per_step)
 
-    def _answer(self, asked: Telegram, now_ns: int) -> Telegram:
+    def _answer(self, request: Telegram, now_ns: int) -> Telegram:
         if self.refusals:
-            return _refused(asked, self.refusals.pop(0))
+            return _refused(request, self.refusals.pop(0))
         try:
-            return self._said(asked, now_ns)
+            return self._reply(request, now_ns)
         except ProtocolError:
-            return _refused(asked, _INVALID)
+            return _refused(request, _INVALID)
 
-    def _said(self, asked: Telegram, now_ns: int) -> Telegram:
-        word, name, values = asked.word, asked.name.decode("ascii", "replace"), asked.values()
+    def _reply(self, request: Telegram, now_ns: int) -> Telegram:
+        word, name, values = request.word, request.name.decode("ascii", "replace"), request.values()
         answers = {b"sRN": "sRA", b"sWN": "sWA", b"sMN": "sAN", b"sEN": "sEA"}
         if word not in answers:
-            return _refused(asked, _UNKNOWN_METHOD)
-        out = Writer(f"{answers[word]} {name}", binary=asked.binary)
+            return _refused(request, _UNKNOWN_METHOD)
+        out = Writer(f"{answers[word]} {name}", binary=request.binary)
         match word, name:
             case b"sRN", "DeviceIdent":
                 return out.text(self.lidar.name).text("V1.00").telegram()
@@ -199,34 +199,34 @@ class SickMachine:
                 self._level = level if _PASSWORDS.get(level) == values.number("u32") else 0
                 return out.number("u8", int(self._level > 0)).telegram()
             case b"sMN", "LMCstartmeas" | "LMCstopmeas" | "Run":
-                return self._method(asked, name, out)
+                return self._method(request, name, out)
             case b"sWN", "LMDscandatacfg":
-                return self._configured(asked, values, out)
+                return self._configured(request, values, out)
             case b"sEN", "LMDscandata":
                 wanted = values.number("u8")
                 turn = math.ceil((now_ns - self.began_ns) / self.period_ns)
-                self.scanning = _Scanning(asked.binary, turn) if wanted and self.measuring else None
+                self.scanning = _Scanning(request.binary, turn) if wanted and self.measuring else None
                 return out.number("u8", wanted).telegram()
-        return _refused(asked, _UNKNOWN_VARIABLE if word in (b"sRN", b"sWN") else _UNKNOWN_METHOD)
+        return _refused(request, _UNKNOWN_VARIABLE if word in (b"sRN", b"sWN") else _UNKNOWN_METHOD)
 
-    def _method(self, asked: Telegram, name: str, out: Writer) -> Telegram:
+    def _method(self, request: Telegram, name: str, out: Writer) -> Telegram:
         if not self._level:
-            return _refused(asked, _ACCESS_DENIED)
+            return _refused(request, _ACCESS_DENIED)
         if name == "Run":  # it ends the login
             self._level = 0
             return out.number("u8", 1).telegram()
         self.measuring = name == "LMCstartmeas"
         return out.number("u8", 0).telegram()
 
-    def _configured(self, asked: Telegram, values: Reader, out: Writer) -> Telegram:
+    def _configured(self, request: Telegram, values: Reader, out: Writer) -> Telegram:
         if not self._level:
-            return _refused(asked, _ACCESS_DENIED)
+            return _refused(request, _ACCESS_DENIED)
         settings = values.numbers("u8", 11)
         self.intensity, self.interval = bool(settings[2]), max(values.number("u16"), 1)
         return out.telegram()
 
 
-class SickTwin(LidarLine):
+class SickEmulator(LidarLine):
     """A SICK lidar on its line."""
 
     machine: SickMachine
@@ -236,12 +236,12 @@ class SickTwin(LidarLine):
         super().__init__(machine.lidar.name, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
 
 
-def sick_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> SickTwin:
-    """The twin of a sensor of the catalogue."""
-    return SickTwin(SickMachine(lidar, sight, time.monotonic_ns()), seed=seed)
+def sick_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> SickEmulator:
+    """The emulator of a sensor of the catalogue."""
+    return SickEmulator(SickMachine(lidar, ranging, time.monotonic_ns()), seed=seed)
 
 
-def _refused(asked: Telegram, code: int) -> Telegram:
-    if asked.binary:
+def _refused(request: Telegram, code: int) -> Telegram:
+    if request.binary:
         return Telegram(b"sFA" + code.to_bytes(2, "big"), binary=True)
     return Telegram(b"sFA %X" % code, binary=False)

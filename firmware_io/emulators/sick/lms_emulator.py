@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.design.catalogue.products import Lidar
-from scanwright.firmware_io.emulators.lidar_line import LidarLine, Sight
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 
 _NEVER_NS = 1 << 62
 _BOOT_NS = 1_000_000_000  # [assumed]; a real one takes up to a minute until its motor is steady
@@ -44,7 +44,7 @@ class LmsMachine:
 
     Attributes:
         lidar: of the catalogue.
-        sight: what it sees.
+        ranging: what it sees.
         began_ns: when it got its power.
         millimetres: whether it tells ranges in them, up to 8 m, and not in centimetres.
         status: that its answers end with.
@@ -52,7 +52,7 @@ class LmsMachine:
     """
 
     lidar: Lidar
-    sight: Sight
+    ranging: Ranging
     began_ns: int
     millimetres: bool = True
     status: int = 0x10  # [assumed] bits without a meaning to us
@@ -76,23 +76,23 @@ class LmsMachine:
 
     def hear(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
         """Answers to whole requests; a sum that is wrong gets a 15."""
-        told = b""
+        answers = b""
         while (at := received.find(b"\x02\x00")) >= 0 and len(received) >= at + 4:
             size = 6 + int.from_bytes(received[at + 2 : at + 4], "little")
             if size > 64:
                 received = received[at + 1 :]
                 continue
             if len(received) < at + size:
-                return told, received[at:]
+                return answers, received[at:]
             one, received = received[at : at + size], received[at + size :]
             if now_ns < self.began_ns:
                 continue
             if int.from_bytes(one[-2:], "little") != remainder(one[:-2]):
-                told += b"\x15"
+                answers += b"\x15"
                 continue
             answer = self._answer(one[4:-2], now_ns)
-            told += b"\x06" + write_telegram(answer + bytes([self.status])) if answer else b"\x15"
-        return told, received[at:] if at >= 0 else received[-1:]
+            answers += b"\x06" + write_telegram(answer + bytes([self.status])) if answer else b"\x15"
+        return answers, received[at:] if at >= 0 else received[-1:]
 
     def next_ns(self) -> int:
         """When the last beam of the next telegram is measured."""
@@ -108,7 +108,7 @@ class LmsMachine:
         time_ns = self.began_ns + np.rint(self._number * self.period_ns + since_ns).astype(np.int64)
         range_m = np.empty(bearing_rad.size)
         order = np.argsort(time_ns, kind="stable")
-        range_m[order] = self.sight(time_ns[order], bearing_rad[order])[0]
+        range_m[order] = self.ranging(time_ns[order], bearing_rad[order])[0]
         scale = 1e3 if self.millimetres else 1e2
         fits = np.isfinite(range_m) & (range_m > 0) & (range_m * scale < 0x1FF0)
         raw = np.where(fits, np.rint(np.where(fits, range_m, 0) * scale), _NO_RANGE).astype("<u2")
@@ -128,21 +128,21 @@ class LmsMachine:
         self.began_ns = now_ns + _BOOT_NS
         self.scanning, self.baud, self._step_centideg = None, 9600, 100
 
-    def _answer(self, asked: bytes, now_ns: int) -> bytes:
-        match asked[0]:
-            case 0x20 if len(asked) == 2 and asked[1] in _MODES:
-                if asked[1] in _BAUDS:
-                    self.baud = _BAUDS[asked[1]]
+    def _answer(self, request: bytes, now_ns: int) -> bytes:
+        match request[0]:
+            case 0x20 if len(request) == 2 and request[1] in _MODES:
+                if request[1] in _BAUDS:
+                    self.baud = _BAUDS[request[1]]
                 else:
-                    self.scanning = object() if asked[1] == 0x24 else None
+                    self.scanning = object() if request[1] == 0x24 else None
                     self._number = max(math.ceil((now_ns - self.began_ns) / self.period_ns), 0)
                 return b"\xa0\x00"
             case 0x31:
                 return b"\xb1" + b"V02.30 " + bytes(20)  # [assumed] what else it holds
             case 0x3A:
                 return b"\xba" + self.lidar.name.replace(" ", "").encode() + b";30106;V02.30"
-            case 0x3B if len(asked) == 5:
-                angle_deg, step_centideg = struct.unpack("<HH", asked[1:])
+            case 0x3B if len(request) == 5:
+                angle_deg, step_centideg = struct.unpack("<HH", request[1:])
                 known = angle_deg == 180 and step_centideg in (50, 100)  # a quarter of a degree: within 100 deg only
                 if known:
                     self._step_centideg = step_centideg
@@ -150,7 +150,7 @@ class LmsMachine:
         return b""
 
 
-class LmsTwin(LidarLine):
+class LmsEmulator(LidarLine):
     """A lidar that answers as an LMS 2xx."""
 
     machine: LmsMachine
@@ -160,6 +160,6 @@ class LmsTwin(LidarLine):
         super().__init__(machine.lidar.name, machine, jitter_s=jitter_s, head=_HEAD, network=False, seed=seed)
 
 
-def lms_twin(lidar: Lidar, sight: Sight, seed: int = 0) -> LmsTwin:
-    """The twin of a sensor of the catalogue."""
-    return LmsTwin(LmsMachine(lidar, sight, time.monotonic_ns()), seed=seed)
+def lms_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LmsEmulator:
+    """The emulator of a sensor of the catalogue."""
+    return LmsEmulator(LmsMachine(lidar, ranging, time.monotonic_ns()), seed=seed)

@@ -73,7 +73,7 @@ def drifts(
     point = origin + (middle.range_m + x[4])[:, None] * direction
     plane = grouping.q[np.maximum(grouping.surface, 0)]
     plane = plane / np.linalg.norm(plane, axis=1)[:, None]
-    found = []
+    results = []
     for k in np.unique(middle.recording).tolist():
         mine = (middle.recording == k) & (grouping.surface >= 0)
         time_s = (middle.time_ns - middle.time_ns[mine].min()) / 1e9
@@ -85,8 +85,8 @@ def drifts(
         known = np.isfinite(np.diag(spread))
         rate = np.where(known, rates[-_RATES:], 0.0)
         square = rate[known] @ np.linalg.solve(spread[np.ix_(known, known)], rate[known])
-        found.append(Drift(k, rate[:3], rate[3:], float(square)))
-    return tuple(found)
+        results.append(Drift(k, rate[:3], rate[3:], float(square)))
+    return tuple(results)
 
 
 def _with(normal: Floats, rise: Floats) -> Floats:

@@ -1,0 +1,117 @@
+"""Tables of the pages that come from builds: written between the marks `<!-- table: NAME -->` and `<!-- end -->`.
+
+    uv run python -m benchmarks.scanwright.tables [OUT]
+
+Builds the shipped tasks that OUT (out/ by default) does not have yet, runs `compare` of `ground_ahead`, and rewrites
+the tables of docs/choose-hardware.md and docs/compared.md.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from scanwright.design.task.task import shipped_tasks
+
+ROOT = Path(__file__).parents[2]
+HAND_TOOLS = ("hexagon keys", "multimeter", "torque screwdriver")  # what every build needs: not worth a column
+
+
+def main() -> None:
+    """Build, compare, and write both tables."""
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "out"
+    for task in shipped_tasks():
+        if not (out / task / "bom.csv").exists():
+            subprocess.run(
+                ["scanwright", "build", task, "--out", out / task, "--quiet"], check=False
+            )  # 1: a check failed
+    write_table(ROOT / "docs/choose-hardware.md", "hardware", hardware_table(out))
+    compared = out / "compare/ground_ahead/compare.csv"
+    if not compared.exists():
+        subprocess.run(["scanwright", "compare", "ground_ahead", "--out", out / "compare/ground_ahead"], check=True)
+    write_table(ROOT / "docs/compared.md", "compare", compare_table(compared))
+
+
+def write_table(page: Path, name: str, table: str) -> None:
+    """Replace what lies between the marks of a table in a page."""
+    text, count = re.subn(
+        rf"(<!-- table: {name} -->\n).*?(?=<!-- end -->)",
+        lambda mark: f"{mark[1]}\n{table}\n\n",
+        page.read_text(),
+        flags=re.DOTALL,
+    )
+    if count != 1:
+        raise SystemExit(f"{page}: {count} tables named {name} (exactly 1 allowed)")
+    page.write_text(text)
+
+
+def hardware_table(out: Path) -> str:
+    """Return one row for each shipped task that `out` has a build of, as a table in Markdown."""
+    rows = [_hardware_row(out / task) for task in shipped_tasks() if (out / task / "bom.csv").exists()]
+    head = [
+        "task",
+        "lidar, servo, ring",
+        "printed",
+        "other made parts",
+        "tools beside hex keys",
+        "USD",
+        "failed checks",
+    ]
+    return _markdown(head, rows)
+
+
+def _hardware_row(folder: Path) -> list[str]:
+    with (folder / "bom.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    bought = {row["part"]: row["number"] for row in rows if row["kind"] == "bought"}
+    printed = [row for row in rows if row["kind"] == "printed"]
+    mass_g = sum(float(row["mass_g"] or 0) * float(row["quantity"] or 1) for row in printed)
+    made = [f"{row['part']} ({row['kind']})" for row in rows if row["kind"] in ("turned", "sawn")]
+    tools = [row["part"] for row in rows if row["kind"] == "tool" and not row["part"].startswith(HAND_TOOLS)]
+    (total,) = (row for row in rows if row["kind"] == "total")
+    checks = json.loads((folder / "checks.json").read_text(encoding="utf-8"))["checks"]
+    devices = [bought.get(kind, "none") for kind in ("lidar", "servo", "slip_ring")]
+    return [
+        f"`{folder.name}`",
+        ", ".join(devices),
+        f"{len(printed)} parts, {mass_g:.0f} g",
+        ", ".join(made) or "none",
+        ", ".join(tools) or "none",
+        f"{total['low_usd']} to {total['high_usd']}",
+        str(sum(check["severity"] == "error" for check in checks)),
+    ]
+
+
+def compare_table(path: Path) -> str:
+    """Return the rows of a `compare.csv` that a reader chooses by, as a table in Markdown."""
+    with path.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    shown = ("name", "time_s", "layers", "points_per_s", "beams_per_ball", "blind_weight", "cost_usd")
+    missing = [name for name in shown if name not in rows[0]]
+    if missing:
+        raise SystemExit(f"{path}: no column {missing[0]} (columns: {', '.join(rows[0])})")
+    head = ["scanner", "time [s]", "layers", "points/s", "beams", "region never seen", "USD"]
+    return _markdown(head, [_compare_row([row[name] for name in shown]) for row in rows])
+
+
+def _compare_row(values: list[str]) -> list[str]:
+    name, time_s, layers, points, beams, blind, price = values
+    share = f"{float(blind):.1%}" if blind else "?"
+    return [name, f"{float(time_s):g}", layers, _figure(points), _figure(beams), share, _figure(price)]
+
+
+def _figure(text: str) -> str:
+    return f"{float(text):,.3g}" if text and float(text) < 1000 else f"{float(text):,.0f}" if text else "?"
+
+
+def _markdown(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    main()
