@@ -58,7 +58,7 @@ def test_a_product_that_parts_do_not_fit_is_a_warning_for_each_wrong_value_and_n
     catalogue = load_catalogue()
     checks = room.known_errors([catalogue.named(name) for name in ("SNU11-P0210", "UTM-30LX", "MX-64R", "RPLIDAR C1")])
     assert Counter((check.where, check.severity) for check in checks) == {
-        ("SNU11-P0210", "warning"): 3,
+        ("SNU11-P0210", "warning"): 2,
         ("RPLIDAR C1", "note"): 1,
     }
     assert checks[0].message.endswith("the printed parts will not fit")

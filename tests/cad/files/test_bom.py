@@ -3,6 +3,7 @@
 import csv
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -11,15 +12,16 @@ from scanners import TILTED, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.files.bom import _wiring, bom_text, items_of
-from scanwright.cad.files.manual.instructions import instructions_text
+from scanwright.cad.files.manual.instructions import instructions_text, screws_in_words
 from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
+from scanwright.cad.layout.layout import layout_of
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.angles import Angles
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.products import Provenance, Servo
 
 
 @pytest.fixture(scope="module")
@@ -215,6 +217,16 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
     seat = next(joint for joint in joints if joint.onto == "lidar_body")
     assert (seat.part, seat.count) == ("sub_plate", 4)
+
+
+def test_screws_into_holes_that_are_not_verified_say_how_to_measure_them():
+    scanner = scanner_at((0, 0, 25, -20), slip_ring=None)
+    lidar = scanner.lidar.model_copy()
+    lidar._provenance = lidar.provenance() | {"holes": Provenance(source="assumed", verified=False)}
+    layout = layout_of(replace(scanner, lidar=lidar))
+    words = [screws_in_words(SimpleNamespace(layout=layout, parts={}), joint) for joint in joints_of(layout)]
+    first = [line for line in words if "Measure first" in line]
+    assert len(first) == 1 and f"no source verifies holes of {lidar.name}: press paper" in first[0]
 
 
 def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):

@@ -239,7 +239,7 @@ def test_horn_and_bearing_share_the_load_as_the_beam_equation_says(across, along
     assert shared.misaligned_nm_per_m * 1e-4 == pytest.approx(abs(off), rel=1e-2)
 
 
-@pytest.mark.parametrize("servo", ["MX-64R", "XM430-W350"])
+@pytest.mark.parametrize("servo", ["MX-64R", "MX-106"])
 @pytest.mark.parametrize("angles", [GROUND_AHEAD, ROLLING, (-90, 0, 90, 0)])
 def test_all_that_is_out_of_line_leaves_half_of_the_horns_rating(servo, angles):
     """In aluminium and in steel; and by an independent sum: every offset at once in one direction."""

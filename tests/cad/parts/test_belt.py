@@ -450,9 +450,9 @@ def test_what_else_cannot_be_built_is_refused():
     ("change", "words"),
     [
         ({"flange": None}, "bore_mm = 0 is a capsule: tell its flange and rotor"),
-        ({"length_mm": 7.0}, "below_top_mm 5 lies beyond length_mm"),
+        ({"length_mm": 2.0}, "below_top_mm 0 lies beyond length_mm"),
         ({"outer_diameter_mm": 30.0}, "circle_mm 35 puts its holes into outer_diameter_mm"),
-        ({"outer_diameter_mm": 9.0}, "rotor.diameter_mm 10 is not below"),
+        ({"outer_diameter_mm": 7.0}, "rotor.diameter_mm 7.8 is not below"),
     ],
 )
 def test_a_capsule_that_contradicts_itself_is_refused(change, words):
