@@ -90,7 +90,7 @@ def with_holes(table: Mapping[str, Any]) -> dict[str, Any]:
 
     Args:
         table: of a product file; each value a table of value, source and verified. Returned as it is if it states
-            `holes`, or not all of the old fields.
+            `holes`, or not all of the old fields. The holes are verified if their places and size are.
     """
     old = OLD_LIDAR if table.get("kind") == "lidar" else OLD_SERVO
     entries = [table.get(field) for field in old]
@@ -105,10 +105,11 @@ def with_holes(table: Mapping[str, Any]) -> dict[str, Any]:
         ear = {"kind": "through", "size": screw, "depth_mm": CASE_EAR_MM}
         holes = [*_in_face(front, front_z, "+z", **ear), *_in_face(rear, rear_z, "-z", **ear)]
     sources = dict.fromkeys(entry.get("source") for entry in entries if isinstance(entry, dict))
+    placing = [entries[old.index(field)] for field in old if field != "mount_thread_depth_mm"]
     stated = {
         "value": holes,
         "source": "; ".join(str(source) for source in sources),
-        "verified": all(entry.get("verified") is True for entry in entries if isinstance(entry, dict)),
+        "verified": all(entry.get("verified") is True for entry in placing if isinstance(entry, dict)),
     }
     return {field: entry for field, entry in table.items() if field not in old} | {"holes": stated}
 

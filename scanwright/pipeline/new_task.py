@@ -8,9 +8,8 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from scanwright.cad.layout.direct.adapter import adapter_of
-from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.layout import drive_of
+from scanwright.cad.layout.all_joints import joints_of
+from scanwright.cad.layout.layout import layout_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
@@ -125,33 +124,27 @@ def _require_strength(lidar: Lidar, servo: Servo) -> None:
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
-    """The ring that lets the cable turn on and on; None for a servo that cannot turn so.
+    """Return the ring that lets the cable turn on and on; None if the servo must sweep.
 
     Rings that are rated for the lidar's data come first, then those with a bore, which need no belt, and of those the
-    ones whose speed is known.
+    ones whose speed is known. A servo that does not read its angle all around sweeps, and so does one that no ring of
+    the catalogue can be laid out with.
 
     Raises:
-        TaskError: none can be laid out with these two.
+        TaskError: these two cannot be laid out without a ring either.
     """
-    if servo.position_feedback_deg < 360:
-        return None
-    rings = [product for product in products if isinstance(product, SlipRing)]
-    why = "the catalogue has no slip ring"
 
     def order(ring: SlipRing) -> tuple[bool, bool, bool, str]:
         return bool(data_fault(ring, lidar)), ring.bore_mm == 0, ring.max_rpm is None, ring.name
 
-    for ring in sorted(rings, key=order):
-        if ring.friction_nm is not None and ring.friction_nm[1] > servo.continuous_torque_nm:
-            gives = f"{servo.name} gives {servo.continuous_torque_nm:g}"
-            why = f"the friction of {ring.name} is up to {ring.friction_nm[1]:g} N m, {gives}"
-            continue
-        angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=ring.name)
-        scanner = scanner_of(angles, "fdm-0.4", products)
+    rings = sorted((product for product in products if isinstance(product, SlipRing)), key=order)
+    strong = [ring for ring in rings if ring.friction_nm is None or ring.friction_nm[1] <= servo.continuous_torque_nm]
+    why = ""
+    for ring in (*(strong if servo.position_feedback_deg == 360 else ()), None):
+        name = None if ring is None else ring.name
+        angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=name)
         try:
-            stack = drive_of(scanner).stack
-            if isinstance(stack, DirectStack) and stack.bearing is None:
-                adapter_of(scanner, stack)
+            joints_of(layout_of(scanner_of(angles, "fdm-0.4", products)))
         except BuildError as error:
             why = str(error)
         else:
@@ -169,9 +162,12 @@ def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
             'mode = "spin"',
             f"period_s = {answers.scan_s:g}    # one full turn is one full scan: longer is denser",
         ]
+    why = f"{servo.name} does not read its angle all around"
+    if servo.position_feedback_deg == 360:
+        why = f"no slip ring of the catalogue fits {servo.name}"
     return [
         "",
-        f"[motion]  # {servo.name} does not read its angle all around: it sweeps to and fro, and needs no slip ring",
+        f"[motion]  # {why}: it sweeps back and forth, and its cable hangs in a loop",
         'mode = "sweep"',
         "limits_deg = [-90, 90]",
         f"period_s = {answers.scan_s:g}    # out and back is one full scan: longer is denser",
