@@ -20,7 +20,7 @@ from scanwright.pipeline.wishes import SEEN
 PATIENCE_S = 60.0  # ten times what it takes on a computer that has much else to do
 PRODUCTS = load_catalogue()
 LIDARS, SERVOS = ([p.name for p in PRODUCTS if isinstance(p, kind)] for kind in (Lidar, Servo))
-DOG = ["--lidar", "UST-10LX", "--servo", "XM430-W350", "--height-m", "0.4", "--see", "ground:0.5:5", "--see", "ceiling"]
+DOG = ["--lidar", "UST-20LX", "--servo", "XM430-W350", "--height-m", "0.4", "--see", "ground:0.5:5", "--see", "ceiling"]
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_what_was_asked_for_stands_in_the_file(command, here):
     ground, ceiling = task.weight
     assert isinstance(ground, GroundRegion) and isinstance(ceiling, CeilingRegion)
     assert (ground.from_m, ground.to_m, ground.height_m, ceiling.ceiling_m) == (0.5, 5, 0.4, 2.5)
-    assert (task.sensor, task.servo, task.slip_ring) == ("UST-10LX", "XM430-W350", None)
+    assert (task.sensor, task.servo, task.slip_ring) == ("UST-20LX", "XM430-W350", None)
     assert "no slip ring of the catalogue fits XM430-W350: it sweeps back and forth" in text
     again = next(line for line in text.splitlines() if line.startswith("# Made by: ")).removeprefix("# Made by: ")
     (here / "FILE.toml").unlink()
