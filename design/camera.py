@@ -35,18 +35,18 @@ class Camera(Record):
     """One camera and its images.
 
     The camera is fixed to `frame`: `world` is the robot, `rot` turns with the servo, `laser` is the lidar.
-    `rotvec_deg` turns that frame's axes into the camera's (axis times angle); 0 looks along z with x to the right.
+    `rotvec_deg` rotates that frame's axes to those of the camera (axis times angle): 0 looks along z, x right.
     """
 
-    model: Literal["pinhole", "fisheye"] = Field(default="pinhole", description="of its lens")
+    model: Literal["pinhole", "fisheye"] = Field(default="pinhole", description="model of its lens")
     size_px: tuple[Pixels, Pixels] = Field(description="width, height")
     focal_px: tuple[Focal, Focal] = Field(description="fx, fy")
     centre_px: tuple[float, float] = Field(description="cx, cy")
     distortion: tuple[float, ...] = Field(default=(), description="pinhole: k1 k2 p1 p2 [k3]; fisheye: k1 k2 k3 k4")
-    frame: Literal["world", "rot", "laser"] = Field(description="what it is fixed to: robot, linkage or lidar")
-    position_mm: tuple[float, float, float] = Field(description="of its optical centre in that frame")
-    rotvec_deg: tuple[float, float, float] = Field(description="turns that frame's axes into the camera's")
-    images: str = Field(description="an image, or a CSV of them: file, and time_ns or joint_deg; beside the task file")
+    frame: Literal["world", "rot", "laser"] = Field(description="frame that it is fixed to: robot, linkage or lidar")
+    position_mm: tuple[float, float, float] = Field(description="its optical centre in that frame")
+    rotvec_deg: tuple[float, float, float] = Field(description="rotates that frame's axes to those of the camera")
+    images: str = Field(description="an image, or a CSV of them: file, and time_ns or joint_deg; next to the task file")
 
     @model_validator(mode="after")
     def _has_its_coefficients(self) -> Camera:

@@ -8,19 +8,18 @@
      +-- RecordingError        recording: unreadable, or without the data that is required      (ValueError)
      +-- SceneError            mesh: unreadable, or without a surface that a beam can hit       (ValueError)
      +-- InstallError          an extra of the package or a system library is not installed     (ImportError)
-     +-- DeviceError           a device is absent or did not do what was requested
+     +-- DeviceError           a device is absent or did not do what was requested; exit code 3
           +-- DeviceTimeoutError  it did not answer in time                                     (TimeoutError)
           +-- ProtocolError    its answer is not a valid packet
           +-- DeviceFaultError it is overloaded, too hot, blocked, or its supply failed
           +-- ServoSetupError  its settings must change first (`firmware_io.servo.fitness`, with the list)
           +-- UnsafeError      it did not confirm that it stopped: it may still turn or emit light
 
-A command prints the message and exits with 2; any other exception is a bug and prints its traceback. The message is
-one line, or one line for each fault of a file: file, line, field, value, bound and a suggestion, as far as they apply.
-
-Messages name fields in Python form, `min_range_m = 9: at most 5`. The command line prints fields that are options of
-the running command as options, `--min-range-m`. It recognises a field by an underscore, at the start of the message
-before ":" or " = ", or in backquotes: "pole = 'x': three numbers", "name `angles` or `poses`".
+A command prints the message and exits with the code of its kind, 2 if none is named; any other exception is a bug and
+prints its traceback. The message is one line, or one line for each fault of a file: file, line, field, value, bound
+and a suggestion, as far as they apply.
+It names fields in Python form: `min_range_m = 9: at most 5`. The command line prints those that are its options as
+options. It recognises a field by an underscore, before ":" or " = " at the start, or in backquotes.
 """
 
 from __future__ import annotations

@@ -34,6 +34,11 @@ class Finding:
     hint: str = ""
 
 
+def sentence(finding: Finding) -> str:
+    """Return message and hint as one line."""
+    return f"{finding.message}: {finding.hint}" if finding.hint else finding.message
+
+
 def errors_in(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return the findings of severity `error`."""
     return tuple(finding for finding in findings if finding.severity == "error")

@@ -36,7 +36,7 @@ class Shortest(Record):
 
     mode: Literal["shortest"] = Field(default="shortest", description="spin, as fast as the limits allow")
     longest_s: float = Field(
-        default=60.0, strict=True, ge=SHORTEST_S, le=LONGEST_S, description="beyond which it gives up"
+        default=60.0, strict=True, ge=SHORTEST_S, le=LONGEST_S, description="longest period of the search"
     )
 
     @property
@@ -50,11 +50,11 @@ class Sweep(Record):
 
     mode: Literal["sweep"] = Field(default="sweep", description="back and forth between two angles")
     limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]] = Field(
-        description="the two ends, from where the index marks meet"
+        description="its two ends; 0 is where the index marks meet"
     )
     period_s: float = Field(strict=True, ge=SHORTEST_S, le=LONGEST_S, description="time out and back")
-    profile: Literal["trapezoid"] = Field(default="trapezoid", description="speed up, cruise, brake")
-    accel_deg_s2: float = Field(default=720.0, strict=True, gt=0, description="while it speeds up and brakes")
+    profile: Literal["trapezoid"] = Field(default="trapezoid", description="accelerate, cruise, brake")
+    accel_deg_s2: float = Field(default=720.0, strict=True, gt=0, description="of acceleration and braking")
 
     @model_validator(mode="after")
     def _can_be_done(self) -> Sweep:
@@ -116,7 +116,7 @@ class Sweep(Record):
 class StopAndGo(Record):
     """Stop at evenly spaced angles of a full turn to measure: no de-skew needed."""
 
-    mode: Literal["stop_and_go"] = Field(default="stop_and_go", description="stand still while the lidar measures")
+    mode: Literal["stop_and_go"] = Field(default="stop_and_go", description="stop while the lidar measures")
     stops: int = Field(strict=True, ge=1, le=100_000, description="in one full turn")
     dwell_s: float = Field(strict=True, ge=SHORTEST_S, le=LONGEST_S, description="time of measuring at each stop")
     move_s: float = Field(

@@ -55,7 +55,7 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
-autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Floats", "Mask", "Say", "Times")}
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Floats", "Mask", "Times")}
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 
@@ -86,6 +86,15 @@ def describe_commands(app: Any) -> None:
     folder = Path(app.srcdir) / "reference/cli"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "commands.md").write_text("\n".join(page))
+
+
+def describe_checks(app: Any) -> None:
+    """Write the page of all checks from their table."""
+    from scanwright.cad.checks.table import table_page
+
+    folder = Path(app.srcdir) / "reference/checks"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "table.md").write_text(table_page(), encoding="utf-8")
 
 
 def describe_files(app: Any) -> None:
@@ -142,6 +151,7 @@ def setup(app: Any) -> None:
         import_module(heavy)  # once: Sphinx forks its readers
     app.connect("source-read", name_rooms)
     app.connect("builder-inited", describe_commands)
+    app.connect("builder-inited", describe_checks)
     app.connect("builder-inited", describe_files)
     app.connect("autodoc-process-docstring", named_in_full)
     app.connect("autodoc-process-docstring", drawn_as_typed, priority=400)  # before napoleon's 500

@@ -1,4 +1,4 @@
-"""A serial port, opened for one program alone, without touching what its control lines say."""
+"""A serial port, opened exclusively; its control lines stay as they are."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from serial.tools.list_ports import comports
 
 from scanwright.design.errors import DeviceError
 
-_WRITE_S = 10.0  # only a port that nobody serves any more takes longer; a busy computer can take seconds
+_WRITE_S = 10.0  # only a dead port takes longer; a busy computer can take seconds
 _ADAPTERS = Path("/sys/bus/usb-serial/devices")
 
 
@@ -26,9 +26,10 @@ class _UntouchedLines(serial.Serial):  # type: ignore[misc]
 
 
 def open_serial_port(port: str, baud: int, read_timeout_s: float | None = None) -> serial.Serial:
-    """Open a port, which nobody else can open meanwhile.
+    """Open a port, exclusively.
 
-    DTR and RTS are left as they are. (Linux itself raises them where it opens a port that nobody had open.)
+    DTR and RTS are left as they are, also when the port is closed: by default the system would drop DTR then, which
+    starts the motor of an RPLIDAR A1. (Linux itself raises them when it opens a port that no program had open.)
 
     Args:
         port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a re-plug.
@@ -39,13 +40,21 @@ def open_serial_port(port: str, baud: int, read_timeout_s: float | None = None) 
         DeviceError: no such port, it is in use, or may not be opened.
     """
     try:
-        return _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=_WRITE_S)
+        opened = _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=_WRITE_S)
+        _keep_lines_on_close(opened.fileno())
+        return opened
     except (OSError, ValueError) as error:  # pyserial's own are OSErrors
         raise DeviceError(_why_not_opened(port, error)) from error
 
 
+def _keep_lines_on_close(fd: int) -> None:
+    modes = termios.tcgetattr(fd)
+    modes[2] &= ~termios.HUPCL
+    termios.tcsetattr(fd, termios.TCSANOW, modes)
+
+
 def latency_timer(port: str) -> Path | None:
-    """The file with the time [ms] for which a USB adapter gathers bytes; None for ports that have no such timer."""
+    """Return the file with the time [ms] for which a USB adapter gathers bytes; None for a port without one."""
     file = _ADAPTERS / Path(port).resolve().name / "latency_timer"
     return file if file.is_file() else None
 

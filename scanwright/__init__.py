@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from scanwright.api import write_cloud as write_cloud
     from scanwright.api.devices import Scanned as Scanned
     from scanwright.cad.assembly.assembly import Assembly as Assembly
-    from scanwright.cad.checks.check import Check as Check
     from scanwright.design.angles import AngleSet as AngleSet
     from scanwright.design.errors import BuildError as BuildError
     from scanwright.design.errors import DeviceError as DeviceError
@@ -56,10 +55,14 @@ if TYPE_CHECKING:
     from scanwright.design.errors import UnsafeError as UnsafeError
     from scanwright.design.evaluation.comparison import ComparisonRow as ComparisonRow
     from scanwright.design.evaluation.evaluation import Evaluation as Evaluation
+    from scanwright.design.evaluation.evaluation import Lever as Lever
+    from scanwright.design.evaluation.poles import Pole as Pole
+    from scanwright.design.findings import Finding as Finding
     from scanwright.design.search.optimum import Optimum as Optimum
     from scanwright.design.task.task import LoadedTask as LoadedTask
     from scanwright.design.task.task import Task as Task
     from scanwright.firmware_io.assembly.assemble import AssembleSummary as AssembleSummary
+    from scanwright.firmware_io.assembly.options import AssembleOptions as AssembleOptions
     from scanwright.firmware_io.calibration.calibrate import Calibration as Calibration
     from scanwright.firmware_io.clouds.cloud import Cloud as Cloud
     from scanwright.firmware_io.lidar.lidar import LidarDriver as LidarDriver
@@ -72,103 +75,42 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.servo.servo import ServoDriver as ServoDriver
     from scanwright.pipeline.build import Build as Build
 
-_TYPES = {
-    "Scanned": "scanwright.api.devices",
-    "Assembly": "scanwright.cad.assembly.assembly",
-    "Check": "scanwright.cad.checks.check",
-    "AngleSet": "scanwright.design.angles",
-    "BuildError": "scanwright.design.errors",
-    "DeviceError": "scanwright.design.errors",
-    "DeviceFaultError": "scanwright.design.errors",
-    "DeviceTimeoutError": "scanwright.design.errors",
-    "InstallError": "scanwright.design.errors",
-    "MissingFileError": "scanwright.design.errors",
-    "NumericalError": "scanwright.design.errors",
-    "ProtocolError": "scanwright.design.errors",
-    "RecordingError": "scanwright.design.errors",
-    "ScanwrightError": "scanwright.design.errors",
-    "SceneError": "scanwright.design.errors",
-    "TaskError": "scanwright.design.errors",
-    "UnsafeError": "scanwright.design.errors",
-    "ComparisonRow": "scanwright.design.evaluation.comparison",
-    "Evaluation": "scanwright.design.evaluation.evaluation",
-    "Optimum": "scanwright.design.search.optimum",
-    "LoadedTask": "scanwright.design.task.task",
-    "Task": "scanwright.design.task.task",
-    "AssembleSummary": "scanwright.firmware_io.assembly.assemble",
-    "Calibration": "scanwright.firmware_io.calibration.calibrate",
-    "Cloud": "scanwright.firmware_io.clouds.cloud",
-    "LidarDriver": "scanwright.firmware_io.lidar.lidar",
-    "MapSummary": "scanwright.firmware_io.mapping.map_files",
-    "RecordingArrays": "scanwright.firmware_io.recording.arrays",
-    "ImportSummary": "scanwright.firmware_io.recording.importer",
-    "Recording": "scanwright.firmware_io.recording.recording",
-    "RegisteredFiles": "scanwright.firmware_io.registration.register_files",
-    "ServoSetupError": "scanwright.firmware_io.servo.fitness",
-    "ServoDriver": "scanwright.firmware_io.servo.servo",
-    "Build": "scanwright.pipeline.build",
+_MODULES = {
+    "scanwright.api.devices": "Scanned",
+    "scanwright.cad.assembly.assembly": "Assembly",
+    "scanwright.design.angles": "AngleSet",
+    "scanwright.design.errors": (
+        "BuildError DeviceError DeviceFaultError DeviceTimeoutError InstallError MissingFileError "
+        "NumericalError ProtocolError RecordingError ScanwrightError SceneError TaskError UnsafeError"
+    ),
+    "scanwright.design.evaluation.comparison": "ComparisonRow",
+    "scanwright.design.evaluation.evaluation": "Evaluation Lever",
+    "scanwright.design.evaluation.poles": "Pole",
+    "scanwright.design.findings": "Finding",
+    "scanwright.design.search.optimum": "Optimum",
+    "scanwright.design.task.task": "LoadedTask Task",
+    "scanwright.firmware_io.assembly.assemble": "AssembleSummary",
+    "scanwright.firmware_io.assembly.options": "AssembleOptions",
+    "scanwright.firmware_io.calibration.calibrate": "Calibration",
+    "scanwright.firmware_io.clouds.cloud": "Cloud",
+    "scanwright.firmware_io.lidar.lidar": "LidarDriver",
+    "scanwright.firmware_io.mapping.map_files": "MapSummary",
+    "scanwright.firmware_io.recording.arrays": "RecordingArrays",
+    "scanwright.firmware_io.recording.importer": "ImportSummary",
+    "scanwright.firmware_io.recording.recording": "Recording",
+    "scanwright.firmware_io.registration.register_files": "RegisteredFiles",
+    "scanwright.firmware_io.servo.fitness": "ServoSetupError",
+    "scanwright.firmware_io.servo.servo": "ServoDriver",
+    "scanwright.pipeline.build": "Build",
 }
-"""The module of each public type."""
-
-__all__ = [
-    "AngleSet",
-    "AssembleSummary",
-    "Assembly",
-    "Build",
-    "BuildError",
-    "Calibration",
-    "Check",
-    "Cloud",
-    "ComparisonRow",
-    "DeviceError",
-    "DeviceFaultError",
-    "DeviceTimeoutError",
-    "Evaluation",
-    "ImportSummary",
-    "InstallError",
-    "LidarDriver",
-    "LoadedTask",
-    "MapSummary",
-    "MissingFileError",
-    "NumericalError",
-    "Optimum",
-    "ProtocolError",
-    "Recording",
-    "RecordingArrays",
-    "RecordingError",
-    "RegisteredFiles",
-    "Scanned",
-    "ScanwrightError",
-    "SceneError",
-    "ServoDriver",
-    "ServoSetupError",
-    "Task",
-    "TaskError",
-    "UnsafeError",
-    "__version__",
-    "assemble",
-    "build",
-    "calibrate",
-    "check",
-    "compare",
-    "draw_density",
-    "evaluate",
-    "import_bag",
-    "load_angles",
-    "load_task",
-    "make_map",
-    "make_parts",
-    "open_lidar",
-    "open_recording",
-    "open_servo",
-    "optimise",
-    "read_cloud",
-    "register",
-    "scan",
-    "set_up_servo",
-    "simulate",
-    "write_cloud",
-]
+"""Module -> public types in it."""
+_TYPES = {name: module for module, names in _MODULES.items() for name in names.split()}
+_FUNCTIONS = (
+    "assemble build calibrate check compare draw_density evaluate import_bag load_angles load_task make_map "
+    "make_parts open_lidar open_recording open_servo optimise read_cloud register scan set_up_servo simulate "
+    "write_cloud"
+)
+__all__ = sorted([*_TYPES, *_FUNCTIONS.split(), "__version__"])
 
 if not Path(__file__).with_name("design").is_dir():
     raise ImportError("scanwright/design is no folder: clone with symbolic links (git clone -c core.symlinks=true)")

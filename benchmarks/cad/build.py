@@ -57,11 +57,11 @@ def on_one_core(task: str, folder: Path) -> None:
     from scanwright.design.task.task import load_task
     from scanwright.pipeline.build import build_task
 
-    build_task(load_task(task), folder / task, say)
-    say("")
+    build_task(load_task(task), folder / task, progress)
+    progress("")
 
 
-def say(line: str) -> None:
+def progress(line: str, _fraction: float | None = None, /) -> None:
     """A line of progress, with the seconds before it."""
     print(time.process_time(), line)
 

@@ -25,8 +25,8 @@ import numpy as np
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies, rotor_of
-from scanwright.cad.checks.deflection import LEAST_ERROR
-from scanwright.cad.checks.mount import carried
+from scanwright.cad.checks.loads.deflection import LEAST_ERROR
+from scanwright.cad.checks.loads.mount import carried
 from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
 from scanwright.cad.parts.base_mount import FOOT_RADIUS

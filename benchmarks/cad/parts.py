@@ -31,7 +31,6 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies
 from scanwright.cad.assembly.print_settings import slicer_settings
-from scanwright.cad.checks.check import Check
 from scanwright.cad.checks.run import run_checks
 from scanwright.cad.files.threemf import threemf_bytes
 from scanwright.cad.geometry.inertia import of_solid
@@ -39,6 +38,8 @@ from scanwright.cad.geometry.print_pose import on_bed
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import BuildError
+from scanwright.design.findings import Finding
+from scanwright.design.progress import no_progress
 from scanwright.design.scanner import Scanner, scanner_of
 
 Products = tuple[str, str, str]
@@ -128,14 +129,14 @@ def _made(combinations: tuple[Products, ...], numbered: tuple[int, Scanner]) -> 
     setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
     try:
         assembly = make_parts(scanner)
-        checks, _ = run_checks(scanner, assembly, lambda _: None)
+        checks, _ = run_checks(scanner, assembly, no_progress)
     except BuildError as error:
         return Made(which, setting, refused=str(error))
     values = _values(scanner, assembly, checks) | {"processor_s": time.process_time() - start}
     if (number // len(combinations)) % SLICED == 0 and shutil.which(slicer.PROGRAM):
         values |= _sliced(scanner, assembly)
-    failed = tuple((check.kind, check.message) for check in checks if check.severity == "error")
-    warned = frozenset(check.kind for check in checks if check.severity == "warning")
+    failed = tuple((check.code, check.message) for check in checks if check.severity == "error")
+    warned = frozenset(check.code for check in checks if check.severity == "warning")
     return Made(which, setting, values=values, failed=failed, warned=warned)
 
 
@@ -157,7 +158,7 @@ def scanners_of(combinations: tuple[Products, ...], count: int) -> Iterator[Scan
         yield scanner_of(angles, "fdm-0.4", catalogue)
 
 
-def _values(scanner: Scanner, assembly: Assembly, checks: list[Check]) -> dict[str, float]:
+def _values(scanner: Scanner, assembly: Assembly, checks: list[Finding]) -> dict[str, float]:
     """What the parts of one scanner come to, and the worst of its checks of each kind."""
     density = scanner.printer.density_g_cm3
     printed = {
@@ -166,13 +167,13 @@ def _values(scanner: Scanner, assembly: Assembly, checks: list[Check]) -> dict[s
         if not assembly.parts[name].metal
     }
     found = {
-        kind: worst(check.value for check in checks if check.kind == kind and check.value is not None)
+        kind: worst(check.value for check in checks if check.code == kind and check.value is not None)
         for kind, worst in WORST.items()
-        if any(check.kind == kind and check.value is not None for check in checks)
+        if any(check.code == kind and check.value is not None for check in checks)
     }
     # how much of what the horn may bear it does bear
     horn = [
-        check.value / check.limit for check in checks if check.kind == "tilt_moment" and check.value and check.limit
+        check.value / check.limit for check in checks if check.code == "tilt_moment" and check.value and check.limit
     ]
     return {
         "h_mm": assembly.layout.stack.h,

@@ -29,11 +29,13 @@ from scanwright.design.catalogue.products import Multibeam
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.comparison import compare, ready_made
 from scanwright.design.evaluation.comparison_table import notes, table
-from scanwright.design.evaluation.evaluation import evaluate
+from scanwright.design.evaluation.evaluation import Lever, evaluate
 from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.evaluation.poles import Pole
 from scanwright.design.motion import Shortest
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
@@ -105,9 +107,8 @@ def _shadow(drawn: RandomTask) -> SelfOcclusion | None:
 
 
 def _evaluate(drawn: RandomTask, _: Path) -> None:
-    found = evaluate(
-        drawn.loaded, drawn.angles_rad, "20,1000,5", "5,-3,1.0" if drawn.beams.all() else None, _quiet, _shadow(drawn)
-    )
+    lever = Lever(5, -3, 1.0) if drawn.beams.all() else None
+    found = evaluate(drawn.loaded, drawn.angles_rad, Pole(0.02, 1.0, 5.0), lever, no_progress, _shadow(drawn))
     "\n".join(found.lines())
     json.dumps({"angles_deg": drawn.angles_deg, **found.facts()})
     found.beam_directions()
@@ -165,10 +166,6 @@ def _studio(drawn: RandomTask, _: Path) -> None:
     scale_html(highest)
     density_colours(judge.problem, setting.angles_rad, hexagons().directions, highest)
     edges(judge.problem.field)
-
-
-def _quiet(_: str) -> None:
-    """Ignore progress."""
 
 
 def main() -> None:

@@ -39,7 +39,7 @@ from scanwright.firmware_io.clouds.ply import PlyWriter
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import RecordingWriter
 from scanwright.firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
-from scanwright.trials.axis import ways_between
+from scanwright.trials.axis import interpolations
 
 ROUNDS = 7
 PROGRAM_ROUNDS = 2
@@ -147,7 +147,7 @@ def orders() -> None:
     print("\n4. the axis between encoder samples: 20 deg/s, 4096 steps a turn, 100 samples/s, 1 % ripple, 36 s")
     log = joint_log(36.0, 100.0)
     after_ns = np.linspace(0, log.time_ns[-1] - log.time_ns[0], 400_000).astype(np.int64)
-    for way, prepare in ways_between(log).items():
+    for way, prepare in interpolations(log).items():
         start = time.perf_counter()
         curve = prepare()
         ready = time.perf_counter()

@@ -210,11 +210,12 @@ Eight tasks from eight worlds. Left the scanner that was built, right one full s
 noise of the data sheet included; the red ball is the scanner, larger than it is. All of this page is made by
 `python -m benchmarks.scanwright.gallery`: tasks, parts, scans, pictures and figures.
 
-**Do not print the parts with a slip ring of Senring yet.** The real ring UH1256 is longer than the one of the catalogue,
-and its leads are thicker. `build` prints a warning for each such product, `scanwright catalogue NAME` has the reasons.
-Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real devices have
-no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and scans do not depend on
-the holes.
+**Do not print the parts with a slip ring of Senring yet.** The real UH1256 is longer than that of the catalogue, and
+its leads are thicker. `build` prints a warning for each such product, `scanwright catalogue NAME` has the reasons.
+Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real devices
+have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and scans do not
+depend on the holes.
+"""
 
 
 def made(entry: Entry) -> None:
@@ -225,7 +226,7 @@ def made(entry: Entry) -> None:
         task.unlink(missing_ok=True)
         words = ["new", entry.name, *shlex.split(entry.words), "-o", str(task)]
         subprocess.run([sys.executable, "-m", "scanwright", *words], check=True, capture_output=True)
-    if failed := sw.build(task, OUT, say=print).failed:
+    if failed := sw.build(task, OUT, progress=print).failed:
         sys.exit(f"{entry.name}: {failed[0].message}")
 
 

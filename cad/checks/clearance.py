@@ -1,9 +1,9 @@
-"""That nothing meets anything, in any position of the servo. Millimetres.
+"""Distance of turning and fixed bodies at every axis angle, and overlap of bodies that move together. Millimetres.
 
-A turning body and a standing one meet at some axis angle if and only if their images (r, z) in the half plane about
+A turning body and a fixed one meet at some axis angle if and only if their images (r, z) in the half plane about
 the axis overlap, and the distance of the images is the least distance over a whole turn: no stepping. The image of a
-triangle is drawn by its horizontal chords, so that it is right within CHORD. Bodies that move together are intersected
-as solids.
+triangle is drawn by its horizontal chords, so that it is right within CHORD_MM. Bodies that move together are
+intersected as solids.
 """
 
 from __future__ import annotations
@@ -15,19 +15,21 @@ import numpy as np
 import shapely
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.checks.check import Check, at_least, at_most
+from scanwright.cad.checks.limits import at_least, at_most
+from scanwright.cad.checks.table import CLEARANCE_MM, OVERLAP_MM3
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.design.arrays import Array
+from scanwright.design.findings import Finding
+from scanwright.design.scene import ray_caster
 
-CHORD = 0.01  # error of an image's edges
+CHORD_MM = 0.01  # error of an image's edges: a fortieth of the clearance
 LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
-CLEARANCE = 0.4  # between what turns and what stands still
-FAR = 5.0  # distances beyond it are not worked out
-SHARED_MM3 = 0.05  # of two bodies that touch: the noise of their meshes
+RAY = np.array([0.5377, 0.3021, math.sqrt(1 - 0.5377**2 - 0.3021**2)])  # along no edge of any part
+FAR_MM = 5.0  # distances beyond it are not computed: twelve times the clearance
 
 
-def clearance_checks(assembly: Assembly) -> list[Check]:
-    """Room between turning and standing bodies over a whole turn, and no room shared by bodies that move together."""
+def clearance_checks(assembly: Assembly) -> list[Finding]:
+    """Return both checks of an assembly."""
     meet = {frozenset({name, body.meets}) for name, body in assembly.bodies.items() if body.meets}
     turning = assembly.turning()
     return [turning_check(assembly.outlines(), turning, meet), together_check(assembly.meshes(), turning)]
@@ -35,8 +37,8 @@ def clearance_checks(assembly: Assembly) -> list[Check]:
 
 def turning_check(
     meshes: Mapping[str, TriMesh], turning: Container[str], meet: Container[frozenset[str]] = frozenset()
-) -> Check:
-    """Room between turning and standing bodies over a whole turn.
+) -> Finding:
+    """Check the least distance of turning and fixed bodies over a full turn.
 
     Args:
         meshes: of all bodies by name, as they look while they turn.
@@ -47,21 +49,21 @@ def turning_check(
     sides = {turns: [rings[name] for name in rings if (name in turning) == turns] for turns in (True, False)}
     boxes = {turns: shapely.total_bounds(np.concatenate([[], *side])) for turns, side in sides.items()}
     images = {name: _near(image, boxes[name not in turning]) for name, image in rings.items()}
-    nearest, where = FAR, "everything that turns"
+    nearest, subject = FAR_MM, "everything that turns"
     for rotor in sorted(name for name in meshes if name in turning):
         for stator in sorted(name for name in meshes if name not in turning):
             if frozenset({stator, rotor}) in meet:
                 continue
-            inside = _holds(meshes[rotor], meshes[stator]) or _holds(meshes[stator], meshes[rotor])
+            inside = _contains(meshes[rotor], meshes[stator]) or _contains(meshes[stator], meshes[rotor])
             distance = 0.0 if inside else _distance(images[rotor], images[stator])
             if distance < nearest:
-                nearest, where = distance, f"{rotor} and {stator}"
-    return at_least("clearance", nearest, CLEARANCE, "mm", where, "least distance over a whole turn")
+                nearest, subject = distance, f"{rotor} and {stator}"
+    return at_least("clearance", nearest, CLEARANCE_MM, "mm", subject, "least distance over a full turn")
 
 
-def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Check:
-    """No room shared by bodies that move together; arguments as for `turning_check`."""
-    most, where = 0.0, "parts that move together"
+def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Finding:
+    """Check the overlap of bodies that move together; arguments as for `turning_check`."""
+    most, subject = 0.0, "parts that move together"
     bodies = {name: mesh.manifold() for name, mesh in meshes.items()}
     names = sorted(meshes)
     for i, one in enumerate(names):
@@ -70,27 +72,27 @@ def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Ch
                 continue
             volume = float((bodies[one] ^ bodies[other]).volume())
             if volume > most:
-                most, where = volume, f"{one} and {other}"
-    return at_most("interference", most, SHARED_MM3, "mm3", where, "room that two parts share")
+                most, subject = volume, f"{one} and {other}"
+    return at_most("interference", most, OVERLAP_MM3, "mm3", subject, "overlap of two parts")
 
 
 def _distance(one: Array, other: Array) -> float:
-    """Least distance of two sets of shapes in the half plane, FAR where it is more."""
+    """Return the least distance of two sets of shapes in the half plane, at most FAR_MM."""
     if len(one) == 0 or len(other) == 0:
-        return FAR
+        return FAR_MM
     low, high = shapely.total_bounds(one), shapely.total_bounds(other)
     gap = np.maximum(0.0, np.maximum(low[:2] - high[2:], high[:2] - low[2:]))
-    if float(np.hypot(*gap)) >= FAR:
-        return FAR
+    if float(np.hypot(*gap)) >= FAR_MM:
+        return FAR_MM
     tree = shapely.STRtree(other)
-    _, distances = tree.query_nearest(one, max_distance=FAR, return_distance=True, all_matches=False)
-    return float(distances.min(initial=FAR))
+    _, distances = tree.query_nearest(one, max_distance=FAR_MM, return_distance=True, all_matches=False)
+    return float(distances.min(initial=FAR_MM))
 
 
 def _near(rings: Array, box: Array) -> Array:
-    """The shapes within FAR of a box (4,), for nothing farther off can be the nearest: mending all takes long."""
+    """Return the shapes within FAR_MM of a box (4,), repaired; to repair the others too takes long."""
     bounds = shapely.bounds(rings)
-    near = ((bounds[:, :2] < box[2:] + FAR) & (bounds[:, 2:] > box[:2] - FAR)).all(axis=1)
+    near = ((bounds[:, :2] < box[2:] + FAR_MM) & (bounds[:, 2:] > box[:2] - FAR_MM)).all(axis=1)
     return np.asarray(shapely.make_valid(shapely.polygons(rings[near])))
 
 
@@ -100,7 +102,7 @@ def _image(mesh: TriMesh) -> Array:
     radius = np.hypot(corners[:, :, 0], corners[:, :, 1])
     across = np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1)
     # the chord of an arc of radius r and length s is off by s^2 / 8 r; r of the nearest corner, seldom of the inside
-    wanted = 1.0 + across / np.sqrt(8 * CHORD * np.maximum(radius.min(axis=1) - across / 2, 0.5))
+    wanted = 1.0 + across / np.sqrt(8 * CHORD_MM * np.maximum(radius.min(axis=1) - across / 2, 0.5))
     shapes: list[Array] = []
     for few, many in zip((0, *LEVELS), LEVELS, strict=False):
         chosen = (wanted > few) & ((wanted <= many) | (many == LEVELS[-1]))
@@ -154,22 +156,14 @@ def _flat(corners: Array, levels: int) -> tuple[Array, ...]:
     return tuple(np.repeat(values[:, None], levels, axis=1) for values in (near, far, corners[:, 0, 2]))
 
 
-def _holds(outer: TriMesh, inner: TriMesh) -> bool:
-    """Whether a corner of `inner` lies in `outer`: crossings of one ray, counted."""
+def _contains(outer: TriMesh, inner: TriMesh) -> bool:
+    """Return whether a corner of `inner` is in `outer`: the first face that a ray from it meets is seen from inside."""
     point = inner.vertices[0]
-    low, high = outer.vertices.min(axis=0), outer.vertices.max(axis=0)
-    if not ((point > low) & (point < high)).all():
+    if not ((point > outer.vertices.min(axis=0)) & (point < outer.vertices.max(axis=0))).all():
         return False
-    a, b, c = (outer.vertices[outer.faces[:, i]] for i in range(3))
-    ray = np.array([0.5377, 0.3021, math.sqrt(1 - 0.5377**2 - 0.3021**2)])  # along no edge of any part
-    p = np.cross(ray, c - a)
-    det = np.einsum("ij,ij->i", b - a, p)
-    safe = np.where(np.abs(det) > 1e-12, det, 1.0)
-    u = np.einsum("ij,ij->i", point - a, p) / safe
-    q = np.cross(point - a, b - a)
-    v, t = q @ ray / safe, np.einsum("ij,ij->i", c - a, q) / safe
-    crossed = (np.abs(det) > 1e-12) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
-    return bool(crossed.sum() % 2)
+    scene = ray_caster.build_scene(outer.vertices[outer.faces] / 1000)
+    (face,) = ray_caster.cast(scene, point / 1000, RAY[None]).triangle
+    return bool(face >= 0 and scene.normals[face] @ RAY > 0)
 
 
 def _apart(one: TriMesh, other: TriMesh) -> bool:

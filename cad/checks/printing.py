@@ -1,8 +1,8 @@
-"""Whether each printed part can be printed as it lies on the bed. Millimetres.
+"""Bed, support, walls and holes of each printed part in its print pose. Millimetres.
 
-A wall is measured from points all over the surface straight through to the other side, and counts where the other side
-is parallel: a wedge thins to nothing at its edge on every sharp corner, and prints. A thin spot is a flaw; where they
-make up more than THIN_SHARE of the surface, the part is not what was meant. The message tells the thinnest spot.
+Walls are measured from points on the surface along the normal to the other side, and counted if the other side is
+parallel: every sharp corner is a wedge that thins to nothing, and prints. A thin spot is a warning; thin walls on more
+than THIN_SHARE of the surface are an error. The message names the thinnest spot.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from dataclasses import dataclass, replace
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.checks.check import Check, at_least, at_most, note, spot, tidy
 from scanwright.cad.checks.islands import islands_check
+from scanwright.cad.checks.limits import at_least, at_most, note, spot, tidy
+from scanwright.cad.checks.table import SMALLEST_HOLE_MM, THIN_SHARE
 from scanwright.cad.geometry.holes import Round, rounds_of
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import PrintPose
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
+from scanwright.design.findings import Finding
 from scanwright.design.scene import ray_caster
 
-POINTS = 6000  # per part
-THIN_SHARE = 0.01
-PARALLEL = math.cos(math.radians(15.0))
-SAME_MM = 0.02  # between two thicknesses
-BESIDE = 2.0  # from a thin spot to a hole that is named with it
-SMALLEST_HOLE = 1.5  # diameter; smaller ones close
+POINTS = 6000  # per part: one for 2 to 8 mm2 of the parts of the shipped tasks
+PARALLEL_COS = math.cos(math.radians(15.0))  # a wedge below 15 deg prints as a wall
+SAME_MM = 0.02  # between two thicknesses: a twentieth of a nozzle
+NEAR_HOLE_MM = 2.0  # from a thin spot to a hole that is named with it
 
 
 def printing_checks(
     printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, TriMesh], poses: Mapping[str, PrintPose]
-) -> list[Check]:
-    """Bed, support, walls and holes of every printed part, as it lies on the bed in its pose."""
+) -> list[Finding]:
+    """Check every printed part in its print pose."""
     checks = []
     for name, solid in printed.items():
         pose = poses[name]
@@ -45,7 +45,7 @@ def printing_checks(
         checks.append(_walls(name, meshes[name], printer, holes))
         if holes:
             smallest = min(hole.diameter for hole in holes)
-            checks.append(at_least("smallest_hole", smallest, SMALLEST_HOLE, "mm", name, "smallest hole"))
+            checks.append(at_least("smallest_hole", smallest, SMALLEST_HOLE_MM, "mm", name, "smallest hole"))
     return checks
 
 
@@ -56,8 +56,8 @@ class ThinWalls:
     Attributes:
         area_mm2: of both of their sides.
         surface_mm2: of the whole part.
-        thinnest_mm: least thickness; inf where no wall is thin.
-        at: middle of the wall there, shape (3,); NaN where no wall is thin.
+        thinnest_mm: least thickness; inf if no wall is thin.
+        at: middle of the wall there, shape (3,); NaN if no wall is thin.
     """
 
     area_mm2: float
@@ -67,12 +67,12 @@ class ThinWalls:
 
 
 def thin_walls(mesh: TriMesh, least_mm: float) -> ThinWalls:
-    """Measure the walls of a part; of places of one thickness, the one nearest to their middle is told."""
+    """Measure the walls of a part; of places of one thickness, return the one nearest to their middle."""
     points, normals, area = _surface(mesh)
     solid = ray_caster.build_scene(mesh.vertices[mesh.faces] / 1000)
     inside = 1e-6  # m, below the surface
     hits = ray_caster.cast(solid, points / 1000 - inside * normals, -normals)
-    parallel = (hits.triangle >= 0) & (np.einsum("ij,ij->i", solid.normals[hits.triangle], normals) < -PARALLEL)
+    parallel = (hits.triangle >= 0) & (np.einsum("ij,ij->i", solid.normals[hits.triangle], normals) < -PARALLEL_COS)
     thickness = 1000 * (hits.range_m + inside)
     thin = parallel & (thickness < least_mm)
     if not thin.any():
@@ -84,34 +84,34 @@ def thin_walls(mesh: TriMesh, least_mm: float) -> ThinWalls:
     return ThinWalls(area * int(thin.sum()) / POINTS, area, thinnest, middles[int(np.argmin(away))])
 
 
-def _walls(name: str, mesh: TriMesh, printer: Printer, holes: list[Round]) -> Check:
+def _walls(name: str, mesh: TriMesh, printer: Printer, holes: list[Round]) -> Finding:
     walls = thin_walls(mesh, printer.min_wall_mm)
     what = f"walls thinner than {printer.min_wall_mm:g} mm"
     check = at_most("wall", walls.area_mm2, THIN_SHARE * walls.surface_mm2, "mm2", name, what)
     if walls.area_mm2 == 0:
         return check
     hole = min(holes, key=lambda hole: _distance(hole, walls.at), default=None)
-    beside = f", beside a hole of {hole.diameter:.4g} mm" if hole and _distance(hole, walls.at) < BESIDE else ""
-    message = f"{check.message}; the thinnest, {walls.thinnest_mm:.2f} mm, {spot(walls.at)}{beside}"
-    return replace(check, severity="warning" if check.severity == "pass" else check.severity, message=message)
+    near = f", near a hole of {hole.diameter:.4g} mm" if hole and _distance(hole, walls.at) < NEAR_HOLE_MM else ""
+    message = f"{check.message}; the thinnest, {walls.thinnest_mm:.2f} mm, {spot(walls.at)}{near}"
+    return replace(check, severity="warning" if check.severity == "ok" else check.severity, message=message)
 
 
 def _distance(hole: Round, point: Array) -> float:
-    """From a point to the wall of a hole."""
+    """Return the distance of a point from the wall of a hole."""
     low, along = np.array(hole.low), np.array(hole.direction)
     height = float((point - low) @ along)
     aside = float(np.linalg.norm(point - low - height * along)) - hole.diameter / 2
     return math.hypot(aside, max(0.0, -height, height - hole.length))
 
 
-def _bed(name: str, pose: PrintPose, printer: Printer) -> Check:
+def _bed(name: str, pose: PrintPose, printer: Printer) -> Finding:
     worst = max(range(3), key=lambda i: pose.size_mm[i] / printer.bed_mm[i])
     size = " x ".join(f"{edge:.0f}" for edge in pose.size_mm)
     return at_most("bed", tidy(pose.size_mm[worst]), printer.bed_mm[worst], "mm", name, f"{size} mm on {printer.name}")
 
 
 def _surface(mesh: TriMesh) -> tuple[Array, Array, float]:
-    """Points spread over the surface by area, their normals, and the whole area: the same ones every time."""
+    """Return points spread over the surface by area, their normals, and the area: the same points in every run."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)
     doubled = np.linalg.norm(cross, axis=1)

@@ -45,7 +45,7 @@ def drawing_of(
     mass_g: float,
     config_hash: str,
 ) -> Sheet:
-    """The sheet of one part."""
+    """Return the sheet of one part."""
     spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
     part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, joints_of(assembly.layout))
@@ -70,12 +70,12 @@ def drawing_of(
 
 
 def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:
-    """The number of a made part: configuration and place in the assembly."""
+    """Return the number of a made part: configuration and place in the assembly."""
     return f"{config_hash}-{list(assembly.made).index(part) + 1}"
 
 
 def _making(process: Process, printer: Printer, part: Part) -> list[str]:
-    """How faces get their sizes, and what the model holds already."""
+    """Return the notes on finish and on what the model contains."""
     if process != "printed":
         threads = ", threads countersunk to their diameter" if part.patterns else ""
         finish = "Ra 3.2, faces with a fit Ra 0.8" if part.fits else "Ra 3.2"
@@ -87,24 +87,24 @@ def _making(process: Process, printer: Printer, part: Part) -> list[str]:
 
 
 def _clearances(printer: Printer) -> str:
-    """What the model holds already."""
+    """Return the clearances that the model contains."""
     return (
         f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
         f"fits {number(printer.fit_clearance_mm)} on the diameter."
     )
 
 
-def _notes(scanner: Scanner, part: Part, said: OnSheet, how: str, making: list[str]) -> list[str]:
+def _notes(scanner: Scanner, part: Part, on_sheet: OnSheet, how: str, making: list[str]) -> list[str]:
     angles = scanner.angles.angles_deg
     box = part.solid.BoundingBox()
     axis, zero = "rotation axis", "Z 0 is"
-    if any(said.axis):
-        axis, zero = "axis of the servo's horn", "Their zero is X {}, Y {}, Z".format(*map(number, said.axis))
+    if any(on_sheet.axis):
+        axis, zero = "axis of the servo's horn", "Their zero is X {}, Y {}, Z".format(*map(number, on_sheet.axis))
     notes = [
         f"Millimetres. Ordinates run from the {axis} (X, Y) and the lowest point (Z), azimuths from +Y.",
         f"{zero} {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
         f"Envelope {number(box.xlen)} x {number(box.ylen)} x {number(box.zlen)} along X, Y, Z.",
-        *said.notes,
+        *on_sheet.notes,
         *(f"Ø{number(fit.diameter)} {fit.tolerance}: {fit.why}, {how}." for fit in part.fits),
         *making,
     ]

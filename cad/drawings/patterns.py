@@ -1,4 +1,4 @@
-"""Holes that belong together, and what a drawing says of them. Millimetres, rotation frame."""
+"""Holes that belong together, and their call-outs. Millimetres, rotation frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scanwright.cad.geometry.holes import Round, triple
 from scanwright.cad.layout.joints import Joint
 from scanwright.design.arrays import Array
 
-IN_LINE = 0.01  # mm between the axes of two holes, or of a hole and its screw
+IN_LINE_MM = 0.01  # between the axes of two holes, or of a hole and its screw
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Pattern:
         return np.array([hole.low for hole in self.holes]).mean(axis=0)
 
     def words(self) -> str:
-        """The call-out."""
+        """Return the call-out."""
         hole = self.holes[0]
         depth = "THRU" if hole.through else f"x {number(hole.length)} DEEP"
         circle = f" ON Ø{number(self.circle)}" if self.circle else ""
@@ -55,18 +55,18 @@ class Pattern:
 
 
 def number(value: float) -> str:
-    """A length or an angle as drawings write it: two decimals at most, no trailing zeros."""
+    """Return a length or an angle with two decimals at most and no trailing zeros."""
     text = f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
 def counted(count: int) -> str:
-    """How often, where it is more than once, before the words for one."""
+    """Return the count before a call-out if it is more than one."""
     return f"{count}x " if count > 1 else ""
 
 
 def patterns_of(rounds: list[Round]) -> list[Pattern]:
-    """Holes grouped by diameter, direction and height; those about the rotation axis left out."""
+    """Return the holes off the rotation axis, grouped by diameter, direction and height."""
     groups: dict[tuple[float, ...], list[Round]] = {}
     for hole in _drilled([item for item in rounds if item.hole and not on_axis(item)]):
         direction = np.array(hole.direction)
@@ -77,8 +77,8 @@ def patterns_of(rounds: list[Round]) -> list[Pattern]:
 
 
 def slots_of(joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
-    """The slots of a part's joints, which hold no thread; `moved` is what the part was moved by."""
-    found = []
+    """Return the slots of a part's joints; `moved` is what the part was moved by."""
+    slots = []
     for joint in joints:
         if joint.slot_mm is None:
             continue
@@ -88,12 +88,12 @@ def slots_of(joints: Sequence[Joint], moved: tuple[float, float, float]) -> list
             start, along = np.array(axis.start) + moved, np.array(axis.along)
             ends = [triple(end) for end in (start, start + joint.grip_mm * along)]
             rounds.append(Round(width, triple(along), ends[0], ends[1], True, True))
-        found.append(Pattern(tuple(rounds), 0.0, slot=length))
-    return found
+        slots.append(Pattern(tuple(rounds), 0.0, slot=length))
+    return slots
 
 
 def _drilled(holes: list[Round]) -> list[Round]:
-    """Those of one diameter in line, one of them open at both ends, as what one drill makes: a slot may part them."""
+    """Join holes of one diameter in line, one of them open at both ends: one drill makes them, a slot may part them."""
     out: list[Round] = []
     for hole in holes:
         for i, other in enumerate(out):
@@ -109,22 +109,22 @@ def _drilled(holes: list[Round]) -> list[Round]:
 
 
 def with_threads(patterns: list[Pattern], joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
-    """The same patterns, those that hold the screws of some joints with their thread, insert or nut.
+    """Add thread, insert or nut to the patterns that hold screws of joints.
 
     Args:
         patterns: of a part.
         joints: whose threads it holds, rotation frame.
         moved: what the part was moved by.
     """
-    held: list[Pattern] = []
+    threaded: list[Pattern] = []
     for pattern in patterns:
         joint = next((joint for joint in joints if all(_of(hole, joint, moved) for hole in pattern.holes)), None)
-        held.append(pattern if joint is None else replace(pattern, holds=_thread(joint)))
-    return held
+        threaded.append(pattern if joint is None else replace(pattern, holds=_thread(joint)))
+    return threaded
 
 
 def _of(hole: Round, joint: Joint, moved: tuple[float, float, float]) -> bool:
-    """Whether one of a joint's screws sits in a hole of a part that was moved."""
+    """Return whether one of a joint's screws is in a hole of a part that was moved."""
     return any(_on_line(hole, np.array(axis.start) + moved, np.array(axis.along)) for axis in joint.axes)
 
 
@@ -138,7 +138,7 @@ def _thread(joint: Joint) -> str:
 
 
 def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
-    """Patterns of screw holes take in the wider holes in line with them."""
+    """Join wider holes to the screw holes in line with them, as recesses of heads."""
     out: list[Pattern] = []
     for pattern in patterns:  # by diameter, smallest first
         carrier = next((one for one in out if all(_on_one(hole, one) for hole in pattern.holes)), None)
@@ -162,18 +162,18 @@ def _in_line(hole: Round, other: Round) -> bool:
 
 
 def _on_line(hole: Round, point: Array, along: Array) -> bool:
-    """Whether a hole lies about the line through a point along a unit vector."""
+    """Return whether a hole lies about the line through a point along a unit vector."""
     aside = np.array(hole.low) - point
-    return bool(abs(along @ hole.direction) > 1 - 1e-5 and np.linalg.norm(aside - (aside @ along) * along) < IN_LINE)
+    return bool(abs(along @ hole.direction) > 1 - 1e-5 and np.linalg.norm(aside - (aside @ along) * along) < IN_LINE_MM)
 
 
 def on_axis(item: Round) -> bool:
-    """Whether a cylinder lies about the rotation axis."""
+    """Return whether a cylinder lies about the rotation axis."""
     return abs(item.direction[2]) > 1 - 1e-6 and math.hypot(item.low[0], item.low[1]) < 1e-3
 
 
 def along_pattern(pattern: Pattern, towards: Array) -> Array:
-    """The direction of the nearest two holes: a rectangle then lies straight."""
+    """Return the direction of the nearest two holes, so that a rectangle is level."""
     points = [np.array(hole.low) for hole in pattern.holes]
     pairs = [(a, b) for i, a in enumerate(points) for b in points[i + 1 :]]
     a, b = min(pairs, key=lambda pair: round(float(np.linalg.norm(pair[1] - pair[0])), 3))
@@ -197,5 +197,5 @@ def _circle(holes: list[Round]) -> float:
     second = np.cross(holes[0].direction, first)
     turns = np.sort(np.arctan2(arms @ second, arms @ first))
     steps = np.diff([*turns, turns[0] + 2 * math.pi])
-    # four on a square are told by their sides
+    # four on a square get ordinates
     return float(2 * radii.mean()) if np.ptp(steps) < 1e-3 and len(holes) != 4 else 0.0

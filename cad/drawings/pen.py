@@ -26,14 +26,14 @@ ANCHORS = {
 }
 CAPITAL = 0.72  # height of capitals and figures over the size of the font (Helvetica)
 GLYPH_WIDTH = 0.6 / CAPITAL  # of the height, on average: what room a text needs
-TEXT = 2.5
-ARROW = (2.2, 0.35)  # length and half width
-TURN = 2 * math.pi
+TEXT_MM = 2.5  # height of letters, one of ISO 3098-1
+ARROW_MM = (2.2, 0.35)  # length and half width
+TURN_RAD = 2 * math.pi
 ORDINATE_X, ORDINATE_Y, DIAMETER, ANGLE = 32 + 64 + 6, 32 + 6, 32 + 128 + 3, 32 + 128 + 5  # kinds of DIMENSION
 
 
 def document_at(scale: float) -> Drawing:
-    """An empty DXF R2010 whose views are full size and whose lines, texts and arrows grow by 1 / scale."""
+    """Return an empty DXF R2010 whose views are full size and whose lines, texts and arrows grow by 1 / scale."""
     document = new("R2010", units=MM)
     document.header["$LTSCALE"] = 1 / scale
     for layer, width in WIDTHS.items():
@@ -42,7 +42,7 @@ def document_at(scale: float) -> Drawing:
             lengths = [length * (-1) ** i for i, length in enumerate(DASHES[layer])]
             document.linetypes.add(layer, pattern=[sum(DASHES[layer]), *lengths])
         document.layers.add(layer, color=COLOURS[layer], linetype=linetype, lineweight=round(width * 100))
-    sizes = {"dimscale": 1 / scale, "dimtxt": TEXT, "dimasz": ARROW[0], "dimexo": 1.5}
+    sizes = {"dimscale": 1 / scale, "dimtxt": TEXT_MM, "dimasz": ARROW_MM[0], "dimexo": 1.5}
     document.dimstyles.new("SHEET", dxfattribs={**sizes, "dimdec": 2, "dimadec": 2, "dimzin": 8, "dimazin": 2})
     return document
 
@@ -64,16 +64,16 @@ class Pen:
     reached: list[Point] = field(default_factory=list)
 
     def box(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right and top of what was drawn, about the origin."""
+        """Return left, bottom, right and top of what was drawn, about the origin."""
         xs, ys = zip(*self.reached, strict=True)
         return min(xs), min(ys), max(xs), max(ys)
 
     def paper(self, point: Point) -> Point:
-        """Where a point of the model is, both about the origin."""
+        """Return a point of the model on the paper, both about the origin."""
         return point[0] * self.scale, point[1] * self.scale
 
     def stroke(self, layer: Layer, points: Sequence[Point]) -> None:
-        """Straight pieces through points."""
+        """Draw straight pieces through points."""
         self.reached.extend(points)
         if self.space is None:
             return
@@ -83,20 +83,20 @@ class Pen:
         else:
             self.space.add_lwpolyline(placed, dxfattribs={"layer": layer})
 
-    def arc(self, layer: Layer, centre: Point, radius: float, start: float = 0.0, end: float = TURN) -> None:
-        """Part of a circle, counter-clockwise from start to end [rad]."""
+    def arc(self, layer: Layer, centre: Point, radius: float, start: float = 0.0, end: float = TURN_RAD) -> None:
+        """Draw part of a circle, counter-clockwise from start to end [rad]."""
         turns = [start + (end - start) * k / 16 for k in range(17)]
         self.reached.extend(_polar(centre, radius, turn) for turn in turns)
         if self.space is None:
             return
         placed, size = self._model(centre), radius / self.scale
-        if end - start > TURN - 1e-6:
+        if end - start > TURN_RAD - 1e-6:
             self.space.add_circle(placed, size, dxfattribs={"layer": layer})
         else:
             self.space.add_arc(placed, size, math.degrees(start), math.degrees(end), dxfattribs={"layer": layer})
 
-    def text(self, at: Point, words: str, height: float = TEXT, anchor: str = "left", angle: float = 0.0) -> None:
-        """One line; `at` is its left end, middle or right end on the base line; angle in degrees."""
+    def text(self, at: Point, words: str, height: float = TEXT_MM, anchor: str = "left", angle: float = 0.0) -> None:
+        """Write one line; `at` is its left end, middle or right end on the base line; angle in degrees."""
         align, share = ANCHORS[anchor]
         width = width_of(words, height)
         c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
@@ -108,8 +108,8 @@ class Pen:
             self.space.add_text(written, dxfattribs=attributes).set_placement(self._model(at), align=align)
 
     def head(self, tip: Point, angle: float) -> None:
-        """A filled arrow head that points along an angle [rad]."""
-        (length, half), (c, s) = ARROW, (math.cos(angle), math.sin(angle))
+        """Draw a filled arrow head that points along an angle [rad]."""
+        (length, half), (c, s) = ARROW_MM, (math.cos(angle), math.sin(angle))
         back = tip[0] - length * c, tip[1] - length * s
         corners = (tip, (back[0] - half * s, back[1] + half * c), (back[0] + half * s, back[1] - half * c))
         self.reached.extend(corners)
@@ -117,9 +117,9 @@ class Pen:
             self.space.add_solid([self._model(corner) for corner in corners], dxfattribs={"layer": "DIMENSION"})
 
     def dimension(self, kind: int, words: str, text_at: Point, **points: Point) -> Pen:
-        """A DIMENSION entity; its picture is drawn with the pen returned.
+        """Add a DIMENSION entity and return the pen that draws its picture.
 
-        ezdxf draws one too, but centres texts by the fonts of the machine, and knows neither boxes nor bent leaders.
+        ezdxf can draw one too, but centres texts by the fonts of the machine, without boxes and bent leaders.
 
         Args:
             kind: ORDINATE_X, ORDINATE_Y, DIAMETER or ANGLE.
@@ -141,8 +141,8 @@ class Pen:
         return round(x, 6), round(y, 6)
 
 
-def width_of(words: str, height: float = TEXT) -> float:
-    """Room that a text takes, roughly."""
+def width_of(words: str, height: float = TEXT_MM) -> float:
+    """Return the approximate width of a text."""
     return len(words) * height * GLYPH_WIDTH
 
 

@@ -1,8 +1,8 @@
-"""Lines of a solid as seen from one side, hidden ones marked: straight lines, arcs, and chains of points for the rest.
+"""Lines of a solid seen from one side, hidden ones marked: straight lines, arcs, and chains of points for the rest.
 
 The kernel's hidden-line removal takes seconds where edges lie exactly behind one another and hundredths where they do
-not (measured: 8.6 s and 0.1 s), so the view is turned by SKEW; what then lies twice within TOLERANCE is drawn once, and
-nothing hidden is drawn under something visible. Millimetres.
+not (measured: 8.6 s and 0.1 s), so the view is turned by SKEW_RAD; lines that then coincide within TOLERANCE_MM are
+drawn once, and no hidden line is drawn under a visible one. Millimetres.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from OCP.TopoDS import TopoDS_Shape
 
 from scanwright.design.arrays import Array
 
-SKEW = (1.0e-4, 0.6e-4)  # rad, about the two axes of the view
-TOLERANCE = 0.03  # mm
-SAMPLES = 49  # of a curved edge: the chords of a circle seen aslant, 100 mm across on paper, stay within 0.1 mm
-SHORTEST = 0.05
+SKEW_RAD = (1.0e-4, 0.6e-4)  # rad, about the two axes of the view
+TOLERANCE_MM = 0.03  # between lines that are drawn once: a quarter of the thinnest line
+SAMPLES = 49  # of a curved edge: the chords of a circle seen tilted, 100 mm across on paper, stay within 0.1 mm
+SHORTEST_MM = 0.05  # line that is drawn: shorter than half a line is wide
 
 Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """A piece of a circle, counter-clockwise; angles in rad, a whole turn for a circle."""
+    """A piece of a circle, counter-clockwise; angles in rad, a full turn for a circle."""
 
     centre: tuple[float, float]
     radius: float
@@ -54,18 +54,18 @@ Curve = Arc | Chain
 
 
 def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
-    """The lines of a solid in the plane of a view, in a fixed order.
+    """Return the lines of a solid in the plane of a view, in a fixed order.
 
     Args:
         solid: what is drawn.
         right: unit vector that points to the right of the view.
         up: unit vector that points up in it; the viewer is at right x up.
         zero: point that the plane has its zero at.
-        hidden: whether hidden lines are wanted.
+        hidden: whether to include hidden lines.
     """
     towards = np.cross(right, up)
     middle = np.array(solid.BoundingBox().center.toTuple())
-    skewed = towards + SKEW[0] * right + SKEW[1] * up
+    skewed = towards + SKEW_RAD[0] * right + SKEW_RAD[1] * up
     algorithm = HLRBRep_Algo()
     algorithm.Add(solid.wrapped)
     axes = gp_Ax2(gp_Pnt(*middle.tolist()), gp_Dir(*skewed.tolist()), gp_Dir(*right.tolist()))
@@ -84,7 +84,7 @@ def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bo
 
 
 def _edges(compound: TopoDS_Shape | None) -> Iterator[Array]:
-    """Points along every edge: the ends of a straight one, shape (2, 2), of others shape (SAMPLES, 2)."""
+    """Yield points along every edge: the ends of a straight one, shape (2, 2), of others shape (SAMPLES, 2)."""
     if compound is None or compound.IsNull():
         return
     BRepLib.BuildCurves3d_s(compound)
@@ -101,7 +101,7 @@ def _drawn_once(pieces: list[tuple[Array, bool]]) -> list[Curve]:
     arcs: list[tuple[Array, float, Span, bool]] = []
     chains: list[Chain] = []
     for points, hidden in pieces:
-        if float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < SHORTEST:
+        if float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < SHORTEST_MM:
             continue
         if _is_straight(points):
             lines.append((points[[0, -1]], hidden))
@@ -118,21 +118,21 @@ def _drawn_once(pieces: list[tuple[Array, bool]]) -> list[Curve]:
 def _is_straight(points: Array) -> bool:
     along = points[-1] - points[0]
     length = float(np.linalg.norm(along))
-    if length < SHORTEST / 2:
+    if length < SHORTEST_MM / 2:
         return False
     aside = (points - points[0]) @ np.array([-along[1], along[0]]) / length
-    return bool(np.abs(aside).max() < TOLERANCE / 10)
+    return bool(np.abs(aside).max() < TOLERANCE_MM / 10)
 
 
 def _circle(points: Array) -> tuple[Array, float, Span] | None:
-    """Centre, radius and angles of the circle through points; None where they lie on none."""
+    """Return centre, radius and angles of the circle through points; None if there is none."""
     system = np.column_stack([2 * points, np.ones(len(points))])
     middle = points.mean(axis=0)
     solved, *_ = np.linalg.lstsq(system - [*(2 * middle), 0.0], ((points - middle) ** 2).sum(axis=1), rcond=None)
     centre = solved[:2] + middle
     radii = np.linalg.norm(points - centre, axis=1)
     radius = float(radii.mean())
-    if radius > 1000 or np.abs(radii - radius).max() > TOLERANCE / 3:
+    if radius > 1000 or np.abs(radii - radius).max() > TOLERANCE_MM / 3:
         return None
     turns = np.unwrap(np.arctan2(*(points - centre).T[::-1]))
     low, high = sorted((float(turns[0]), float(turns[-1])))
@@ -140,7 +140,7 @@ def _circle(points: Array) -> tuple[Array, float, Span] | None:
 
 
 def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
-    """Lines that lie on one another become one, the visible part first."""
+    """Join lines that lie on one another, the visible part first."""
     order = sorted(pieces, key=lambda piece: -round(float(np.linalg.norm(piece[0][1] - piece[0][0])), 3))
     starts, alongs = np.zeros((len(order), 2)), np.zeros((len(order), 2))
     groups: list[tuple[list[Span], list[Span]]] = []
@@ -148,7 +148,7 @@ def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
         n = len(groups)
         across = np.stack([-alongs[:n, 1], alongs[:n, 0]], axis=1)
         off = [np.abs(np.einsum("ij,ij->i", end - starts[:n], across)) for end in ends]
-        same = np.flatnonzero(np.maximum(*off) < TOLERANCE).tolist() if n else []
+        same = np.flatnonzero(np.maximum(*off) < TOLERANCE_MM).tolist() if n else []
         if same:
             i = same[0]
         else:
@@ -162,12 +162,12 @@ def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
     for start, along, spans in zip(starts, alongs, groups, strict=False):
         for hidden, shown in _shown(*spans):
             for low, high in shown:
-                if high - low > SHORTEST:
+                if high - low > SHORTEST_MM:
                     yield Chain((_point(start + low * along), _point(start + high * along)), hidden)
 
 
 def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
-    """The same for circles."""
+    """Join arcs of one circle in the same way."""
     groups: list[tuple[Array, float, tuple[list[Span], list[Span]]]] = []
     for centre, radius, (low, high), hidden in sorted(pieces, key=lambda piece: (*np.round(piece[0], 2), piece[1])):
         alike = (i for i, (other, size, _) in enumerate(groups) if _alike(other - centre, size - radius))
@@ -179,12 +179,12 @@ def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
     for centre, radius, spans in groups:
         for hidden, shown in _shown(*spans):
             for low, high in _closed(shown):
-                if (high - low) * radius > SHORTEST:
+                if (high - low) * radius > SHORTEST_MM:
                     yield Arc(_point(centre), round(radius, 3), round(low, 5) + 0.0, round(high, 5) + 0.0, hidden)
 
 
 def _alike(shift: Array, growth: float) -> bool:
-    return abs(growth) < TOLERANCE and float(np.abs(shift).max()) < TOLERANCE
+    return abs(growth) < TOLERANCE_MM and float(np.abs(shift).max()) < TOLERANCE_MM
 
 
 def _within_turn(low: float, high: float) -> list[Span]:
@@ -195,14 +195,14 @@ def _within_turn(low: float, high: float) -> list[Span]:
 
 
 def _closed(spans: list[Span]) -> list[Span]:
-    """Spans of a circle, those that meet at angle zero joined."""
+    """Join the spans of a circle that meet at angle zero."""
     if len(spans) > 1 and spans[0][0] < 1e-3 and spans[-1][1] > 2 * math.pi - 1e-3:
         return [*spans[1:-1], (spans[-1][0], spans[0][1] + 2 * math.pi)]
     return spans
 
 
 def _shown(seen: list[Span], behind: list[Span]) -> tuple[tuple[bool, list[Span]], ...]:
-    """Whether hidden, and what is drawn so: of what lies behind only what nothing seen covers."""
+    """Return the visible spans, and the hidden ones that no visible one covers."""
     seen = _union(seen)
     return (False, seen), (True, _minus(_union(behind), seen))
 
@@ -210,16 +210,16 @@ def _shown(seen: list[Span], behind: list[Span]) -> tuple[tuple[bool, list[Span]
 def _union(spans: Iterable[Span]) -> list[Span]:
     joined: list[Span] = []
     for low, high in sorted(spans):
-        if joined and low <= joined[-1][1] + TOLERANCE:
+        if joined and low <= joined[-1][1] + TOLERANCE_MM:
             joined[-1] = joined[-1][0], max(joined[-1][1], high)
         else:
             joined.append((low, high))
     return joined
 
 
-def _minus(spans: list[Span], taken: list[Span]) -> list[Span]:
-    for low, high in taken:
-        low, high = low - TOLERANCE, high + TOLERANCE
+def _minus(spans: list[Span], covered: list[Span]) -> list[Span]:
+    for low, high in covered:
+        low, high = low - TOLERANCE_MM, high + TOLERANCE_MM
         spans = [
             piece
             for start, end in spans

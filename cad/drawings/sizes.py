@@ -1,4 +1,4 @@
-"""What a view says of a part's sizes, and the view drawn with it."""
+"""Dimensions of a view, and the view drawn with them."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from scanwright.cad.drawings.dimensions import (
 )
 from scanwright.cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
 from scanwright.cad.drawings.patterns import Pattern, number
-from scanwright.cad.drawings.pen import TEXT, Layer, Pen, Point
+from scanwright.cad.drawings.pen import TEXT_MM, Layer, Pen, Point
 from scanwright.cad.drawings.project import Arc, Curve
 from scanwright.cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
-NEARLY = 0.2  # an extent that differs less from a radius is that radius, notched
-OVER = 3.0  # of a centre line beyond the part
-MARK = 4.0  # length of the thick ends of a cut
-LETTER = 5.0  # room for the letter beside them
-CAPITALS = 3.5  # its height
-CENTRE_GAP = 3.0  # between the optical centre and its name
+NEARLY_MM = 0.2  # an extent that differs less from a radius is that radius, notched
+OVER_MM = 3.0  # of a centre line beyond the part
+MARK_MM = 4.0  # length of the thick ends of a cut
+LETTER_MM = 5.0  # space for the letter next to them
+CAPITALS_MM = 3.5  # its height
+CENTRE_GAP_MM = 3.0  # between the optical centre and its name
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Sizes:
     Attributes:
         box: left, bottom, right and top of its lines.
         below: horizontal positions, and the height of what lies there.
-        beside: vertical positions, and where what lies there is.
+        heights: vertical positions, and the place of what lies there across them.
         callouts: diameters, holes and slots.
         holes: what gets a cross: middle and half of its size.
         circles: that holes lie on: middle and radius.
@@ -47,14 +47,14 @@ class Sizes:
 
     box: tuple[float, float, float, float]
     below: dict[float, float]
-    beside: dict[float, float]
+    heights: dict[float, float]
     callouts: list[Callout]
     holes: list[tuple[Point, float]]
     circles: list[tuple[Point, float]]
 
 
 def sizes_of(view: View, part: Part) -> Sizes:
-    """Of the holes and slots that the view looks along; in front and top view also those of the whole part."""
+    """Return the sizes of holes and slots along the view; in front and top view also those of the entire part."""
     measure = Pen(None, 1.0)
     _outline(measure, view)
     sizes = Sizes(measure.box(), {}, {}, [], [], [])
@@ -64,40 +64,40 @@ def sizes_of(view: View, part: Part) -> Sizes:
             _cylinders(sizes, part)
         _faces(sizes, view, part)
         left, low, _, _ = sizes.box
-        for values, edge in ((sizes.below, low), (sizes.beside, left)):
+        for values, edge in ((sizes.below, low), (sizes.heights, left)):
             if values:
                 values.setdefault(0.0, 0.0 if view.kind == "onto" else edge)
     return sizes
 
 
 def draw(pen: Pen, view: View, sizes: Sizes, part: Part) -> None:
-    """One view with its dimensions, about its origin."""
+    """Draw one view with its dimensions, about its origin."""
     left, low, right, high = (c * pen.scale for c in sizes.box)
     pen.reached.extend(((left, low), (right, high)))
     if pen.space is not None:
         _outline(pen, view)
         for line in view.hatching:
             pen.stroke("DIMENSION", [pen.paper(point) for point in line])
-    aside = OVER + MARK + LETTER if view.kind == "top" and part.fits else 0.0  # beside the marks of the cut
-    # past the axis, which stands free where the part is at its side
-    beyond = max(right, 0.0 if view.kind == "onto" else OVER) + aside
+    aside = OVER_MM + MARK_MM + LETTER_MM if view.kind == "top" and part.fits else 0.0  # for the marks of the cut
+    # past the axis, which is free if the part is at its side
+    beyond = max(right, 0.0 if view.kind == "onto" else OVER_MM) + aside
     if view.kind != "iso":
         _centre_lines(pen, view, part, (left, low, right, high))
         if view.kind == "top" and part.fits:
             leaders = [[tip, bend] for _, tip, bend in leaders_right(sizes.callouts, beyond, pen.scale)]
-            at_left = [[(left - aside, y * pen.scale), (left, y * pen.scale)] for y in sizes.beside]
-            _cut_marks(pen, left - OVER, right + OVER, [*leaders, *at_left])
+            at_left = [[(left - aside, y * pen.scale), (left, y * pen.scale)] for y in sizes.heights]
+            _cut_marks(pen, left - OVER_MM, right + OVER_MM, [*leaders, *at_left])
     for middle, radius in sizes.circles:
         pen.arc("CENTRE", pen.paper(middle), radius * pen.scale)
     for middle, radius in sizes.holes:
         centre_mark(pen, pen.paper(middle), radius * pen.scale)
     sign = -1.0 if view.kind == "left" else 1.0  # it looks along the axis that points to the left
     ordinates(pen, sizes.below, low, below=True, sign=sign)
-    ordinates(pen, sizes.beside, left - aside, below=False)
+    ordinates(pen, sizes.heights, left - aside, below=False)
     callouts_right(pen, sizes.callouts, beyond)
-    told = [p for p in part.patterns if len(p.holes) >= 3 and shows_angle(view, p)]
-    if told and view.kind in ("front", "left", "angle"):
-        _angle(pen, view, told[0], part, high + OVER)
+    angled = [p for p in part.patterns if len(p.holes) >= 3 and shows_angle(view, p)]
+    if angled and view.kind in ("front", "left", "angle"):
+        _angle(pen, view, angled[0], part, high + OVER_MM)
     if view.title:
         pen.text(((left + right) / 2, pen.box()[3] + 2.5), view.title, anchor="middle")
 
@@ -112,28 +112,28 @@ def _outline(pen: Pen, view: View) -> None:
 
 
 def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, float, float]) -> None:
-    """The rotation axis and, where the lidar sits, the optical centre."""
+    """Draw the rotation axis and, if the part carries the lidar, the optical centre."""
     left, low, right, high = box
     if parallel(view.up, Z) and view.kind != "onto":
-        top = high + OVER
+        top = high + OVER_MM
         if part.lidar_axis is not None:
             x, y = pen.paper(view.flat((0.0, 0.0, 0.0)))
-            top = max(top, y + OVER)
+            top = max(top, y + OVER_MM)
             pen.arc("DIMENSION", (x, y), 1.5)
             centre_mark(pen, (x, y), 1.5)
             if view.kind != "left":
                 _name_centre(pen, view, (x, y))
-        pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, top)))
+        pen.stroke("CENTRE", ((0.0, low - OVER_MM), (0.0, top)))
     elif parallel(view.towards, Z):
-        pen.stroke("CENTRE", ((0.0, low - OVER), (0.0, high + OVER)))
-        pen.stroke("CENTRE", ((left - OVER, 0.0), (right + OVER, 0.0)))
+        pen.stroke("CENTRE", ((0.0, low - OVER_MM), (0.0, high + OVER_MM)))
+        pen.stroke("CENTRE", ((left - OVER_MM, 0.0), (right + OVER_MM, 0.0)))
 
 
 def _name_centre(pen: Pen, view: View, at: Point) -> None:
-    """The words at the optical centre, at the first side of it where no line of the part is struck."""
-    words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP
-    below = y - 1.0 - TEXT
-    choices = [((x - CENTRE_GAP, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP, below), "right")]
+    """Write the name at the optical centre, at the first side of it where it meets no line of the part."""
+    words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP_MM
+    below = y - 1.0 - TEXT_MM
+    choices = [((x - CENTRE_GAP_MM, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP_MM, below), "right")]
     lines = [[pen.paper(point) for point in _points(curve)] for curve in view.curves]
     free = (c for c in choices if not any(meets(line, text_box(c[0], words, anchor=c[1])) for line in lines))
     place, anchor = next(free, choices[0])
@@ -141,7 +141,7 @@ def _name_centre(pen: Pen, view: View, at: Point) -> None:
 
 
 def _points(curve: Curve) -> list[Point]:
-    """Points that a curve of a view passes."""
+    """Return points that a curve of a view passes."""
     if not isinstance(curve, Arc):
         return list(curve.points)
     (x, y), radius = curve.centre, curve.radius
@@ -149,25 +149,25 @@ def _points(curve: Curve) -> list[Point]:
     return [(x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns]
 
 
-def _cut_marks(pen: Pen, left: float, right: float, taken: list[list[Point]]) -> None:
-    """Where the section is cut: thick ends, arrows along which one looks, and its letter where no line is `taken`."""
+def _cut_marks(pen: Pen, left: float, right: float, lines: list[list[Point]]) -> None:
+    """Mark the section: thick ends, arrows along the line of sight, and its letter where no line is."""
     for x, out in ((left, -1.0), (right, 1.0)):
-        end = x + out * MARK
+        end = x + out * MARK_MM
         pen.stroke("FRAME", ((x, 0.0), (end, 0.0)))
-        pen.stroke("DIMENSION", ((end, -2 * MARK), (end, 0.0)))
+        pen.stroke("DIMENSION", ((end, -2 * MARK_MM), (end, 0.0)))
         pen.head((end, 0.0), 0.5 * math.pi)
         choices = [
-            ((end + out * 1.5, -2 * MARK), "left" if out > 0 else "right"),
-            ((end, -2 * MARK - CAPITALS - 1.5), "middle"),
+            ((end + out * 1.5, -2 * MARK_MM), "left" if out > 0 else "right"),
+            ((end, -2 * MARK_MM - CAPITALS_MM - 1.5), "middle"),
             ((end, 1.5), "middle"),
         ]
         free = (
             choice
             for choice in choices
-            if not any(meets(line, text_box(choice[0], "S", CAPITALS, choice[1])) for line in taken)
+            if not any(meets(line, text_box(choice[0], "S", CAPITALS_MM, choice[1])) for line in lines)
         )
         place, anchor = next(free, choices[0])
-        pen.text(place, "S", height=CAPITALS, anchor=anchor)
+        pen.text(place, "S", height=CAPITALS_MM, anchor=anchor)
 
 
 def _holes(sizes: Sizes, view: View, part: Part) -> None:
@@ -189,17 +189,17 @@ def _holes(sizes: Sizes, view: View, part: Part) -> None:
 
 
 def _crossed(sizes: Sizes, middles: list[Point], half: float, *, placed: bool) -> Point:
-    """Mark holes, with their positions or without; the last one, which gets the call-out."""
+    """Mark holes, with their positions or without; return the last one, which gets the call-out."""
     for x, y in middles:
         sizes.holes.append(((x, y), half))
         if placed:
             sizes.below[_key(x)] = min(y, sizes.below.get(_key(x), math.inf))
-            sizes.beside[_key(y)] = min(x, sizes.beside.get(_key(y), math.inf))
+            sizes.heights[_key(y)] = min(x, sizes.heights.get(_key(y), math.inf))
     return max(middles, key=lambda p: (round(p[0], 2), round(p[1], 2)))
 
 
 def _cylinders(sizes: Sizes, part: Part) -> None:
-    """Diameters and ends of those about the axis, seen from the front."""
+    """Add diameters and ends of the cylinders about the axis, seen from the front."""
     for item in part.axial:
         z = (item.low[2] + item.high[2]) / 2 - part.datum
         words = f"Ø{number(item.diameter)}{part.tolerance(item)}"
@@ -207,42 +207,42 @@ def _cylinders(sizes: Sizes, part: Part) -> None:
             words += f" x {number(item.length)} DEEP"
         sizes.callouts.append(Callout((item.diameter / 2, z), words, (0.0, z)))
         for end in (item.low, item.high):
-            sizes.beside[_key(end[2] - part.datum)] = sizes.box[0]
+            sizes.heights[_key(end[2] - part.datum)] = sizes.box[0]
 
 
 def _faces(sizes: Sizes, view: View, part: Part) -> None:
-    """Positions of plane faces, and the extent."""
+    """Add positions of plane faces, and the extent."""
     left, low, _, _ = sizes.box
     if view.kind == "front":
         optical = [] if part.lidar_axis is None else [0.0]
         for z in (*planes_across(part.solid, view.up), *optical):
-            sizes.beside[_key(z - part.datum)] = left
+            sizes.heights[_key(z - part.datum)] = left
     elif view.kind in ("top", "onto"):
-        for values, way, edge in ((sizes.below, view.right, low), (sizes.beside, view.up, left)):
-            for value in planes_across(part.solid, way, SIDE_MM2):
-                values.setdefault(_key(value - float(view.origin @ way)), edge)
+        for values, axis, edge in ((sizes.below, view.right, low), (sizes.heights, view.up, left)):
+            for value in planes_across(part.solid, axis, SIDE_MM2):
+                values.setdefault(_key(value - float(view.origin @ axis)), edge)
     if view.kind in ("front", "top"):
         xs, ys = _extent(part, view)
         rim = max((item.diameter / 2 for item in part.axial if not item.hole), default=0.0)
-        known = [rim, -rim] if view.kind == "top" else []  # a diameter says it already
-        for values, ends, edge in ((sizes.beside, ys, left), (sizes.below, xs if view.kind == "top" else (), low)):
+        known = [rim, -rim] if view.kind == "top" else []  # a diameter states it already
+        for values, ends, edge in ((sizes.heights, ys, left), (sizes.below, xs if view.kind == "top" else (), low)):
             for end in ends:
-                if all(abs(end - other) > NEARLY for other in known):
+                if all(abs(end - other) > NEARLY_MM for other in known):
                     values.setdefault(_key(end), edge)
 
 
 def _slanted(view: View, pattern: Pattern, part: Part) -> Callout:
-    """Of a hole that no view looks along: where it points, and its height."""
+    """Return the call-out of a hole that no view looks along: its direction and its height."""
     hole = max(pattern.holes, key=lambda h: round(float(np.hypot(*h.high[:2])), 3))
     outer = max(hole.low, hole.high, key=lambda end: round(math.hypot(end[0], end[1]), 3))
     azimuth = azimuth_deg(np.array(outer))
-    way = "RADIAL" if abs(hole.direction[2]) < STRAIGHT else "INCLINED"
-    words = f"{pattern.words()}, {way} AT {number(azimuth)}°, Z {number(outer[2] - part.datum)}"
+    direction = "RADIAL" if abs(hole.direction[2]) < STRAIGHT else "INCLINED"
+    words = f"{pattern.words()}, {direction} AT {number(azimuth)}°, Z {number(outer[2] - part.datum)}"
     return Callout(view.flat(outer), words)
 
 
 def _extent(part: Part, view: View) -> tuple[Point, Point]:
-    """What a view shows, from left to right and from the lowest to the highest point, exact."""
+    """Return the exact extent of a view, from left to right and from the lowest to the highest point."""
     frame = np.stack([view.right, view.up, view.towards], axis=1)
     box = part.solid.moved(solids.location(frame).inverse).BoundingBox()
     x, y = float(view.origin @ view.right), float(view.origin @ view.up)
@@ -250,13 +250,13 @@ def _extent(part: Part, view: View) -> tuple[Point, Point]:
 
 
 def _seen_along(pattern: Pattern, top: View, part: Part) -> bool:
-    """Whether another view looks along the holes: from the front, from the left, or onto inclined ones."""
+    """Return whether another view looks along the holes: from the front, from the left, or onto inclined ones."""
     onto = [other.direction for other in part.patterns if has_view(other)]
     return any(parallel(pattern.direction, along) for along in (top.right, top.up, *onto))
 
 
 def _angle(pen: Pen, view: View, pattern: Pattern, part: Part, above: float) -> None:
-    """The angle between rotation axis and holes: at the optical centre where the lidar sits, else above the view."""
+    """Draw the angle between rotation axis and holes: at the optical centre if it is on the part, else above."""
     outwards = outwards_of(pattern, part)
     outwards = outwards if outwards[2] > -1e-9 else -outwards
     across, along = float(outwards @ view.right), float(outwards @ view.up)

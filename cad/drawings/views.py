@@ -46,11 +46,11 @@ class View:
 
     @property
     def towards(self) -> Array:
-        """From the part to the viewer."""
+        """Return the direction from the part to the viewer."""
         return np.cross(self.right, self.up)
 
     def flat(self, point: Array | Point3) -> Point:
-        """A point of the rotation frame in the view, model mm."""
+        """Project a point of the rotation frame onto the view, model mm."""
         away = np.asarray(point) - self.origin
         return float(away @ self.right), float(away @ self.up)
 
@@ -59,7 +59,7 @@ Point3 = tuple[float, float, float]
 
 
 def views_of(part: Part) -> list[View]:
-    """All views of a part: front, top, left, isometric, then the others."""
+    """Return all views of a part: front, top, left, isometric, then the others."""
     inclined = [pattern for pattern in part.patterns if has_view(pattern)]
     upright = [p for p in part.patterns if len(p.holes) >= 2 and parallel(p.direction, Z) and not p.slot]
     tilt = _level(outwards_of(inclined[0], part)) if inclined else np.array([1.0, 0.0, 0.0])
@@ -96,12 +96,12 @@ def views_of(part: Part) -> list[View]:
 
 
 def has_view(pattern: Pattern) -> bool:
-    """Whether a view looks at this pattern for its own sake."""
+    """Return whether a pattern gets a view of its own."""
     return len(pattern.holes) >= 3 and not parallel(pattern.direction, Z)
 
 
 def outwards_of(pattern: Pattern, part: Part) -> Array:
-    """Along the holes: to the lidar, or away from the middle of the part."""
+    """Return the direction of the holes to the lidar, or away from the middle of the part."""
     if part.lidar_axis is not None and parallel(pattern.direction, part.lidar_axis):
         return part.lidar_axis
     middle = np.array(part.solid.Center().toTuple())
@@ -109,13 +109,13 @@ def outwards_of(pattern: Pattern, part: Part) -> Array:
 
 
 def shows_angle(view: View, pattern: Pattern) -> bool:
-    """Whether the angle of a pattern to the rotation axis is seen in true size."""
+    """Return whether a view shows the angle of a pattern to the rotation axis in true size."""
     direction = pattern.direction
     return not parallel(direction, Z) and parallel(view.up, Z) and abs(float(direction @ view.towards)) < STRAIGHT
 
 
 def _along(part: Part, upright: list[Pattern]) -> Array:
-    """X, or the line of two holes where the part has faces across that line, but none across X: a bar."""
+    """Return X, or the line of two holes if the part has faces across that line but none across X: a bar."""
     x = np.array([1.0, 0.0, 0.0])
     if len(upright[0].holes) != 2 or planes_across(part.solid, x):
         return x
@@ -130,6 +130,6 @@ def _view(part: Part, title: str, right: Array, up: Array, origin: Array, kind: 
 
 
 def _level(direction: Array) -> Array:
-    """The horizontal part of a direction, as a unit vector."""
+    """Return the horizontal part of a direction, as a unit vector."""
     level = np.array([direction[0], direction[1], 0.0])
     return level / np.linalg.norm(level)

@@ -1,7 +1,7 @@
 """A sheet as DXF, SVG and PDF: the same bytes for the same sheet, and nothing of this machine's fonts in them.
 
 SVG and PDF are of the DXF's own entities. ezdxf's drawing add-on is not their writer: it makes outlines of texts, so
-nobody finds a word in them, and SVGs 2.5 to 5 times as large, in 0.2 to 0.9 s a sheet more.
+no reader can search them, and SVGs 2.5 to 5 times as large, in 0.2 to 0.9 s a sheet more.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from reportlab.pdfgen.canvas import Canvas
 from scanwright.cad.drawings.pen import ANCHORS, CAPITAL, DASHES, WIDTHS, Layer, Point
 from scanwright.cad.drawings.sheet import Sheet
 
-POINTS = 72 / 25.4
+POINTS_PER_MM = 72 / 25.4  # of PDF
 ALIGNED = {alignment: anchor for anchor, (alignment, _) in ANCHORS.items()}
 
 
@@ -51,7 +51,7 @@ Drawn = Sequence[Outline | Words]
 
 
 def drawn_on(sheet: Sheet) -> Iterator[Outline | Words]:
-    """All that a sheet shows, in the order in which it was drawn."""
+    """Yield all that a sheet shows, in the order in which it was drawn."""
     on_paper = Matrix44.scale(sheet.scale)
     for entity in recursive_decompose(sheet.document.modelspace()):
         if isinstance(entity, Text):
@@ -64,7 +64,7 @@ def drawn_on(sheet: Sheet) -> Iterator[Outline | Words]:
 
 
 def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
-    """A page of what is `drawn_on` it; a group per layer."""
+    """Return a page of what is `drawn_on` it; a group per layer."""
     width, height = sheet.size
     groups: dict[Layer, list[str]] = {layer: [] for layer in WIDTHS}
     for item in shown:
@@ -95,13 +95,15 @@ def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
 
 
 def pdf_bytes(sheet: Sheet, shown: Drawn) -> bytes:
-    """The same page in Helvetica, one of the fonts that every reader has."""
+    """Return the same page in Helvetica, one of the fonts that every reader has."""
     file = io.BytesIO()
     # not compressed: what a compressor makes of it depends on its version
-    canvas = Canvas(file, pagesize=(sheet.size[0] * POINTS, sheet.size[1] * POINTS), invariant=1, pageCompression=0)
+    canvas = Canvas(
+        file, pagesize=(sheet.size[0] * POINTS_PER_MM, sheet.size[1] * POINTS_PER_MM), invariant=1, pageCompression=0
+    )
     canvas.setTitle(sheet.name)
     canvas.setCreator("scanwright")
-    canvas.scale(POINTS, POINTS)
+    canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
     canvas.setLineCap(1)
     write = {"left": canvas.drawString, "middle": canvas.drawCentredString, "right": canvas.drawRightString}
     for item in shown:
@@ -126,7 +128,7 @@ def pdf_bytes(sheet: Sheet, shown: Drawn) -> bytes:
 
 
 def dxf_bytes(sheet: Sheet) -> bytes:
-    """DXF R2010 with the views at 1:1 in millimetres; the frame is scaled with them."""
+    """Return DXF R2010 with the views at 1:1 in millimetres; the frame is scaled with them."""
     for name in sorted(sheet.document.entitydb.dxf_types_in_use()):
         sheet.document.classes.add_class(name)  # else in the order of a set, which the hash seed decides
     sheet.document.ezdxf_metadata()["CREATED_BY_EZDXF"] = "scanwright"  # else with the time
@@ -148,7 +150,7 @@ def _fixed_dates() -> Iterator[None]:
 
 
 def _steps(path: Path) -> Iterator[tuple[str, list[Point]]]:
-    """Move to the start, then lines and cubic curves: M, L or C as SVG has them, and their points."""
+    """Yield a move to the start, then lines and cubic curves: M, L or C as SVG has them, and their points."""
     yield "M", [(path.start.x, path.start.y)]
     for command in path.commands():
         controls = [command.ctrl1, command.ctrl2] if isinstance(command, Curve4To) else []
@@ -156,6 +158,6 @@ def _steps(path: Path) -> Iterator[tuple[str, list[Point]]]:
 
 
 def _n(value: float) -> str:
-    """A coordinate to a micrometre, without trailing zeros."""
+    """Return a coordinate to a micrometre, without trailing zeros."""
     text = f"{value:.3f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

@@ -1,7 +1,7 @@
-"""`bom.csv`: everything to print, turn and buy for one scanner, with what is known of numbers and prices.
+"""`bom.csv`: everything to print, turn and buy for one scanner, with quantities and prices.
 
-Prices are those of the catalogue, each with its source and year. Where it has none, a range of `prices.py` stands in
-columns of its own, stated as an estimate; the last row adds both up and names what has not even that.
+Prices are those of the catalogue, each with its source and year. If it has none, a range of `prices.py` stands in
+columns of its own, stated as an estimate; the last row adds up both and names the rows that have neither.
 """
 
 from __future__ import annotations
@@ -14,39 +14,29 @@ from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import print_words
-from scanwright.cad.checks.remarks import products_of
+from scanwright.cad.checks.products import products_of
 from scanwright.cad.drawings.files import drawing_number
-from scanwright.cad.files.prices import ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, estimate_usd, year_of
+from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.cables.words import tied_at
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.names import JOURNAL_SLEEVE
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
 
 JOINTS = "joints of the layout"
+STEPS, WIRING_TEXT = "assembly.md", "wiring.md"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
-
-PAPER_V = 12.0
-
-# What else a lidar needs: name, quantity, source. One that is not here asks for its data sheet.
-WIRING: dict[str, tuple[tuple[str, int, str], ...]] = {
-    "UTM-30LX": (
-        ("USB 2.0 cable of the lidar, type A", 1, PAPER),
-        ("power lead of the lidar, 12 V, 1 A (brown +, blue 0 V)", 1, "data sheet figures: 12 V, 0.7 A, 1.0 A at most"),
-    ),
-    "URG-04LX": (
-        ("USB 2.0 cable of the lidar, type A", 1, PAPER),
-        ("power lead of the lidar, 5 V", 1, "not in the sources of the catalogue: read its data sheet"),
-    ),
-}
+PAPER_V = 12.0  # of its supply
+WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports and failed prints
 
 
 @dataclass(frozen=True, slots=True)
 class BomItem:
-    """One row. Empty texts and None are unknown.
+    """One row; the fields but `estimate` are the columns. Empty texts and None are unknown.
 
     Attributes:
         kind: printed, turned, sawn, material, bought, screw, nut, insert, wiring, consumable, tool or total.
@@ -62,14 +52,15 @@ class BomItem:
         priced: year of the price.
         mass_g: of one.
         source: where the price, or the row, comes from.
-        verified: whether that value is verified; empty where there is none.
+        verified: whether that value is verified; empty if there is none.
         note: for the person who buys.
+        estimate: name in `prices.EACH_USD`; empty if there is none.
     """
 
     kind: str
     part: str
     number: str = ""
-    quantity: int | None = None
+    quantity: int | None = 1
     supplier: str = ""
     supplier_number: str = ""
     unit_usd: float | None = None
@@ -81,6 +72,31 @@ class BomItem:
     source: str = ""
     verified: str = ""
     note: str = ""
+    estimate: str = ""
+
+
+COLUMNS = [field.name for field in fields(BomItem)][:-1]
+# What a lidar needs besides itself. For one that is not here, its data sheet must be read.
+WIRING: dict[str, tuple[BomItem, ...]] = {
+    "UTM-30LX": (
+        BomItem("wiring", "USB 2.0 cable of the lidar, type A", source=PAPER, estimate="USB cable"),
+        BomItem(
+            "wiring",
+            "power lead of the lidar, 12 V, 1 A (brown +, blue 0 V)",
+            source="data sheet figures: 12 V, 0.7 A, 1.0 A at most",
+            estimate="power cable",
+        ),
+    ),
+    "URG-04LX": (
+        BomItem("wiring", "USB 2.0 cable of the lidar, type A", source=PAPER, estimate="USB cable"),
+        BomItem(
+            "wiring",
+            "power lead of the lidar, 5 V",
+            source="not in the sources of the catalogue: read its data sheet",
+            estimate="power cable",
+        ),
+    ),
+}
 
 
 def items_of(
@@ -90,7 +106,7 @@ def items_of(
     masses_g: dict[str, float],
     config_hash: str,
 ) -> list[BomItem]:
-    """All rows; the total last.
+    """Return all rows; the total last.
 
     Args:
         scanner: angles and products.
@@ -105,39 +121,38 @@ def items_of(
         how = f"{scanner.printer.name}, {print_words(scanner.printer)}, from print/{name}.3mf"
         if part.metal:
             how = f"{', '.join(filter(None, (part.material, part.work)))}, after parts/{name}.step"
-        note = f"{how}; drawing drawings/{name}.pdf"
-        items.append(BomItem(part.process, name, number, 1, mass_g=round(masses_g[name], 1), note=note))
+        note, estimate = f"{how}; drawing drawings/{name}.pdf", name if name in EACH_USD else part.process
+        mass_g = round(masses_g[name], 1)
+        items.append(BomItem(part.process, name, number, mass_g=mass_g, note=note, estimate=estimate))
     items.append(_filament(scanner, items))
     items += _products(scanner, assembly.layout.drive)
     items += _screws(joints)
     items += _wiring(scanner)
     items += _ties(assembly)
     items += _electrics(scanner)
-    items += _with_it(assembly.layout.drive, joints)
+    items += _small_things(scanner, assembly, joints)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
 
 def bom_text(items: list[BomItem]) -> str:
-    """The CSV file."""
+    """Return the CSV file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = [field.name for field in fields(BomItem)]
-    writer.writerow(names)
+    writer.writerow(COLUMNS)
     for item in items:
-        writer.writerow(["" if getattr(item, name) is None else getattr(item, name) for name in names])
+        writer.writerow(["" if getattr(item, name) is None else getattr(item, name) for name in COLUMNS])
     return text.getvalue()
 
 
 def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
         if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
-            number = _order_number(product, drive)
-            yield _bought(product, max(1, drive.products.count(product)), number)
+            yield _bought(product, max(1, drive.products.count(product)), _order_number(product, drive))
 
 
 def _order_number(product: Product, drive: DriveLayout) -> str:
-    """What to ask a shop for: a belt comes in lengths."""
+    """Return what to order: a belt comes in lengths."""
     stack = drive.stack
     if isinstance(stack, BeltStack) and product == stack.belt:
         return f"{product.name}, {stack.belt_teeth} teeth, {stack.belt_teeth * stack.belt.pitch_mm:g} mm"
@@ -145,8 +160,7 @@ def _order_number(product: Product, drive: DriveLayout) -> str:
 
 
 def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
-    origin = product.provenance().get("price_usd")
-    price = product.price_usd
+    origin, price = product.provenance().get("price_usd"), product.price_usd
     return BomItem(
         kind="bought",
         part=product.kind.replace("_", " "),
@@ -159,90 +173,76 @@ def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, n
         mass_g=product.mass_g,
         source=origin.source if origin is not None else "",
         verified="" if origin is None else "yes" if origin.verified else "no",
-        note="" if price is not None else "price unknown",
     )
 
 
 def _screws(joints: list[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
-    nuts: dict[str, int] = {}
-    inserts: dict[str, int] = {}
-    standards = {joint.screw.name: joint.screw.nut_standard for joint in joints}
+    nuts: Counter[tuple[str, str]] = Counter()
+    inserts: Counter[str] = Counter()
     for joint in joints:
         if joint.stands_out_mm is None:
             screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
-            nuts[joint.screw.name] = nuts.get(joint.screw.name, 0) + joint.count
+            nuts[joint.screw.name, joint.screw.nut_standard] += joint.count
         if joint.inserts:
-            inserts[joint.screw.name] = inserts.get(joint.screw.name, 0) + joint.count
+            inserts[joint.screw.name] += joint.count
     for number, used in sorted(screws.items()):
-        kind = "grub screw" if number.startswith("ISO 4026") else "cap screw"
-        where = ", ".join(f"{joint.count} {joint.part} to {joint.onto}" for joint in used)
+        kind = "grub screw" if used[0].fixing == "grub" else "cap screw"
+        places = ", ".join(f"{joint.count} {joint.part} to {joint.onto}" for joint in used)
         total = sum(joint.count for joint in used)
-        yield BomItem("screw", kind, number, total, source=JOINTS, note=f"{where}; price unknown")
-    for name, count in sorted(nuts.items()):
-        yield BomItem("nut", "hexagon nut", f"{standards[name]} {name}", count, source=JOINTS, note="price unknown")
+        yield BomItem("screw", kind, number, total, source=JOINTS, note=places, estimate="screw")
+    for (name, standard), count in sorted(nuts.items()):
+        yield BomItem("nut", "hexagon nut", f"{standard} {name}", count, source=JOINTS, estimate="nut")
     for name, count in sorted(inserts.items()):
-        note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm; price unknown"
-        yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note)
+        note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm"
+        yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note, estimate="insert")
 
 
 def _wiring(scanner: Scanner) -> Iterator[BomItem]:
     supply = f"power supply, {PAPER_V:g} V, {network_of(scanner).supply_a:g} A"
-    yield BomItem("wiring", supply, quantity=1, source=PAPER, note="price unknown")
+    yield BomItem("wiring", supply, source=PAPER, estimate="power supply")
     yield from _servo_wiring(scanner.servo)
-    needs = WIRING.get(scanner.lidar.name)
-    if needs is None:
-        yield _unknown_wiring(scanner.lidar)
-    for part, quantity, source in needs or ():
-        yield BomItem("wiring", part, quantity=quantity, source=source, note="price unknown")
+    yield from WIRING.get(scanner.lidar.name) or [_unknown_wiring(scanner.lidar)]
     if scanner.slip_ring is not None:
-        circuits = scanner.slip_ring.circuits
-        part = "plug, socket, crimps and heat shrink for the leads of the slip ring"
-        yield BomItem(
-            "wiring", part, quantity=1, source=f"circuits: {circuits}", note="no plug passes a ring; price unknown"
-        )
+        part, source = "plug, socket, crimps and heat shrink for the leads of the slip ring", scanner.slip_ring.circuits
+        note = "no plug passes a ring"
+        yield BomItem("wiring", part, source=f"circuits: {source}", note=note, estimate="plug and socket")
 
 
 def _ties(assembly: Assembly) -> Iterator[BomItem]:
-    """Cable ties, one for each place that the steps name."""
+    """Yield the cable ties, one for each place that the steps name."""
     places = Counter(tied_at(assembly.layout, assembly.leads))
     if places:
-        note = f"{', '.join(f'{count} at the {place}' for place, count in places.items())}; price unknown"
-        yield BomItem("wiring", "cable tie, 2.5 mm", quantity=places.total(), source="assembly.md", note=note)
+        note = ", ".join(f"{count} at the {place}" for place, count in places.items())
+        count = places.total()
+        yield BomItem("wiring", "cable tie, 2.5 mm", quantity=count, source=STEPS, note=note, estimate="cable tie")
 
 
 def _servo_wiring(servo: Servo) -> Iterator[BomItem]:
-    """The adapter and the cable of a servo, as the catalogue has them."""
+    """Yield the adapter and the cable of a servo, as the catalogue has them."""
     if servo.adapter is None:
         yield _unknown_wiring(servo)
-    for field, price in (("adapter", servo.adapter_usd), ("cable", None)):
+    for field, price, estimate in (("adapter", servo.adapter_usd, "adapter"), ("cable", None, "servo cable")):
         part, origin = getattr(servo, field), servo.provenance().get(field)
         if part is not None:
-            yield BomItem(
-                "wiring",
-                part,
-                quantity=1,
-                unit_usd=price,
-                total_usd=price,
-                source=origin.source if origin is not None else "",
-                note="" if price is not None else "price unknown",
-            )
+            source = origin.source if origin is not None else ""
+            yield BomItem("wiring", part, unit_usd=price, total_usd=price, source=source, estimate=estimate)
 
 
 def _unknown_wiring(product: Product) -> BomItem:
-    part = f"cables and power of {product.name}"
-    return BomItem("wiring", part, source="not in the catalogue", note="read its data sheet; price unknown")
+    part, source = f"cables and power of {product.name}", "not in the catalogue"
+    return BomItem(
+        "wiring", part, quantity=None, source=source, note="read its data sheet", estimate="cables and power"
+    )
 
 
 def _filament(scanner: Scanner, items: list[BomItem]) -> BomItem:
-    """Plastic of all printed parts, a tenth more for supports and what fails."""
-    grams = 1.1 * sum(item.mass_g or 0.0 for item in items if item.kind == "printed")
+    grams = WASTE * sum(item.mass_g or 0.0 for item in items if item.kind == "printed")
     low, high = (round(grams / 1000 * usd, 2) for usd in FILAMENT_USD_PER_KG)
     return BomItem(
         kind="material",
         part="plastic to print, by mass",
-        quantity=1,
         low_usd=low,
         high_usd=high,
         mass_g=round(grams, 1),
@@ -252,52 +252,50 @@ def _filament(scanner: Scanner, items: list[BomItem]) -> BomItem:
 
 
 def _electrics(scanner: Scanner) -> Iterator[BomItem]:
-    """What the wiring needs beside the devices themselves."""
-    network, source = network_of(scanner), "wiring.md"
-    blades: dict[float, int] = {}
-    for branch in network.branches:
-        blades[branch.fuse_a] = blades.get(branch.fuse_a, 0) + 1
-    for amps, count in sorted(blades.items()):
-        note = f"{count} in use, 1 spare"
-        yield BomItem("wiring", f"blade fuse, {amps:g} A", "ISO 8820-3", count + 1, source=source, note=note)
-    main = next(box for box in network.boxes if box.name == "switch")
-    yield BomItem("wiring", "main fuse with holder", "ISO 8820-3", 1, source=source, note=main.lines[0])
-    yield BomItem("wiring", "switch, 12 V DC", quantity=1, source=source, note=main.lines[0])
-    yield BomItem("wiring", "distribution with fuse holders, and a ground bar", quantity=1, source=source)
-    for box in network.boxes:
-        if box.name.endswith("converter"):
-            yield BomItem("wiring", box.title, quantity=1, source=source, note=", ".join(box.lines))
-    for mm2 in sorted({wire.mm2 for wire in network.wires if wire.mm2 > 0}):
-        yield BomItem(
-            "wiring", f"stranded wire, {mm2:g} mm², red and black", "IEC 60228", 1, source=source, note="5 m each"
-        )
+    """Yield what the wiring needs besides the devices."""
+    network = network_of(scanner)
+    fuses = Counter(branch.fuse_a for branch in network.branches)
+    main = next(box for box in network.boxes if box.name == "switch").lines[0]
+    rows = [
+        *(
+            (f"blade fuse, {amps:g} A", "ISO 8820-3", count + 1, f"{count} in use, 1 spare", "fuse")
+            for amps, count in sorted(fuses.items())
+        ),
+        ("main fuse with holder", "ISO 8820-3", 1, main, "main fuse"),
+        ("switch, 12 V DC", "", 1, main, "switch"),
+        ("distribution with fuse holders, and a ground bar", "", 1, "", "distribution"),
+        *((box.title, "", 1, ", ".join(box.lines), "converter") for box in network.boxes if box.bought),
+        *(
+            (f"stranded wire, {mm2:g} mm², red and black", "IEC 60228", 1, "5 m each", "wire")
+            for mm2 in sorted({wire.mm2 for wire in network.wires if wire.mm2 > 0})
+        ),
+    ]
+    for part, number, quantity, note, estimate in rows:
+        yield BomItem("wiring", part, number, quantity, source=WIRING_TEXT, note=note, estimate=estimate)
 
 
-def _with_it(drive: DriveLayout, joints: list[Joint]) -> Iterator[BomItem]:
-    """Small things of the drive, what is used up, and tools."""
-    for part, source in drive.needs:
-        kind = "consumable" if estimate_usd("consumable", part) else "wiring"
-        yield BomItem(kind, part, quantity=1, source=source, note="price unknown")
-    locked = "screws that end in metal or nuts"
-    yield BomItem(
-        "consumable", "threadlocker, medium strength", quantity=1, source=locked, note="a few drops; price unknown"
-    )
+def _small_things(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[BomItem]:
+    """Yield small things of the drive, consumables, and tools."""
+    for need in assembly.layout.drive.needs:
+        yield BomItem(need.kind, need.part, source=need.source, estimate=need.estimate)
+    ends, drops = "screws that end in metal or nuts", "a few drops"
+    yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
     sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
-    yield BomItem("tool", "hexagon keys", quantity=1, source=JOINTS, note=f"for {sizes}; price unknown")
-    yield BomItem("tool", "torque screwdriver, 0.1 to 1 N m", quantity=1, source="assembly.md", note="price unknown")
-    yield BomItem("tool", "multimeter", quantity=1, source="wiring.md", note="price unknown")
-    if any("retaining ring" in part for part, _ in drive.needs):
-        note = "reads 0.01 mm; price unknown"
-        yield BomItem("tool", "dial indicator on a stand", quantity=1, source="assembly.md", note=note)
-    if any(part.startswith(("cable tie", "a soft tube")) for part, _ in drive.needs):
-        note = "for the leads; price unknown"
-        yield BomItem("tool", "crimping pliers", quantity=1, source="assembly.md", note=note)
-    if any(joint.inserts for joint in joints):
-        yield BomItem("tool", "soldering iron", quantity=1, source="assembly.md", note="for the inserts; price unknown")
+    tools = [
+        ("hexagon keys", "hexagon keys", JOINTS, f"for {sizes}", True),
+        ("torque screwdriver", "torque screwdriver, 0.1 to 1 N m", STEPS, "", True),
+        ("multimeter", "multimeter", WIRING_TEXT, "", True),
+        ("dial indicator", "dial indicator on a stand", STEPS, "reads 0.01 mm", JOURNAL_SLEEVE in assembly.made),
+        ("crimping pliers", "crimping pliers", STEPS, "for the leads", scanner.slip_ring is not None),
+        ("soldering iron", "soldering iron", STEPS, "for the inserts", any(joint.inserts for joint in joints)),
+    ]
+    for estimate, part, source, note, needed in tools:
+        if needed:
+            yield BomItem("tool", part, source=source, note=note, estimate=estimate)
 
 
 def _ranged(item: BomItem) -> BomItem:
-    """The row with what it may cost: its price, wider where that is doubtful, or an estimate."""
+    """Return the row with its range: of its price, wider if that is unsure, or of an estimate."""
     if item.low_usd is not None:
         return item
     if item.total_usd is not None:
@@ -305,12 +303,10 @@ def _ranged(item: BomItem) -> BomItem:
         low, high = (1.0, 1.0) if item.verified == "yes" and year >= RECENT else UNSURE
         usd = item.total_usd
         return replace(item, low_usd=round(low * usd, 2), high_usd=round(high * usd, 2), priced=year)
-    each = estimate_usd(item.kind, item.part)
-    if each is None:
-        return item
-    low, high = (round((item.quantity or 1) * usd, 2) for usd in each)
-    said = item.note.replace("price unknown", "").rstrip("; ")
-    note = "; ".join(filter(None, (said, "" if item.kind == "printed" else ESTIMATED)))
+    if not item.estimate:
+        return replace(item, note="; ".join(filter(None, (item.note, "price unknown"))))
+    low, high = (round((item.quantity or 1) * usd, 2) for usd in EACH_USD[item.estimate])
+    note = "; ".join(filter(None, (item.note, "" if item.kind == "printed" else ESTIMATED)))
     return replace(item, low_usd=low, high_usd=high, note=note)
 
 

@@ -53,12 +53,12 @@ class Node:
 def glb_bytes(
     nodes: list[Node], surfaces: Mapping[str, Surface], extras: dict[str, Any], spin: tuple[str, float] | None = None
 ) -> bytes:
-    """The file of a scene.
+    """Return the file of a scene.
 
     Args:
         nodes: parents before children; the first one is the root.
         surfaces: of the nodes with a mesh by name, of `shaded`.
-        extras: facts for programs, kept under `asset.extras`.
+        extras: values for programs, in `asset.extras`.
         spin: name of a node that turns about its z, counter-clockwise, and the seconds of one turn.
     """
     index = {node.name: i + 1 for i, node in enumerate(nodes)}
@@ -106,7 +106,7 @@ def glb_bytes(
 
 
 class _Buffer:
-    """The binary chunk while it grows: everything in it starts at a multiple of four bytes."""
+    """The growing binary chunk; everything in it starts at a multiple of four bytes."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -139,7 +139,7 @@ def _primitive(buffer: _Buffer, surface: Surface, material: int) -> dict[str, An
 
 
 def shaded(mesh: TriMesh) -> Surface:
-    """Vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
+    """Return vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
 
     A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of
     the faces about it that have no edge towards this one, each as wide as its corner.
@@ -161,7 +161,7 @@ def shaded(mesh: TriMesh) -> Surface:
 
 
 def _about_one_vertex(vertex: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """All pairs of corners, a corner with itself included, that are at the same vertex."""
+    """Return all pairs of corners at the same vertex, a corner with itself included."""
     order = np.argsort(vertex, kind="stable")
     counts = np.bincount(vertex)
     first = np.cumsum(counts) - counts
@@ -172,7 +172,7 @@ def _about_one_vertex(vertex: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDAr
 
 
 def _widths(corners: Array) -> Array:
-    """Angles of triangles (m, 3, 3) at their corners [rad], shape (m, 3)."""
+    """Return the angles of triangles (m, 3, 3) at their corners [rad], shape (m, 3)."""
     forth = np.roll(corners, -1, axis=1) - corners
     back = np.roll(corners, 1, axis=1) - corners
     across = np.linalg.norm(np.cross(forth, back), axis=2)
@@ -180,7 +180,7 @@ def _widths(corners: Array) -> Array:
 
 
 def _material(node: Node) -> dict[str, Any]:
-    """Colours of the format are linear, ours are sRGB."""
+    """Return the material: colours of the format are linear, ours are sRGB."""
     linear = [round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 4) for c in node.colour]
     metal, rough = (0.9, 0.35) if node.metal else (0.0, 0.7)
     return {

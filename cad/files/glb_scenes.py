@@ -1,4 +1,4 @@
-"""The scanner to look at: `assembly.glb` in the tree of its frames, and `exploded.glb` pulled apart in build order.
+"""The scanner in 3D: `assembly.glb` in the tree of its frames, and `exploded.glb` pulled apart in build order.
 
     y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body hangs under the frame it moves with.
 
@@ -25,12 +25,12 @@ GAP_MM = 15.0  # between the products of the exploded view
 
 
 def product_of(body: str, assembly: Assembly) -> str:
-    """The thing that one holds in the hand: a made part, or the bought product that several bodies draw."""
+    """Return the made part, or the bought product that several bodies show."""
     return body if body in assembly.made else assembly.bodies[body].product
 
 
 def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh], config_hash: str) -> dict[str, bytes]:
-    """Both files.
+    """Return both files.
 
     Args:
         scanner: angles and products.
@@ -76,7 +76,7 @@ def _exploded(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> list
 
 
 def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[str, Array]:
-    """How far each product is moved in the exploded view, in the rotation frame [mm]."""
+    """Return the displacement of each product in the exploded view, in the rotation frame [mm]."""
     clouds: dict[str, list[Array]] = {}
     for node in nodes:
         if node.mesh is not None:

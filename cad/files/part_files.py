@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.findings import PartFinding
 from scanwright.cad.kernel import require_kernel
 from scanwright.cad.layout.layout import config_hash, mount_offset_mm
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.design.errors import BuildError
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
+from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 
 if TYPE_CHECKING:
@@ -41,9 +42,9 @@ class PartsResult:
     Attributes:
         assembly: the solids.
         meshes: canonical mesh of each made part, with its label.
-        t_world_rot_mm: where the optical centre stands in the world.
-        parts: facts of each made part.
-        findings: what a person should know.
+        t_world_rot_mm: optical centre in the world.
+        parts: properties of each made part.
+        findings: remarks for a person.
         left_out: what this scanner does not need.
         files: relative to the build folder.
     """
@@ -52,38 +53,38 @@ class PartsResult:
     meshes: dict[str, TriMesh]
     t_world_rot_mm: tuple[float, float, float]
     parts: tuple[PartReport, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     left_out: tuple[LeftOut, ...]
     files: tuple[str, ...]
 
     def masses_g(self) -> dict[str, float]:
-        """Of the made parts by name."""
+        """Return the masses of the made parts by name."""
         return {report.name: report.mass_g for report in self.parts}
 
 
 def build_parts(
-    scanner: Scanner, folder: Path, progress: Callable[[str], None], make: Callable[[Scanner], Assembly] | None = None
+    scanner: Scanner, folder: Path, progress: Progress, make: Callable[[Scanner], Assembly] | None = None
 ) -> PartsResult:
     """Make every part and write it into a build folder.
 
     Args:
         scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `layout.mount_offset_mm`, or zero.
         folder: the build folder; `parts/` is made in it.
-        progress: called with a line of text before each step.
-        make: who makes the parts, `make.make_parts` or one that may have them already.
+        progress: callback for progress.
+        make: makes the parts, if not `make.make_parts`.
 
     Raises:
         InstallError: the CAD kernel is not installed.
-        BuildError: a part cannot be made, or the angle set names another place of the optical centre.
+        BuildError: a part cannot be made, or the angle set states another place of the optical centre.
     """
-    offset = mount_offset_mm(scanner)  # refuses what cannot be built before seconds go into the kernel
+    offset = mount_offset_mm(scanner)  # rejects what cannot be built before the kernel is loaded
     _check_offset(scanner, offset)
     progress("loading the CAD kernel")
     require_kernel("the making of parts")
     from scanwright.cad.assembly.assembly import alone, as_tree
     from scanwright.cad.assembly.make import make_parts
     from scanwright.cad.assembly.masses import link_bodies
-    from scanwright.cad.checks.remarks import findings_of, left_out_of
+    from scanwright.cad.checks.remarks import left_out_of, remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
     from scanwright.cad.geometry.mesh import checked, stl_bytes
@@ -117,7 +118,7 @@ def build_parts(
         meshes=meshes_of_parts,
         t_world_rot_mm=offset,
         parts=tuple(reports),
-        findings=(*findings_of(scanner, assembly, bodies), *labels.findings),
+        findings=(*remarks_of(scanner, assembly), *labels.findings),
         left_out=(*left_out_of(assembly), *labels.left_out),
         files=tuple(sorted(files)),
     )
@@ -138,9 +139,9 @@ def _report(name: str, volume: float, density: float, mesh: TriMesh) -> PartRepo
 
 
 def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:
-    given = scanner.angles.t_world_rot_mm
-    if any(given) and max(abs(a - b) for a, b in zip(given, offset, strict=True)) > 1e-3:
+    stated = scanner.angles.t_world_rot_mm
+    if any(stated) and max(abs(a - b) for a, b in zip(stated, offset, strict=True)) > 1e-3:
         raise BuildError(
-            f"{BASE_MOUNT}: t_world_rot_mm = {list(given)}: the mount of these angles puts the optical centre at "
+            f"{BASE_MOUNT}: t_world_rot_mm = {list(stated)}: the mount of these angles puts the optical centre at "
             f"{list(offset)}; build the angle set again, or set it to 0"
         )

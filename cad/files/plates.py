@@ -20,25 +20,25 @@ from scanwright.design.scene.ray_caster import build_scene
 Plate = dict[str, TriMesh]
 
 GAP_MM = 8.0  # between two parts: room for a brim on both
-EDGE_MM = 5.0  # of the bed, where printers hold or skirt
-SIZE = 640, 480  # pixels, wide and high
+EDGE_MM = 5.0  # of the bed, for clips and skirts
+SIZE_PX = 640, 480  # pixels, wide and high
 YAW_RAD, PITCH_RAD = math.radians(-75.0), math.radians(60.0)
 MARGIN = 1.04
 SLAB_MM = 2.0  # drawn below the parts as the bed
 BED, PART = np.array([232.0, 232.0, 229.0]), np.array([226.0, 112.0, 30.0])
-INK, LIGHT, TEXT = (20, 20, 20), (255, 255, 255), 15
+INK, LIGHT, TEXT_PX = (20, 20, 20), (255, 255, 255), 15
 
 
 def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]) -> list[Plate]:
-    """Spread parts over as few beds as rows of boxes take; what is larger than a bed gets one of its own.
+    """Distribute parts over as few beds as rows of boxes need; a part larger than a bed gets one of its own.
 
     Args:
-        printed: parts as they lie on the bed.
+        printed: parts in their print pose.
         bed_mm: width, depth and height.
     """
     sizes = {name: np.ptp(mesh.vertices, axis=0) for name, mesh in printed.items()}
     order = sorted(printed, key=lambda name: (-round(float(sizes[name][1]), 3), -round(float(sizes[name][0]), 3), name))
-    rows: list[tuple[float, list[str]]] = []  # what is left of the width, and who is in it
+    rows: list[tuple[float, list[str]]] = []  # width left, and its parts
     for name in order:
         wide = float(sizes[name][0]) + GAP_MM
         fitting = next((i for i, (left, _) in enumerate(rows) if left >= wide), None)
@@ -60,7 +60,7 @@ def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]
 def plate_files(
     plates: Sequence[Plate], bed_mm: tuple[float, float, float], about: str, settings: Mapping[str, str]
 ) -> dict[str, bytes]:
-    """Print file and picture of each plate; `about` says what the parts were made from, `settings` are a slicer's."""
+    """Return print file and picture of each plate; `about` describes the parts, `settings` are a slicer's."""
     files = {}
     for number, plate in enumerate(plates, start=1):
         name = f"plate_{number}"
@@ -75,7 +75,7 @@ def _laid(
     rows: Sequence[Sequence[str]],
     bed_mm: tuple[float, float, float],
 ) -> Plate:
-    """The parts of one plate, row after row, in the middle of the bed."""
+    """Return the parts of one plate, row after row, in the middle of the bed."""
     deep = [float(max(sizes[name][1] for name in names)) for names in rows]
     y = (bed_mm[1] - sum(deep) - GAP_MM * (len(rows) - 1)) / 2
     plate = {}
@@ -91,24 +91,24 @@ def _laid(
 
 
 def _picture(plate: Plate, bed_mm: tuple[float, float, float]) -> bytes:
-    """PNG of a plate from before and above, the names on its parts."""
+    """Return the PNG of a plate from the front and above, with the names of its parts."""
     scenes = [build_scene(mesh.vertices[mesh.faces] / 1000, name) for name, mesh in plate.items()]
     bed = build_scene(_slab(bed_mm[0], bed_mm[1]) / 1000)
     nowhere = np.zeros(3)
     pieces = [Piece(bed, nowhere, BED), *(Piece(scene, nowhere, PART) for scene in scenes)]
     corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) for piece in pieces])
-    view = view_of(corners, SIZE, YAW_RAD, PITCH_RAD, MARGIN)
+    view = view_of(corners, SIZE_PX, YAW_RAD, PITCH_RAD, MARGIN)
     image = painted(view, pieces)
-    pen, font = ImageDraw.Draw(image), ImageFont.load_default(TEXT)
+    pen, font = ImageDraw.Draw(image), ImageFont.load_default(TEXT_PX)
     for name, scene in zip(plate, scenes, strict=True):
         seen = view.at(scene.triangles_m.reshape(-1, 3))
-        at = ((seen[:, 0].min() + seen[:, 0].max()) / 2, seen[:, 1].max() + TEXT)
+        at = ((seen[:, 0].min() + seen[:, 0].max()) / 2, seen[:, 1].max() + TEXT_PX)
         pen.text(at, name, fill=INK, font=font, anchor="mm", stroke_width=3, stroke_fill=LIGHT)
     return png_bytes(image)
 
 
 def _slab(wide: float, deep: float) -> np.ndarray:
-    """The bed: two triangles, shape (2, 3, 3)."""
+    """Return the bed: two triangles, shape (2, 3, 3)."""
     corners = np.array([[0.0, 0, 0], [wide, 0, 0], [wide, deep, 0], [0, deep, 0]])
     corners[:, 2] = -SLAB_MM
     return corners[[[0, 1, 2], [0, 2, 3]]]

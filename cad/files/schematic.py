@@ -1,9 +1,9 @@
 """`wiring.svg`: the wiring of a scanner, drawn: boxes in columns from the supply to the lidar, wires between pins.
 
-A wire leaves a box to the right and enters another from the left: between two columns first come the lanes in which
-wires change their height, one for each, then room for the words that stand on each wire before its end. A wire that
-passes columns does so below all boxes. So no words meet, whatever the scanner. A wire between two pins
-of one box is a bridge on its right. Cautions stand above all boxes. Lengths in pixels.
+A wire leaves a box to the right and enters another from the left: between two columns are first the lanes in which
+wires change their height, one for each, then space for the text on each wire before its end. A wire that passes columns
+does so below all boxes, so no texts overlap, whatever the scanner. A wire between two pins of one box is a bridge on
+its right. Cautions are above all boxes. Lengths in pixels.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ from xml.sax.saxutils import escape
 
 from scanwright.design.electrics.network import Box, Network, Wire
 from scanwright.design.electrics.rules import check_network
+from scanwright.design.findings import sentence
 
-ROW = 22.0  # from pin to pin
-LINE = 15.0  # from line to line of text in a box
-CHAR = 6.0  # of a letter of the text, with room for the widest
-PAGE = 1100.0  # cautions are no wider: read without scrolling
-BOLD_CHAR = 7.0  # likewise, bold
-LANE = 9.0
-APART = 34.0  # boxes of a column
-EDGE = 24.0
-HEAD = 54.0
+ROW_PX = 22.0  # from pin to pin
+LINE_PX = 15.0  # from line to line of text in a box
+CHAR_PX = 6.0  # of a letter of the text, with room for the widest
+PAGE_PX = 1100.0  # cautions are no wider: read without scrolling
+BOLD_CHAR_PX = 7.0  # likewise, bold
+LANE_PX = 9.0
+APART_PX = 34.0  # boxes of a column
+EDGE_PX = 24.0
+HEAD_PX = 54.0
 INKS = {
     "red": "#c62828",
     "black": "#222222",
@@ -51,31 +52,31 @@ class _Placed:
 
     @property
     def first(self) -> float:
-        """Height of its first pin."""
-        return self.y + 24.0 + LINE * len(self.box.lines) + ROW / 2
+        """Return the height of its first pin."""
+        return self.y + 24.0 + LINE_PX * len(self.box.lines) + ROW_PX / 2
 
     @property
     def bottom(self) -> float:
-        """Its lower edge."""
-        return self.first + ROW * (max(len(self.box.left), len(self.box.right)) - 0.5) + 4.0
+        """Return its lower edge."""
+        return self.first + ROW_PX * (max(len(self.box.left), len(self.box.right)) - 0.5) + 4.0
 
     def left(self, pin: str) -> tuple[float, float]:
-        """Where a pin of its left side is."""
-        return self.x, self.first + ROW * self.box.left.index(pin)
+        """Return the place of a pin of its left side."""
+        return self.x, self.first + ROW_PX * self.box.left.index(pin)
 
     def right(self, pin: str) -> tuple[float, float]:
-        """Where a pin of its right side is."""
-        return self.x + self.width, self.first + ROW * self.box.right.index(pin)
+        """Return the place of a pin of its right side."""
+        return self.x + self.width, self.first + ROW_PX * self.box.right.index(pin)
 
 
 def schematic_svg(network: Network, title: str) -> str:
-    """The picture; equal networks give equal text."""
+    """Return the picture; equal networks give equal text."""
     columns = sorted({box.column for box in network.boxes})
     place = {column: i for i, column in enumerate(columns)}
     spans = [_span(network, place, wire) for wire in network.wires]
-    width = _right_edge(network, _placed(network, columns, spans, HEAD))
+    width = _right_edge(network, _placed(network, columns, spans, HEAD_PX))
     warnings = _warnings(network, width)
-    boxes = _placed(network, columns, spans, HEAD + LINE * len(warnings))
+    boxes = _placed(network, columns, spans, HEAD_PX + LINE_PX * len(warnings))
     floor = max(placed.bottom for placed in boxes.values()) + 26.0
     lanes = [0] * len(columns)
     far, drawn = 0, []
@@ -100,11 +101,11 @@ def schematic_svg(network: Network, title: str) -> str:
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_n(width)} {_n(height)}" width="{_n(width)}" '
             f'height="{_n(height)}" font-family="DejaVu Sans, Helvetica, Arial, sans-serif" font-size="11">',
             '<rect width="100%" height="100%" fill="#ffffff"/>',
-            _text(EDGE, 30.0, title, size=16, bold=True),
-            *(_text(EDGE, HEAD + LINE * i, line, bold=True, ink=DANGER) for i, line in enumerate(warnings)),
+            _text(EDGE_PX, 30.0, title, size=16, bold=True),
+            *(_text(EDGE_PX, HEAD_PX + LINE_PX * i, line, bold=True, ink=DANGER) for i, line in enumerate(warnings)),
             *drawn,
             *(line for placed in boxes.values() for line in _box(placed)),
-            _text(EDGE, height - 14.0, note),
+            _text(EDGE_PX, height - 14.0, note),
             "</svg>",
             "",
         ]
@@ -117,53 +118,53 @@ def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int
 
 
 def _warnings(network: Network, width: float) -> list[str]:
-    """Lines of the cautions, and of broken rules before them, as wide as the sheet."""
-    broken = [f"DO NOT BUILD THIS: {fault.subject}: {fault.message}." for fault in check_network(network)]
+    """Return the lines of broken rules and cautions, as wide as the sheet."""
+    broken = [f"DO NOT BUILD THIS: {sentence(fault)}." for fault in check_network(network)]
     cautions = [f"CAUTION: {caution}" for caution in network.cautions]
     return [
         line
         for text in (*broken, *cautions)
-        for line in textwrap.wrap(text, int((min(width, PAGE) - 2 * EDGE) / BOLD_CHAR))
+        for line in textwrap.wrap(text, int((min(width, PAGE_PX) - 2 * EDGE_PX) / BOLD_CHAR_PX))
     ]
 
 
 def _right_edge(network: Network, boxes: dict[str, _Placed]) -> float:
-    """Width of the sheet: boxes, and the bridges with their words right of the last one."""
+    """Return the width of the sheet: boxes, and the bridges with their text right of the last one."""
     words = [len(wire.words) for wire in network.wires if wire.start[0] == wire.end[0]]
-    bridges = 3 * LANE + CHAR * max(words) if words else 0.0
-    return max(placed.x + placed.width for placed in boxes.values()) + bridges + EDGE
+    bridges = 3 * LANE_PX + CHAR_PX * max(words) if words else 0.0
+    return max(placed.x + placed.width for placed in boxes.values()) + bridges + EDGE_PX
 
 
 def _placed(network: Network, columns: list[int], spans: list[tuple[int, int]], top: float) -> dict[str, _Placed]:
-    """Columns as wide as their words, gaps as wide as their lanes and the words on the wires that end there."""
-    found: dict[str, _Placed] = {}
-    x = EDGE
+    """Place columns as wide as their text, gaps as wide as their lanes and the text on the wires that end there."""
+    placed: dict[str, _Placed] = {}
+    x = EDGE_PX
     for i, column in enumerate(columns):
         boxes = [box for box in network.boxes if box.column == column]
         width = max(_width(box) for box in boxes)
         y = top
         for box in boxes:
-            # pins of neighbouring columns stand half a row apart: no two wires lie on one line
-            y += (i % 2 * ROW / 2 - _Placed(box, x, y, width).first) % ROW
-            found[box.name] = _Placed(box, x, y, width)
-            y = found[box.name].bottom + APART
+            # pins of neighbouring columns are half a row apart: no two wires lie on one line
+            y += (i % 2 * ROW_PX / 2 - _Placed(box, x, y, width).first) % ROW_PX
+            placed[box.name] = _Placed(box, x, y, width)
+            y = placed[box.name].bottom + APART_PX
         words = [len(wire.words) for wire, (_, last) in zip(network.wires, spans, strict=True) if last == i + 1]
         crossing = sum((first == i) + (last == i + 1 and last > first + 1) for first, last in spans)
-        x += width + LANE * (crossing + 2) + CHAR * max(words, default=0) + 14.0
-    return found
+        x += width + LANE_PX * (crossing + 2) + CHAR_PX * max(words, default=0) + 14.0
+    return placed
 
 
 def _width(box: Box) -> float:
     pins = max((len(pin) for pin in box.left), default=0) + max((len(pin) for pin in box.right), default=0) + 4
     longest = max(1.15 * len(box.title), *(len(line) for line in box.lines), pins)
-    return CHAR * longest + 18.0
+    return CHAR_PX * longest + 18.0
 
 
 def _turn(boxes: dict[str, _Placed], column: int, lanes: list[int], gap: int, y: float) -> list[tuple[float, float]]:
-    """The next free lane right of a column, at a height."""
+    """Return the next free lane right of a column, at a height."""
     edge = next(placed.x + placed.width for placed in boxes.values() if placed.box.column == column)
     lanes[gap] += 1
-    return [(edge + LANE * (lanes[gap] + 0.5), y)]
+    return [(edge + LANE_PX * (lanes[gap] + 0.5), y)]
 
 
 def _wire(wire: Wire, points: list[tuple[float, float]]) -> str:
@@ -172,10 +173,10 @@ def _wire(wire: Wire, points: list[tuple[float, float]]) -> str:
 
 
 def _bridge(wire: Wire, placed: _Placed) -> str:
-    """A wire from a pin on the right of a box to another one there."""
+    """Draw a wire from a pin on the right of a box to another one there."""
     (x, start), (_, end) = placed.right(wire.start[1]), placed.right(wire.end[1])
-    words = _text(x + 2.5 * LANE, (start + end) / 2 + 4.0, wire.words)
-    return _line(wire, [(x, start), (x + 2 * LANE, start), (x + 2 * LANE, end), (x, end)]) + "\n" + words
+    words = _text(x + 2.5 * LANE_PX, (start + end) / 2 + 4.0, wire.words)
+    return _line(wire, [(x, start), (x + 2 * LANE_PX, start), (x + 2 * LANE_PX, end), (x, end)]) + "\n" + words
 
 
 def _line(wire: Wire, points: list[tuple[float, float]]) -> str:
@@ -194,7 +195,7 @@ def _box(placed: _Placed) -> list[str]:
         f'<rect x="{_n(x)}" y="{_n(y)}" width="{_n(placed.width)}" height="{_n(placed.bottom - y)}" rx="4" '
         'fill="#f6f6f4" stroke="#222222" stroke-width="1.4"/>',
         _text(x + 9.0, y + 18.0, box.title, bold=True),
-        *(_text(x + 9.0, y + 18.0 + LINE * (i + 1), line) for i, line in enumerate(box.lines)),
+        *(_text(x + 9.0, y + 18.0 + LINE_PX * (i + 1), line) for i, line in enumerate(box.lines)),
     ]
     sides = [(placed.left(pin), pin, "start", 9.0) for pin in box.left]
     sides += [(placed.right(pin), pin, "end", -9.0) for pin in box.right]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import re
 import tempfile
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import cadquery as cq
@@ -29,14 +30,14 @@ _REFERENCE = re.compile(r"#(\d+)")
 _LIST = re.compile(r"\((#\d+(?:,#\d+)+)\)")
 
 Entity = tuple[str, tuple[int, ...]]
-"""Its text with `%s` for each reference, and the numbers of what these refer to."""
+"""Text with `%s` for each reference, and the numbers that these refer to."""
 
 
 def step_text(assembly: cq.Assembly, title: str) -> str:
-    """The canonical STEP text of a named assembly of named, coloured parts; millimetres; `title` enters the header.
+    """Return the canonical STEP text of an assembly of named, coloured parts [mm]; `title` enters the header.
 
     Raises:
-        BuildError: the kernel did not write it.
+        BuildError: the kernel wrote no file.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "part.step"
@@ -65,17 +66,17 @@ def canonical_step(text: str) -> str:
 
 
 def _bare(data: str) -> str:
-    """Without the white space outside strings, and without what means something there inside of them."""
+    """Remove white space outside strings, and replace signs with a meaning inside them."""
     parts = _STRING.split(data)
     parts[::2] = ["".join(part.split()) for part in parts[::2]]
-    for sign, stands_in in STAND_INS.items():
-        parts[1::2] = [part.replace(sign, stands_in) for part in parts[1::2]]
+    for sign, stand_in in STAND_INS.items():
+        parts[1::2] = [part.replace(sign, stand_in) for part in parts[1::2]]
     return "".join(parts)
 
 
 def _readable(data: str) -> str:
-    for sign, stands_in in STAND_INS.items():
-        data = data.replace(stands_in, sign)
+    for sign, stand_in in STAND_INS.items():
+        data = data.replace(stand_in, sign)
     return data
 
 
@@ -84,15 +85,15 @@ def _entity(body: str) -> Entity:
 
 
 def _filled(entity: Entity, words: dict[int, str]) -> str:
-    """The text of an entity with a word for each reference."""
+    """Return the text of an entity with a word for each reference."""
     text, targets = entity
     return text % tuple(map(words.__getitem__, targets))
 
 
 def _digests(entities: dict[int, Entity]) -> dict[int, str]:
-    """Merkle hash of every entity: independent of how the entities are numbered; unordered lists are put in order."""
+    """Return the Merkle hash of every entity, independent of their numbers; unordered lists are sorted."""
     digest: dict[int, str] = {}
-    for name in _children_first(entities):
+    for name in TopologicalSorter({name: targets for name, (_, targets) in entities.items()}).static_order():
         if entities[name][0].startswith(UNORDERED):
             entities[name] = _with_sorted_lists(entities[name], digest)
         text = _readable(_filled(entities[name], digest))
@@ -108,7 +109,7 @@ def _with_sorted_lists(entity: Entity, digest: dict[int, str]) -> Entity:
 
 
 def _parents_first(roots: list[int], entities: dict[int, Entity]) -> list[int]:
-    """Every entity once, in the order of a depth-first walk; iterative, because chains of entities are long."""
+    """Return every entity once, depth first; iterative, because chains of entities are long."""
     order: dict[int, None] = {}
     stack = roots[::-1]
     while stack:
@@ -117,18 +118,3 @@ def _parents_first(roots: list[int], entities: dict[int, Entity]) -> list[int]:
             order[name] = None
             stack += reversed(entities[name][1])
     return list(order)
-
-
-def _children_first(entities: dict[int, Entity]) -> list[int]:
-    """Every entity once, after all that it refers to."""
-    done: dict[int, None] = {}
-    opened: set[int] = set()
-    stack = list(entities)
-    while stack:
-        name = stack[-1]
-        if name in opened:
-            done[stack.pop()] = None
-        else:
-            opened.add(name)
-            stack += entities[name][1]
-    return list(done)

@@ -1,8 +1,7 @@
-"""3MF of parts as they lie on the bed: core specification, millimetres, the same bytes for the same meshes.
+"""3MF of parts in their print pose: core specification, millimetres, the same bytes for the same meshes.
 
-Beside the model lies what PrusaSlicer sets for its objects (Metadata/Slic3r_PE_model.config), which other readers skip.
-The entries are stored, not deflated, with the zip format's first date: what a compressor makes of them depends on its
-version.
+The file also contains the settings of PrusaSlicer (Metadata/Slic3r_PE_model.config), which other readers skip. The
+entries are stored, not deflated, with the zip format's first date: the output of a compressor depends on its version.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str, settings: Mapping[str, str]) -> bytes:
-    """The file of parts that are printed together.
+    """Return the file of parts that are printed together.
 
     Args:
         meshes: by name, in the frame of the bed.
@@ -80,7 +79,7 @@ def _object(number: int, part: str, mesh: TriMesh) -> Iterator[str]:
 
 
 def _config(meshes: Mapping[str, TriMesh], settings: Mapping[str, str]) -> Iterator[str]:
-    """Settings of every object; a reader takes the triangles of an object that it finds here from its volumes."""
+    """Yield the settings of every object; PrusaSlicer reads the triangles of an object from its volumes."""
     yield from ('<?xml version="1.0" encoding="UTF-8"?>', "<config>")
     for number, (part, mesh) in enumerate(meshes.items(), start=1):
         yield f'<object id="{number}" instances_count="1">'

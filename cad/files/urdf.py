@@ -23,7 +23,7 @@ from scanwright.design.scanner import Scanner
 
 
 def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
-    """The text of `scanner.urdf`.
+    """Return the text of `scanner.urdf`.
 
     Args:
         scanner: angles and products.
@@ -36,7 +36,7 @@ def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial],
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(angles.task)}>",
         '  <link name="world"/>',
-        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *map(_standing_shape, drive.shapes)]),
+        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *map(_fixed_shape, drive.shapes)]),
         *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
         *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
         *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),
@@ -58,7 +58,7 @@ def _joint(name: str, kind: str, parent: str, child: str, T: Array) -> list[str]
 
 
 def _spin_joint(scanner: Scanner) -> list[str]:
-    """It turns on and on, but where a cable without a ring holds it between the ends of its sweep."""
+    """Return the joint: continuous, but limited to the sweep if there is no slip ring."""
     servo, motion = scanner.servo, scanner.angles.motion
     kind, ends = "continuous", ""
     if isinstance(motion, Sweep) and scanner.slip_ring is None:
@@ -96,7 +96,7 @@ def _meshes(parts: list[str]) -> list[tuple[str, str]]:
     ]
 
 
-def _standing_shape(shape: Cuboid | Rod) -> tuple[str, str]:
+def _fixed_shape(shape: Cuboid | Rod) -> tuple[str, str]:
     if isinstance(shape, Rod):
         return _origin((0.0, 0.0, (shape.low + shape.high) / 2000)), _cylinder(shape.radius, shape.high - shape.low)
     low, high = np.array(shape.low), np.array(shape.high)
@@ -104,7 +104,7 @@ def _standing_shape(shape: Cuboid | Rod) -> tuple[str, str]:
 
 
 def _lidar_shapes(scanner: Scanner) -> list[tuple[str, str]]:
-    """Base and head of the lidar in the laser frame, whose origin is the optical centre."""
+    """Return base and head of the lidar in the laser frame, whose origin is the optical centre."""
     lidar = scanner.lidar
     x, y, height = lidar.body_mm
     low, high = lidar.window_z_mm

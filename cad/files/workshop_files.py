@@ -1,8 +1,7 @@
-"""What a build hands to the workshop beside STEP, STL and drawings: print files, the scanner to look at, parts list."""
+"""Files for the workshop besides STEP, STL and drawings: print files, scenes, parts list, wiring, assembly steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,31 +14,32 @@ from scanwright.cad.files.part_files import PartsResult, write_files
 from scanwright.cad.files.plates import plate_files, plates_of
 from scanwright.cad.files.threemf import threemf_bytes
 from scanwright.cad.files.wiring import wiring_files
-from scanwright.cad.findings import PartFinding
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
 from scanwright.cad.labels.fit_coupon import fit_coupon
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.layout import config_hash
 from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
+from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 
 
 @dataclass(frozen=True, slots=True)
 class Exports:
-    """What was written, relative to the build folder, what was not, and what a person should know."""
+    """Written files, relative to the build folder, files not included, and remarks for a person."""
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
 
 
 def export_scanner(
     scanner: Scanner,
     made: PartsResult,
     folder: Path,
-    progress: Callable[[str], None],
+    progress: Progress,
 ) -> Exports:
     """Write all of them into a build folder.
 
@@ -47,7 +47,7 @@ def export_scanner(
         scanner: angles and products.
         made: its parts, of `part_files.build_parts`.
         folder: the build folder.
-        progress: called with a line of text before each step.
+        progress: callback for progress.
     """
     assembly, digest, masses = made.assembly, config_hash(scanner), made.masses_g()
     joints = joints_of(assembly.layout)

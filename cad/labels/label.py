@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from scanwright.cad import solids
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.findings import PartFinding
 from scanwright.cad.geometry.holes import Piercing
 from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
 from scanwright.cad.labels.engrave import Groove, engrave, groove_of
@@ -34,6 +33,7 @@ from scanwright.cad.labels.sight import Sight
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
@@ -64,7 +64,7 @@ class Labelled:
 
     parts: dict[str, cq.Solid] = field(default_factory=dict)
     meshes: dict[str, TriMesh] = field(default_factory=dict)
-    findings: list[PartFinding] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
 
 
@@ -163,7 +163,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
         elif not label.seen:
             message = f"{name}: its label is hidden on the assembled scanner: no face in sight has room for it"
-            done.findings.append(PartFinding("label_hidden", "note", name, message))
+            done.findings.append(Finding("label_hidden", "note", name, message))
         words = [] if front is None else [(front, FRONT)]
         words += [] if label is None else [(label.place, label.lines)]
         if words:

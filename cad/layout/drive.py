@@ -6,6 +6,7 @@ Rotation frame at gamma = 0, mm. `cad/layout/direct/drive.py` and `cad/layout/be
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.direct.stack import DirectStack
@@ -52,6 +53,23 @@ class Mass:
 
 
 @dataclass(frozen=True, slots=True)
+class Need:
+    """A small thing that is bought for a drive.
+
+    Attributes:
+        kind: row of the parts list.
+        estimate: name of its price in `cad.files.prices`.
+        part: what it is, with its size.
+        source: of the row.
+    """
+
+    kind: Literal["wiring", "consumable"]
+    estimate: str
+    part: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
 class Mounted:
     """What a base mount holds: the servo's case, or a tower, above the mount's rails.
 
@@ -95,7 +113,7 @@ class DriveLayout:
         stacked: parts and products from the deck to the linkage, in which the exploded view lifts them.
         left_out: parts that this scanner does not need.
         borne: parts that another one keeps along the axis without a screw, by a bearing or a retaining ring.
-        needs: small things that it asks for, each with its source.
+        needs: small things that are bought for it.
     """
 
     stack: Stack
@@ -107,5 +125,5 @@ class DriveLayout:
     built: tuple[str, ...]
     stacked: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    needs: tuple[tuple[str, str], ...]
+    needs: tuple[Need, ...]
     borne: tuple[tuple[str, str], ...] = ()

@@ -10,8 +10,3 @@ from numpy import ndarray
 def dominators(costs: Num[ndarray, "n columns"], cost: Num[ndarray, " columns"]) -> Bool[ndarray, " n"]:
     """Return which rows (n, columns) dominate one of shape (columns,); lower is better. Shape (n,)."""
     return np.asarray((costs <= cost).all(axis=1) & (costs < cost).any(axis=1))
-
-
-def undominated(costs: Num[ndarray, "n columns"]) -> Bool[ndarray, " n"]:
-    """Return which of the rows (n, columns) no other row dominates, shape (n,)."""
-    return np.array([not dominators(costs, cost).any() for cost in costs], dtype=bool)

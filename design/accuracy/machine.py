@@ -12,11 +12,8 @@ CPUINFO = Path("/proc/cpuinfo")
 
 def this_machine() -> str:
     """Return processor, usable cores, system and Python."""
-    system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
-    return f"{_processor()}, {cores()} cores, {system}"
-
-
-def _processor() -> str:
     lines = CPUINFO.read_text().splitlines() if CPUINFO.exists() else []
     named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or "unnamed processor"
+    processor = named[0] if named else platform.processor() or "unnamed processor"
+    system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
+    return f"{processor}, {cores()} cores, {system}"

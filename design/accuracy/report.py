@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -35,12 +35,6 @@ def write_method_points(path: Path, measured: MethodsMeasured) -> None:
         marks = [str(front).lower(), str(point.chosen).lower()]
         rows.append([point.method, point.setting, *cells, *marks, point.failed])
     write_table(path, [*header.split(), "on_front", "chosen", "failed"], rows)
-
-
-def write_rows(path: Path, rows: list[StressRow]) -> None:
-    """Write the stress table."""
-    header = ["case", "quantity", "expected", "got", "error", "allowed", "passed"]
-    write_table(path, header, [[r.case, r.quantity, r.expected, r.got, r.error, r.allowed, r.passed] for r in rows])
 
 
 def work_precision_picture(path: Path, measured: MethodsMeasured, title: str) -> None:
@@ -92,7 +86,8 @@ def report_stress(loaded: LoadedTask, folder: Path, progress: Progress, more: It
     loaded = as_turning(loaded)
     rows = [*stress_rows(loaded, problem_of(loaded)), *more]
     folder.mkdir(parents=True, exist_ok=True)
-    write_rows(folder / "stress.csv", rows)
+    header = ["case", "quantity", "expected", "got", "error", "allowed", "passed"]
+    write_table(folder / "stress.csv", header, [[*astuple(row), row.passed] for row in rows])
     failed = sum(not row.passed for row in rows)
     lines = [
         f"{'ok  ' if row.passed else 'FAIL'} {row.case:58} {row.quantity:15} expected {row.expected:.8g}, "

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.design.accuracy.front import undominated
+from scanwright.design.accuracy.front import dominators
 from scanwright.design.accuracy.methods import Method, methods_for
 from scanwright.design.accuracy.reference import Reference, is_smooth, reference
 from scanwright.design.arrays import Array, Setting
@@ -125,8 +125,7 @@ def _settings(
 def best_points(points: Sequence[Point], reference_error: float) -> list[bool]:
     """Return whether no other point dominates it; errors below that of the reference count as equal."""
     costs = np.array([[p.median_s, max(p.J_error, reference_error)] for p in points])
-    answered = np.isfinite(costs[:, 1])
-    return (undominated(np.where(answered[:, None], costs, np.inf)) & answered).tolist()
+    return [bool(np.isfinite(cost[1]) and not dominators(costs, cost).any()) for cost in costs]
 
 
 def _point(

@@ -60,7 +60,9 @@ class ElectricLoad:
 
 def loads_of(scanner: Scanner) -> list[ElectricLoad]:
     """Return the devices of a scanner that the supply feeds: not a lidar that USB feeds."""
-    loads = [_servo_load(scanner.servo), _computer_load()]
+    amps = COMPUTER_W / COMPUTER_V
+    computer = ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps, amps)
+    loads = [_servo_load(scanner.servo), computer]
     if scanner.lidar.link != "usb-powered":
         loads.insert(0, _lidar_load(scanner.lidar, behind_ring=scanner.slip_ring is not None))
     return loads
@@ -83,11 +85,6 @@ def _servo_load(servo: Servo) -> ElectricLoad:
     volts = _fed_with(servo.supply_v)
     peak = stall * volts / servo.rated_v
     return ElectricLoad("servo", servo.name, volts, (servo.idle_a or 0.0) + peak / 5, peak, peak, servo.supply_v)
-
-
-def _computer_load() -> ElectricLoad:
-    amps = COMPUTER_W / COMPUTER_V
-    return ElectricLoad("computer", "computer", COMPUTER_V, amps / 2, amps, amps)
 
 
 def _fed_with(supply_v: tuple[float, float] | None) -> float:

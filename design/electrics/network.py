@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from scanwright.design.findings import Finding
+
 Pin = tuple[str, str]  # box and pin
 
 
@@ -19,6 +21,7 @@ class Box:
         right: pins away from it.
         column: its place from left to right.
         free: pins that stay open on purpose.
+        bought: whether the parts list has a row for it.
     """
 
     name: str
@@ -28,6 +31,7 @@ class Box:
     right: tuple[str, ...]
     column: int
     free: tuple[str, ...] = ()
+    bought: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +124,7 @@ class Drop:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """The entire wiring; `cautions` to read before wiring, and `unknown`, values that the catalogue lacks."""
+    """All of it; `cautions` are for a person before wiring, `unknown` warn of values that the catalogue lacks."""
 
     boxes: tuple[Box, ...]
     wires: tuple[Wire, ...]
@@ -130,4 +134,4 @@ class Network:
     supply_a: float
     risks: tuple[str, ...]
     cautions: tuple[str, ...]
-    unknown: tuple[str, ...]
+    unknown: tuple[Finding, ...]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterator
 
 from scanwright.design.catalogue.products import Circuits, Lidar, SlipRing
 from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of
@@ -18,6 +19,7 @@ from scanwright.design.electrics.loads import (
 )
 from scanwright.design.electrics.network import Box, Branch, Circuit, Network, Pin, Wire
 from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_for
+from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
 
 USB_A = 0.5  # of a port: USB 2.0 specification, 7.2.1
@@ -78,11 +80,6 @@ def _shield(lidar: Lidar) -> tuple[str, ...]:
     return () if lidar.sends_only else ("shield",)
 
 
-def _plug_pin(net: str) -> str:
-    """Return the computer's pin for a net."""
-    return CROSSED.get(net, net)
-
-
 def _nets(lidar: Lidar) -> list[tuple[str, float]]:
     """Return the nets that the lidar needs in a ring: power, data, and last the shield, which is optional."""
     most = most_a(lidar)
@@ -133,7 +130,8 @@ def _boxes(
         if load.volts != SUPPLY_V:
             title = f"{CHANGER[load.volts]} for the {load.name}"
             size = (f"at least {load.peak_a:.2g} A, set to {load.set_v:g} V",)
-            boxes.append(Box(f"{load.name} converter", title, size, ("in +", "in -"), ("out +", "out -"), 3))
+            sides = ("in +", "in -"), ("out +", "out -")
+            boxes.append(Box(f"{load.name} converter", title, size, *sides, 3, bought=True))
     signals = SIGNALS[servo.bus or "ttl"]
     plug = "data port" if lidar.link is None else PLUG[lidar.link]
     boxes += [
@@ -153,7 +151,7 @@ def _boxes(
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
     pins = (*power, *data, *(_shield(lidar) if shielded else ()))
     level = () if lidar.signal_v is None else (f"levels of {lidar.signal_v:g} V, not RS-232",)
-    ends = (*map(_plug_pin, data), "shield")
+    ends = (*(CROSSED.get(net, net) for net in data), "shield")
     boxes.append(
         Box("plug", f"{plug} of the computer", (_cable(lidar, circuits), *level), (plug,), ends, 5, ("shield",))
     )
@@ -213,7 +211,7 @@ def _wires(
     wires += [Wire(("adapter", pin), ("servo", end), pin, 0.0, 0.0, note="servo cable") for pin, end in joined.items()]
     peaks = dict(_nets(lidar))
     for net in (*_data(lidar), *_shield(lidar)):
-        start = ("plug", _plug_pin(net))
+        start = ("plug", CROSSED.get(net, net))
         if not circuits:
             note = _data_note(net) if _cable(lidar, circuits) == CUT else UNCUT
             wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=note))
@@ -257,18 +255,22 @@ def _data_note(net: str) -> str:
     return {"shield": "braid", "VBUS": MEASURE, "GND": MEASURE}.get(net, "")
 
 
-def _unknown(scanner: Scanner) -> list[str]:
+def _unknown(scanner: Scanner) -> Iterator[Finding]:
+    """Yield a warning for each value that the catalogue lacks."""
     lidar, servo, ring = scanner.lidar, scanner.servo, scanner.slip_ring
-    facts: dict[str, object] = {
-        f"{lidar.name}: supply_v": lidar.supply_v,
-        f"{lidar.name}: current_a and peak_a": lidar.peak_a,
-        f"{lidar.name}: link": lidar.link,
-        f"{servo.name}: supply_v": servo.supply_v,
-        f"{servo.name}: stall_a": servo.stall_a,
-        f"{servo.name}: bus": servo.bus,
-    }
+    values: list[tuple[str, str, object]] = [
+        (lidar.name, "supply_v", lidar.supply_v),
+        (lidar.name, "current_a and peak_a", lidar.peak_a),
+        (lidar.name, "link", lidar.link),
+        (servo.name, "supply_v", servo.supply_v),
+        (servo.name, "stall_a", servo.stall_a),
+        (servo.name, "bus", servo.bus),
+    ]
     if lidar.link != "usb-powered":
-        facts[f"{lidar.name}: leads (the colours of its power lead)"] = lidar.leads
+        values.append((lidar.name, "leads (the colours of its power cable)", lidar.leads))
     if ring is not None:
-        facts[f"{ring.name}: ways"] = ring.ways
-    return [name for name, value in facts.items() if value is None]
+        values.append((ring.name, "ways", ring.ways))
+    for product, field, value in values:
+        if value is None:
+            message = f"{product}: {field} is not in the catalogue"
+            yield Finding("wiring", "warning", product, message, hint="measure it, or ask its maker")

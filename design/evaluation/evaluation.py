@@ -17,7 +17,7 @@ from scanwright.design.evaluation.as_built import AsBuilt, as_built
 from scanwright.design.evaluation.coverage import Coverage, coverage, on_surfaces
 from scanwright.design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
 from scanwright.design.evaluation.metres import PlaneFigures, on_planes
-from scanwright.design.evaluation.poles import PoleChances, parse_pole, pole_chances
+from scanwright.design.evaluation.poles import Pole, PoleChances, pole_chances, require_in_range
 from scanwright.design.objective.ball_search import BallScore, ball_score
 from scanwright.design.objective.holes import Hole, holes, percent
 from scanwright.design.objective.problem import Problem, problem_of
@@ -32,11 +32,19 @@ from scanwright.design.task.task import LoadedTask
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """The optical centre off the axis by (x, y) of the rotation frame, as seen at a range."""
+    """Lever arm: offset (x, y) of the optical centre from the rotation axis, as seen at a range.
+
+    Raises:
+        TaskError: the range is not at least twice the offset.
+    """
 
     x_mm: float
     y_mm: float
     range_m: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.range_m < 1e6 or not max(abs(self.x_mm), abs(self.y_mm)) < 500 * self.range_m:
+            raise TaskError(f"lever: range_m = {self.range_m:g}: must be at least twice the offset, below 1e6")
 
     def shares(self) -> tuple[float, float, float]:
         """The same as shares of the range: `Problem.lever`."""
@@ -181,8 +189,8 @@ class Evaluation:
 def evaluate(
     loaded: LoadedTask,
     angles_rad: Setting,
-    pole: str | None,
-    lever: str | None,
+    pole: Pole | None,
+    lever: Lever | None,
     progress: Callable[[str], None],
     shadow: SelfOcclusion | None = None,
 ) -> Evaluation:
@@ -191,21 +199,21 @@ def evaluate(
     Args:
         loaded: the task.
         angles_rad: the setting.
-        pole: as `parse_pole` reads it, None for no pole.
-        lever: `X_MM,Y_MM,RANGE_M`, None for an optical centre on the axis.
+        pole: computes the chance to hit it; None for no pole.
+        lever: offset of the optical centre; None for one on the axis.
         progress: is told what is being computed.
         shadow: beams that the parts of this very setting block, if it was built.
 
     Raises:
         BuildError: the shadow is of another number of beams.
-        TaskError: no direction has a weight, or the pole or the lever makes no sense.
+        TaskError: no direction has a weight, or the lidar cannot measure the pole.
         NumericalError: J differs from a count over simulated beams.
     """
-    asked = None if pole is None else parse_pole(pole, loaded.lidar)
-    off_axis = None if lever is None else _parse_lever(lever)
+    if pole is not None:
+        require_in_range(pole, loaded.lidar)
     problem = problem_of(loaded)
-    if off_axis is not None:
-        problem = replace(problem, lever=off_axis.shares())
+    if lever is not None:
+        problem = replace(problem, lever=lever.shares())
     motion, sweep = loaded.task.motion, problem.sweep
     progress("closed form")
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
@@ -218,7 +226,7 @@ def evaluate(
     return Evaluation(
         problem=problem,
         angles_rad=angles_rad,
-        lever=off_axis,
+        lever=lever,
         score=found,
         ball=ball_score(problem, angles_rad),
         holes=holes(problem, angles_rad),
@@ -227,28 +235,11 @@ def evaluate(
         cap=cap,
         interlaced_s=interlaced_s,
         rises=sensitivity(problem, angles_rad, np.radians(1.0)),
-        hit=None if asked is None else pole_chances(problem, angles_rad, asked),
+        hit=None if pole is None else pole_chances(problem, angles_rad, pole),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
         planes=on_planes(loaded, problem, angles_rad),
         as_built=built,
     )
-
-
-def angles_in(text: str) -> tuple[float, float, float, float]:
-    """Four angles in degrees, separated by commas: alpha_rot, beta_rot, alpha_laser, beta_laser.
-
-    Raises:
-        TaskError: these are not four angles.
-    """
-    try:
-        alpha_rot, beta_rot, alpha_laser, beta_laser = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise TaskError(f"angles = '{text}': four numbers in degrees, such as 0,90,0,-90 for rolling") from error
-    try:
-        setting_rad((alpha_rot, beta_rot, alpha_laser, beta_laser))
-    except TaskError as error:
-        raise TaskError(f"angles = '{text}': {error}") from error
-    return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
 def setting_rad(angles_deg: Sequence[float]) -> Setting:
@@ -274,13 +265,3 @@ def simulated_beams(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 
 def _cap(cap: BlindCone) -> str:
     x, y, z = cap.axis_world
     return f"{cap.half_angle_deg:.2f} deg about ({x:z.3f}, {y:z.3f}, {z:z.3f})"
-
-
-def _parse_lever(text: str) -> Lever:
-    try:
-        x_mm, y_mm, range_m = (float(part) for part in text.split(","))
-    except ValueError:
-        x_mm = y_mm = range_m = 0.0
-    if not 0 < range_m < 1e6 or not max(abs(x_mm), abs(y_mm)) < 500 * range_m:
-        raise TaskError(f"lever = '{text}': X_MM,Y_MM,RANGE_M, the range at least twice the arm, such as 5,-3,1.0")
-    return Lever(x_mm, y_mm, range_m)

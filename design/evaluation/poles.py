@@ -27,11 +27,22 @@ SEED = 0
 
 @dataclass(frozen=True, slots=True)
 class Pole:
-    """An upright pole and how far away it stands."""
+    """An upright pole, its middle at the height of the optical centre, and its range.
+
+    Raises:
+        TaskError: a number is not above 0, or the scanner would be inside the pole.
+    """
 
     width_m: float
     height_m: float
     range_m: float
+
+    def __post_init__(self) -> None:
+        for name in ("width_m", "height_m", "range_m"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise TaskError(f"pole: {name} = {getattr(self, name):g}: must be above 0")
+        if self.width_m >= 2 * self.range_m:
+            raise TaskError(f"pole: width_m = {self.width_m:g}: the scanner would be inside the pole")
 
     @property
     def half_width_rad(self) -> float:
@@ -73,24 +84,15 @@ class PoleChances:
     stands: str
 
 
-def parse_pole(text: str, lidar: Lidar) -> Pole:
-    """A pole from `WIDTH_MM,HEIGHT_MM,RANGE_M`.
+def require_in_range(pole: Pole, lidar: Lidar) -> None:
+    """Refuse a pole that the lidar cannot measure.
 
     Raises:
-        TaskError: these are not three numbers above 0, or the lidar does not see that far or that near.
+        TaskError: it is too near or too far away.
     """
-    try:
-        width_mm, height_mm, range_m = (float(part) for part in text.split(","))
-    except ValueError:
-        width_mm = height_mm = range_m = np.nan
-    if not (0 < width_mm < np.inf and 0 < height_mm < np.inf and 0 < range_m < np.inf):
-        raise TaskError(f"pole = '{text}': WIDTH_MM,HEIGHT_MM,RANGE_M, all above 0, such as 20,1000,5")
     low, high = lidar.range_min_mm / 1000, lidar.practical_range_m
-    if not low <= range_m <= high:
-        raise TaskError(f"pole = '{text}': range_m = {range_m:g}: the {lidar.name} sees from {low:g} to {high:g} m")
-    if width_mm / 1000 >= 2 * range_m:
-        raise TaskError(f"pole = '{text}': width_mm = {width_mm:g}: the scanner would stand in the pole")
-    return Pole(width_mm / 1000, height_mm / 1000, range_m)
+    if not low <= pole.range_m <= high:
+        raise TaskError(f"pole: range_m = {pole.range_m:g}: {lidar.name} measures from {low:g} to {high:g} m")
 
 
 def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChances:
@@ -102,7 +104,7 @@ def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChanc
     weights, stands = _standing(problem, pole)
     total = float(weights.sum())
     if not total > 0:
-        raise TaskError("pole: the robot hides every azimuth at that height: make the pole higher, or move it away")
+        raise TaskError("pole: the robot hides every azimuth at that height; choose a higher or a farther pole")
     below = np.concatenate([[0.0], np.cumsum(weights)]) / total
     rng = np.random.default_rng(SEED)
     per_phase = []

@@ -38,9 +38,7 @@ def read_text_of(path: Path, what: str) -> str:
     try:
         return read_text(path)
     except NotADirectoryError as error:
-        raise TaskError(
-            f"{path.parent}: this is a file; name the folder of a build, which contains {path.name}"
-        ) from error
+        raise TaskError(f"{path.parent}: this is a file; name the build folder that contains {path.name}") from error
     except (OSError, ValueError) as error:
         kind = MissingFileError if isinstance(error, FileNotFoundError) else TaskError
         raise kind(f"{path}: cannot read {what}: {getattr(error, 'strerror', None) or error}") from error

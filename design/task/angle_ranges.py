@@ -23,31 +23,32 @@ class AngleRanges(Record):
     """Mounting angles to search over, or fixed."""
 
     alpha_rot_deg: Angle = Field(
-        default=(-180.0, 180.0), description="the servo's axis, at first upright, is tilted about the line ahead"
+        default=(-180.0, 180.0), description="tilt of the servo's axis, upright at 0, about x (ahead)"
     )
     beta_rot_deg: Angle = Field(
-        default=(-90.0, 90.0), description="... and before that about the line to the left: 90 points it ahead"
+        default=(-90.0, 90.0), description="tilt before that about y (left): 90 points it ahead"
     )
     alpha_laser_deg: Angle = Field(
-        default=(-90.0, 90.0), description="the lidar, at first lying across the axis, is rolled about its front"
+        default=(-90.0, 90.0), description="roll of the lidar, perpendicular to the axis at 0, about its front"
     )
     beta_laser_deg: Angle = Field(
-        default=(-90.0, 90.0), description="... and after that pitched: -90 lets its front look along the axis"
+        default=(-90.0, 90.0), description="pitch after that: at -90 its front points along the axis"
     )
-    step_deg: Number = Field(default=5.0, ge=0.5, le=45, description="of the grid that is searched, refined to 0.01")
-    tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting: the optimum bears it best")
+    step_deg: Number = Field(default=5.0, ge=0.5, le=45, description="step of the grid of the search, refined to 0.01")
+    tolerance_deg: Number = Field(default=0.0, ge=0, le=10, description="of the mounting, for which J is optimised")
     holes: Literal["avoid", "allow"] = Field(
-        default="avoid", description="directions of weight that no beam ever comes near; 'allow' is the paper's plain J"
+        default="avoid", description="blind spots in the regions; 'allow' is the plain J of the paper"
     )
 
     prefer: Literal["lowest_J", "simple"] = Field(
-        default="lowest_J", description="'simple' takes the mount with the fewest angles that costs at most prefer_loss"
+        default="lowest_J",
+        description="'simple' chooses the fewest angles that cost at most prefer_loss",
     )
     prefer_loss: Number = Field(
         default=0.0,
         ge=0,
         lt=1,
-        description="share of the beams per ball (of J if not log) that 'simple' may cost",
+        description="largest cost of 'simple': share of the beam density (of J if not log)",
     )
 
     @model_validator(mode="after")

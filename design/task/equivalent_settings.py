@@ -105,14 +105,12 @@ def equivalents_within(setting: Setting) -> list[Equivalent]:
         for symmetry in _SYMMETRIES
         if (inside := symmetry.of(setting)) is not None
     ]
-    return sorted(
-        equivalents, key=lambda each: (_count(each, setting), each.gamma_sign < 0, each.mirrored, each.gamma_added_deg)
-    )
 
+    def order(each: Equivalent) -> tuple[int, bool, bool, float]:
+        changed = sum(each.setting[name] != tuple(setting[name]) for name in BOUNDS)
+        return changed, each.gamma_sign < 0, each.mirrored, each.gamma_added_deg
 
-def _count(equivalent: Equivalent, original: Setting) -> int:
-    """Return how many angles it changes."""
-    return sum(equivalent.setting[name] != tuple(original[name]) for name in BOUNDS)
+    return sorted(equivalents, key=order)
 
 
 def advice(setting: Setting, name: str) -> str:

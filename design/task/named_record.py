@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,10 @@ def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], P
     try:
         return read_toml(source, f"the {what} file"), source
     except MissingFileError as error:
-        others = [str(other) for other in source.parent.glob("*.toml")]
-        known = suggest(str(path), [*others, *names_in(shipped)])
+        names = {name: name for name in names_in(shipped)}
+        names |= {other.stem: str(other) for other in source.parent.glob("*.toml")}
+        close = difflib.get_close_matches(path.stem, names, n=1, cutoff=0.8)  # the person has typed a file's name
+        known = f"; did you mean '{names[close[0]]}'?" if close else f"; known: {', '.join(names_in(shipped))}"
         raise MissingFileError(f"{path}: no such {what} file{known}") from error
 
 

@@ -19,7 +19,7 @@ Number = Annotated[float, Strict()]
 
 Span = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
-Value = Annotated[Number, Field(ge=0, le=1e300, description="how much it matters; 0 is nothing")]
+Value = Annotated[Number, Field(ge=0, le=1e300, description="weight of the region; 0 excludes it")]
 
 
 def _divides_the_half_circle(step: float) -> float:
@@ -77,8 +77,8 @@ class ConeRegion(Record):
     """Directions within `half_angle_deg` of `axis` (world frame; its length does not matter)."""
 
     shape: Literal["cone"] = Field(description="around one direction")
-    axis: tuple[Number, Number, Number] = Field(description="its middle: x ahead, y left, z up; of any length")
-    half_angle_deg: Number = Field(ge=1e-3, le=180, description="from its middle to its edge")
+    axis: tuple[Number, Number, Number] = Field(description="its centre: x ahead, y left, z up; of any length")
+    half_angle_deg: Number = Field(ge=1e-3, le=180, description="from its centre to its edge")
     value: Value = 1.0
     required: Required = None
 
@@ -100,7 +100,7 @@ class MapRegion(Record):
     """
 
     shape: Literal["map"] = Field(description="weights in a picture or a table")
-    file: str = Field(description=".png, .csv or .npy, beside the task: rows theta 0 .. 180, columns phi 0 .. 360")
+    file: str = Field(description=".png, .csv or .npy, next to the task: rows theta 0 .. 180, columns phi 0 .. 360")
     value: Value = 1.0
     required: Required = None
 
@@ -108,19 +108,19 @@ class MapRegion(Record):
 class Placed(Record):
     """A mesh, and the scanner's optical centre and the world's axes in it (roll, pitch, yaw; z last)."""
 
-    file: str = Field(description=".stl, .ply, .obj, .dae or .glb, beside the task")
+    file: str = Field(description=".stl, .ply, .obj, .dae or .glb, next to the task")
     unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
     sensor_m: Triple = Field(default=(0.0, 0.0, 0.0), description="the optical centre in the mesh: x, y, z")
     rpy_deg: tuple[Turn, Turn, Turn] = Field(
         default=(0.0, 0.0, 0.0), description="axes of the world in the mesh: roll, pitch, yaw"
     )
-    step_deg: GridStep = Field(default=2.0, description="between the rays that are cast at it")
+    step_deg: GridStep = Field(default=2.0, description="between the rays")
 
 
 class MeshRegion(Placed):
     """Every direction in which a mesh, such as the robot, is hit."""
 
-    shape: Literal["mesh"] = Field(description="where a mesh is, such as the robot itself")
+    shape: Literal["mesh"] = Field(description="directions of a mesh, such as the robot itself")
     value: Value = 1.0
 
 
@@ -151,8 +151,8 @@ class OnPlane(Record):
     """
 
     _rising: ClassVar[Pairs]  # fields: the first of each pair must be below the second
-    heading_deg: Number = Field(default=0.0, ge=-360, le=360, description="where it lies: 0 is ahead, 90 left")
-    height_m: Length = Field(description="of the scanner's optical centre over the ground")
+    heading_deg: Number = Field(default=0.0, ge=-360, le=360, description="direction: 0 is ahead, 90 left")
+    height_m: Length = Field(description="height of the scanner's optical centre above the ground")
     value: Value = 1.0
     required: Required = None
 
@@ -208,9 +208,9 @@ class GroundRegion(OnPlane):
 
     _rising: ClassVar[Pairs] = (("from_m", "to_m"),)
     shape: Literal["ground"] = Field(description="level ground, in metres")
-    from_m: Far = Field(description="where it begins; negative is behind")
-    to_m: Far = Field(description="where it ends")
-    width_m: Length = Field(description="across, half of it to each side")
+    from_m: Far = Field(description="its near end; negative is behind")
+    to_m: Far = Field(description="its far end")
+    width_m: Length = Field(description="its width, half of it to each side")
 
     def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
         return _level(self.from_m, self.to_m, self.width_m, -self.height_m)
@@ -224,10 +224,10 @@ class CeilingRegion(OnPlane):
 
     _rising: ClassVar[Pairs] = ("height_m", "ceiling_m"), ("from_m", "to_m")
     shape: Literal["ceiling"] = Field(description="a level ceiling, in metres")
-    ceiling_m: Length = Field(default=2.5, description="its height over the ground")
-    from_m: Far = Field(default=-2.0, description="where it begins; negative is behind")
-    to_m: Far = Field(default=2.0, description="where it ends")
-    width_m: Length = Field(default=4.0, description="across, half of it to each side")
+    ceiling_m: Length = Field(default=2.5, description="its height above the ground")
+    from_m: Far = Field(default=-2.0, description="its near end; negative is behind")
+    to_m: Far = Field(default=2.0, description="its far end")
+    width_m: Length = Field(default=4.0, description="its width, half of it to each side")
 
     def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
         return _level(self.from_m, self.to_m, self.width_m, self.ceiling_m - self.height_m)
@@ -241,10 +241,10 @@ class WallRegion(OnPlane):
 
     _rising: ClassVar[Pairs] = (("bottom_m", "top_m"),)
     shape: Literal["wall"] = Field(description="an upright wall, in metres")
-    distance_m: Length = Field(description="to it, level")
-    width_m: Length = Field(description="across, half of it to each side")
-    bottom_m: Far = Field(default=0.0, description="height of its lower edge over the ground")
-    top_m: Far = Field(default=2.5, description="height of its upper edge over the ground")
+    distance_m: Length = Field(description="horizontal distance")
+    width_m: Length = Field(description="its width, half of it to each side")
+    bottom_m: Far = Field(default=0.0, description="height of its lower edge above the ground")
+    top_m: Far = Field(default=2.5, description="height of its upper edge above the ground")
 
     def _ahead_m(self) -> tuple[Triple, Triple, Triple, Triple]:
         far, side = self.distance_m, self.width_m / 2

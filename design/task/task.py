@@ -67,17 +67,17 @@ class DensityRules(Record):
     """How density is counted and J is computed; see `docs/definitions.md`, Density and Objective."""
 
     ball_radius_deg: Number = Field(
-        default=2.0, ge=SMALLEST_BALL_DEG, le=90, description="beams this near to a direction count for it"
+        default=2.0, ge=SMALLEST_BALL_DEG, le=90, description="radius in which beams of a direction count"
     )
     objective: str = Field(default="log", description="what J is; see Definitions", examples=[*SHIPPED_OBJECTIVES])
     required: Required = None
-    background: Value = Field(default=0.0, description="how much directions matter that no weight names")
+    background: Value = Field(default=0.0, description="weight of directions outside of all regions")
     quadrature: Literal["solid_angle", "equal_angle"] = Field(
-        default="solid_angle", description="how directions are summed; 'equal_angle' is the paper's sum"
+        default="solid_angle", description="quadrature of J; 'equal_angle' is the sum of the paper"
     )
-    grid_step_deg: GridStep = Field(default=1.0, description="of the paper's sum")
-    tolerance: Number | None = Field(default=None, gt=0, description="error of J that is good enough")
-    budget_s: Number | None = Field(default=None, gt=0, description="time that one J may take")
+    grid_step_deg: GridStep = Field(default=1.0, description="grid of that sum")
+    tolerance: Number | None = Field(default=None, gt=0, description="largest error of J")
+    budget_s: Number | None = Field(default=None, gt=0, description="largest time of one J")
 
     @field_validator("objective")
     @classmethod
@@ -90,37 +90,37 @@ class DensityRules(Record):
 class Limits(Record):
     """Limits that every reported setting must meet."""
 
-    min_density: Number | None = Field(default=None, ge=1, description="beams per ball, anywhere in the region")
-    max_line_gap_deg: Number | None = Field(default=None, gt=0, le=360, description="between neighbouring scan lines")
-    max_blind_cone_deg: Number | None = Field(default=None, ge=0, le=90, description="half angle, about the axis")
-    max_blocked: Number | None = Field(default=None, gt=0, le=1, description="share of the beams that parts may hide")
-    max_blind_weight: Number | None = Field(default=None, ge=0, le=1, description="share of the weight never seen")
+    min_density: Number | None = Field(default=None, ge=1, description="beam density, everywhere in the regions")
+    max_line_gap_deg: Number | None = Field(default=None, gt=0, le=360, description="between adjacent scan lines")
+    max_blind_cone_deg: Number | None = Field(default=None, ge=0, le=90, description="half angle of the blind cone")
+    max_blocked: Number | None = Field(default=None, gt=0, le=1, description="share of the beams that parts block")
+    max_blind_weight: Number | None = Field(default=None, ge=0, le=1, description="share of the weight in blind spots")
 
 
 class Task(Record):
     """One task file with every default written out."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="of the task and its build folder")
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="name of the task and its build folder")
     sensor: str = Field(description="the 2D lidar, by its name in the catalogue")
-    servo: str = Field(description="what turns it, by its name in the catalogue")
-    slip_ring: str | None = Field(default=None, description="what lets its cable turn for ever; a sweep needs none")
-    printer: str = Field(default="fdm-0.4", description="how the parts are made, by its name in the catalogue")
-    catalogue: tuple[str, ...] = Field(default=(), description="product files of your own, beside the task")
-    deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck")
-    modules: Modules = Field(default=NO_MODULES, description="parts that it works without: none by default")
-    motion: Annotated[Motion | Shortest, Field(discriminator="mode", description="how the servo moves in one scan")]
+    servo: str = Field(description="the servo, by its name in the catalogue")
+    slip_ring: str | None = Field(default=None, description="the slip ring; a sweep needs none")
+    printer: str = Field(default="fdm-0.4", description="printer, by its name in the catalogue")
+    catalogue: tuple[str, ...] = Field(default=(), description="your own product files, next to the task")
+    deck: DeckHoles | None = Field(default=None, description="holes of the robot's deck for the base mount")
+    modules: Modules = Field(default=NO_MODULES, description="optional parts: none by default")
+    motion: Annotated[Motion | Shortest, Field(discriminator="mode", description="motion of the servo in one scan")]
     angles: AngleRanges = Field(default=AngleRanges(), description="mounting angles: ranges to search, or values")
-    density: DensityRules = Field(default=DensityRules(), description="how beams are counted and judged")
-    limits: Limits = Field(default=Limits(), description="what every answer must keep")
-    weight: tuple[Region, ...] = Field(default=(), description="what matters, painted in order: the last one wins")
-    mask: tuple[MaskRegion, ...] = Field(default=(), description="what the robot hides: it never counts")
+    density: DensityRules = Field(default=DensityRules(), description="definition of density and J")
+    limits: Limits = Field(default=Limits(), description="limits that every result must meet")
+    weight: tuple[Region, ...] = Field(default=(), description="regions of interest; the last one takes precedence")
+    mask: tuple[MaskRegion, ...] = Field(default=(), description="regions that the robot hides: excluded")
     scene: Placed | None = Field(default=None, description="a mesh of the surroundings")
     camera: Camera | None = Field(default=None, description="a camera that colours the cloud")
 
     @model_validator(mode="after")
     def _boxes_stand_in_a_scene(self) -> Task:
         if self.scene is None and any(isinstance(region, BoxRegion) for region in self.weight):
-            raise ValueError("a weight of shape = 'box' needs a [scene] that it stands in")
+            raise ValueError("a weight of shape = 'box' requires a [scene]")
         return self
 
     @field_validator("mask")

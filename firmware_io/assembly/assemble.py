@@ -14,7 +14,6 @@ from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from statistics import median_high
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +26,9 @@ from scanwright.design.errors import RecordingError, suggest
 from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.assembly.beam_outcome import Verdict, between_surfaces
-from scanwright.firmware_io.assembly.cloud_rows import COLUMNS, cloud_fields, cloud_rows
+from scanwright.firmware_io.assembly.cloud_rows import cloud_fields, cloud_rows
 from scanwright.firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
+from scanwright.firmware_io.assembly.options import COLUMNS, DEFAULT, AssembleOptions, Per
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
@@ -37,7 +37,6 @@ from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import Block, straight
 
-Per = Literal["recording", "turn", "half"]
 _PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
@@ -129,40 +128,31 @@ def assemble_recording(
     recording: Path,
     angles: AngleSet,
     out: Path,
+    options: AssembleOptions = DEFAULT,
     *,
-    organised: bool = False,
-    lag_s: float = 0.0,
-    per: Per = "recording",
-    poses: Trajectory | None = None,
+    platform: Trajectory | None = None,
     own_body: OwnBody | None = None,
-    smooth: bool = True,
-    columns: Iterable[str] = COLUMNS,
-    beams: BeamLimits = BeamLimits(),
 ) -> AssembleSummary:
     """Write the cloud of a recording, or one for each turn of the axis, in constant memory whatever its length.
 
     Args:
         recording: MCAP recording.
         angles: angle set of the scanner that made it.
-        out: the cloud, `.ply` (`finish` makes other formats of it): x y z [m] and `columns`; `out_000.ply` and so on
-            where there are several.
-        organised: keep beam i of every scan in its row i, `width` rows to a scan, NaN where it became no point.
-        lag_s: how late the joint log's stamps are: the beam of time t has the angle logged at t + lag_s.
-        per: a new cloud after each whole (half) turn since the first scan, and where the axis turns back; a scan
-            belongs where its first beam does.
-        poses: where the platform was, for clouds on a map; without them the platform stands still.
-        own_body: beams that end on the scanner, to be left out.
-        smooth: smooth the steps of the encoder where that helps; else go straight from sample to sample.
-        columns: of `COLUMNS`; time_s counts from the first beam, ring is the beam's index.
-        beams: which beams are wanted at all.
+        out: the cloud, `.ply` (`finish` makes other formats of it): x y z [m] and columns; `out_000.ply` and so on if
+            there are several.
+        options: all but poses, imu, camera, outliers, voxel_m and normals, which others apply. A beam of time t has
+            the angle logged at t + lag_s; a scan belongs to the cloud of its first beam.
+        platform: where the platform was, for clouds on a map; without it the platform stands still.
+        own_body: beams that end on the scanner, to be dropped.
 
     Raises:
         RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
     """
-    columns = list(columns)
+    columns, organised, lag_s, per = options.columns, options.organised, options.lag_s, options.per
+    beams = BeamLimits(options.min_range_m, options.max_range_m, options.edges_deg)
     _check(out, lag_s, columns)
     source = open_recording(recording)
-    if smooth:
+    if options.smooth:
         curve, notes = axis_curve(source.joint_log, at_rest=source.at_rest)
     else:
         curve, notes = straight(source.joint_log), "axis angle: straight between samples, as asked"
@@ -177,7 +167,7 @@ def assemble_recording(
 
     def rows_of(block: Block) -> NDArray[np.void]:
         block, with_joint = beams.limited(block), "joint_rad" in columns
-        placed = place_block(block, curve, angles, lag_s, poses=poses, own_body=own_body, with_joint=with_joint)
+        placed = place_block(block, curve, angles, lag_s, poses=platform, own_body=own_body, with_joint=with_joint)
         beams.leave_out(block, placed)
         counts.update(dict(enumerate(np.bincount(placed.verdict.ravel()).tolist())))
         rows = cloud_rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
@@ -187,7 +177,7 @@ def assemble_recording(
     for which, tagged in groupby(_by_cloud(source.blocks(), cloud_from_rows), key=itemgetter(0)):
         path = out if per == "recording" else out.with_name(f"{out.stem}_{which:03}{out.suffix}")
         scans = int(np.sum(cloud_from_rows == which))
-        comments = _comments(source, angles, width, scans, lag_s, poses is not None)
+        comments = _comments(source, angles, width, scans, lag_s, platform is not None)
         before = counts[Verdict.POINT]
         with PlyWriter(path, fields, comments) as cloud:
             for _ in ahead(cloud.write, (rows_of(block) for _, block in tagged)):
@@ -214,13 +204,13 @@ def assemble_recording(
         notes=(
             notes,
             *_about_sensor(source, angles.sensor),
-            *(*_about_gaps(source), *_about_poses(poses), *_about_own_body(own_body, source)),
+            *(*_about_gaps(source), *_about_poses(platform), *_about_own_body(own_body, source)),
             *_about_slivers(clouds, per),
         ),
     )
 
 
-def _check(out: Path, lag_s: float, columns: list[str]) -> None:
+def _check(out: Path, lag_s: float, columns: Iterable[str]) -> None:
     check_place(out, RecordingError)
     if out.suffix != ".ply":
         raise RecordingError(f"{out}: clouds are written as PLY; name it {out.with_suffix('.ply').name}")

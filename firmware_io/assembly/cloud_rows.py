@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scanwright.firmware_io.assembly.deskew_kernel import PlacedBlock
+from scanwright.firmware_io.assembly.options import COLUMNS
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
 from scanwright.firmware_io.samples import Block
 
-COLUMNS = ("intensity", "time_s", "joint_rad", "ring")
 """What a cloud can tell of each point beside x y z."""
 
 

@@ -25,7 +25,7 @@ _EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers 
 FAMILIES = (
     LidarFamily("ldrobot", "LDROBOT", open_ldrobot, f"{_EMULATORS}.ldrobot:ldrobot_emulator"),
     LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, f"{_EMULATORS}.lidar:scip_emulator", stamp_choice=True),
-    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, f"{_EMULATORS}.slamtec:slamtec_emulator"),
+    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, f"{_EMULATORS}.slamtec.machine:slamtec_emulator"),
     LidarFamily("sick", "SICK (CoLa A and B)", open_sick, f"{_EMULATORS}.sick.cola_emulator:sick_emulator"),
     LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, f"{_EMULATORS}.sick.lms_emulator:lms_emulator"),
 )

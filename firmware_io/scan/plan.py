@@ -9,7 +9,7 @@ from pathlib import Path
 from scanwright.design.angles import CALIBRATED, AngleSet, angles_in_use
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Servo
-from scanwright.design.errors import DeviceError, RecordingError
+from scanwright.design.errors import RecordingError, ScanwrightError
 from scanwright.design.files.atomic_file import check_place, place_in
 from scanwright.design.motion import Motion, Spin
 from scanwright.firmware_io.device_ports import Ports, find_ports
@@ -107,15 +107,15 @@ def plan_scan(
     in_use = angles_in_use(out)
     angles = in_use.angles
     if turns < 1:
-        raise DeviceError(f"turns = {turns}: at least 1")
+        raise ScanwrightError(f"turns = {turns}: at least 1")
     if angles.motion is None:
-        raise DeviceError(f"{out / 'angles.json'}: motion = null: this angle set has no motion of the servo")
+        raise ScanwrightError(f"{out / 'angles.json'}: motion = null: this angle set has no motion of the servo")
     if turns * angles.motion.duration_s > _LONGEST_S:
         most = int(_LONGEST_S / angles.motion.duration_s)
-        raise DeviceError(f"turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
+        raise ScanwrightError(f"turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
     product = load_catalogue().products.get(angles.servo)
     if isinstance(angles.motion, Spin) and isinstance(product, Servo) and product.position_feedback_deg < 360:
-        raise DeviceError(
+        raise ScanwrightError(
             f"{out / 'angles.json'}: motion.mode = 'spin': {angles.servo} measures its angle in "
             f"{product.position_feedback_deg:g} of 360 deg only: make it a 'sweep', or choose a servo such as MX-64R"
         )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import DeviceError, ScanwrightError
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.bus.unit import PING_S, ServoUnit
@@ -30,14 +30,15 @@ def set_address(
         folder: gets the file that undoes the changes.
 
     Raises:
-        DeviceError: nothing to do, not one servo but none or several could be meant, the number is taken, the servo
+        ScanwrightError: nothing to do, or no such number.
+        DeviceError: not one servo but none or several could be meant, the number is taken, the servo
             does not know the speed or the adapter cannot have it, it holds its torque, or keeps what it has; or the
             file cannot be written. But for the last two nothing was changed.
     """
     if new_id is None and new_baud is None:
-        raise DeviceError(f"{port}: nothing to set: give new_id, new_baud or both")
+        raise ScanwrightError(f"{port}: nothing to set: give new_id, new_baud or both")
     if new_id is not None and new_id not in _IDS:
-        raise DeviceError(f"new_id = {new_id}: servos have numbers from 0 to {_IDS[-1]}")
+        raise ScanwrightError(f"new_id = {new_id}: servos have numbers from 0 to {_IDS[-1]}")
     with closing(open_bus(port)) as bus:
         unit = _only(bus, from_id, from_baud)
         table = unit.table

@@ -11,7 +11,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationError
 
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import DeviceError, ScanwrightError
 from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
 from scanwright.firmware_io.servo.bus.registers import Register
@@ -145,14 +145,15 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
         port: where the servo is now; None for where it was.
 
     Raises:
-        DeviceError: no such file, no such servo, it holds its torque, or keeps a count.
+        ScanwrightError: no such file, or it is no file of settings.
+        DeviceError: no such servo, it holds its torque, or keeps a count.
     """
     try:
         saved = ServoSettings.model_validate_json(file.read_bytes())
     except OSError as error:
-        raise DeviceError(f"{file}: cannot read: {error.strerror}") from error
+        raise ScanwrightError(f"{file}: cannot read: {error.strerror}") from error
     except ValidationError as error:
-        raise DeviceError(format_validation_error(error, file, ServoSettings)) from error
+        raise ScanwrightError(format_validation_error(error, file, ServoSettings)) from error
     expected = [table for table in all_tables() if (table.model, table.protocol) == (saved.model, saved.protocol)]
     known = settable(expected[0]) if expected else {}
     for setting in saved.settings:
@@ -160,7 +161,7 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
         fits = register is not None and register.bounds[0] <= setting.before <= register.bounds[1]
         if register is None or not fits or (register == expected[0].baud and setting.before not in expected[0].bauds):
             what = f"{setting.register_name} = {setting.before}"
-            raise DeviceError(f"{file}: {saved.model} of protocol {saved.protocol} has no setting {what}")
+            raise ScanwrightError(f"{file}: {saved.model} of protocol {saved.protocol} has no setting {what}")
     with closing(open_bus(port or saved.port)) as bus:
         now_id = next((one.after for one in saved.settings if known[one.register_name] == expected[0].id), saved.id)
         unit = find_servo(bus, saved.model, now_id, unmute="for good")

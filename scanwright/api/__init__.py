@@ -1,7 +1,7 @@
-"""What a person wants of a scanner, a typed function each; `import scanwright as sw` gives all of them.
+"""The Python interface: typed functions, all available by `import scanwright as sw`.
 
-Angles of the arguments are degrees, lengths metres, as in task files; arrays that come back are SI units. Everything
-that can go wrong by wrong input raises a `ScanwrightError` whose message is one line for each fault.
+Arguments: angles in degrees, lengths in metres, as in task files. Returned arrays: SI units. Wrong input raises a
+`ScanwrightError` whose message is one line for each fault.
 """
 
 from scanwright.api.clouds import make_map as make_map

@@ -1,4 +1,4 @@
-"""Clouds: read, written, joined, and made a map of."""
+"""Read, write, register and map clouds."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
+from scanwright.api.arguments import AnglesLike, as_angle_set, with_say
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.registration.register_files import RegisteredFiles
 
 
+@with_say
 def register(
     clouds: Sequence[str | Path],
     out: str | Path,
@@ -28,20 +30,20 @@ def register(
     angles: AnglesLike | None = None,
     spacing_m: float = 0.1,
     map_spacing_m: float = 0.02,
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> RegisteredFiles:
-    """Find where clouds stand to each other, from no start if need be, and merge them into one map.
+    """Align point clouds and merge them; works without initial poses.
 
     Args:
         clouds: of one place, two or more.
         out: map to write.
         poses: TUM file to write; None for one beside the map.
-        start: TUM file of start poses, a line for each cloud; found if not given.
+        start: TUM file of initial poses, one line per cloud; None needs none.
         angles: calibrated angle set that all clouds were assembled with: what its covariance means for the poses is
             part of their covariance. Without it the calibration is taken to be right.
         spacing_m: distance of the points that are registered.
         map_spacing_m: distance of the points of the map.
-        say: is told what is being done.
+        progress: progress callback.
 
     Raises:
         RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
@@ -52,12 +54,13 @@ def register(
     target = Path(out)
     check_place(target, RecordingError)
     tum = target.with_suffix(".tum") if poses is None else Path(poses)
-    given = None if start is None else Path(start)
+    start_poses = None if start is None else Path(start)
     scanner = None if angles is None else as_angle_set(angles)
     paths = [Path(cloud) for cloud in clouds]
-    return register_files(paths, target, tum, given, spacing_m, map_spacing_m, scanner, lambda step, _=None: say(step))
+    return register_files(paths, target, tum, start_poses, spacing_m, map_spacing_m, scanner, progress)
 
 
+@with_say
 def make_map(
     clouds: Sequence[str | Path],
     out: str | Path,
@@ -69,26 +72,25 @@ def make_map(
     from_m: float = 0.1,
     to_m: float = 1.8,
     seen_through_m: float | None = None,
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> MapSummary:
-    """Turn clouds into an occupancy grid, as ROS's map_server reads it: YAML and PGM.
+    """Create an occupancy grid for ROS's map_server from point clouds: YAML and PGM.
 
-    A cell is occupied where a point lies in it between two heights above the floor; free where it is not and a
-    beam passed below the lower one; else unknown.
+    A cell is occupied if a point in it lies between two heights above the floor; free if it is not occupied and a
+    beam passed below the lower height; otherwise unknown.
 
     Args:
         clouds: of one place, z up, in one frame or with `poses`.
         out: YAML file to write; the PGM goes beside it.
-        angles: angle set that all clouds were assembled with: its optical centre is where they were seen from. Without
-            it the origins of clouds that have poses are; of others nobody knows it, and they free nothing.
-        poses: TUM file, a line for each cloud, as `register` writes it; the poses in the files if not given.
+        angles: angle set that all clouds were assembled with; its optical centre is the position of the scanner. None
+            uses the origins of clouds that have poses; clouds without poses make no cell free.
+        poses: TUM file, a line for each cloud, as `register` writes it; None reads the poses in the files.
         resolution_m: edge of a cell.
-        floor_m: height of the floor in the map; found if not given.
-        from_m: what is lower above the floor is driven over.
-        to_m: what is higher above the floor is driven under.
-        seen_through_m: leave out what came or went: points that another cloud was seen through, by more than this; 0.1
-            is usual.
-        say: is told what is being done.
+        floor_m: height of the floor in the map; None detects it.
+        from_m: lowest height of obstacles above the floor.
+        to_m: highest height of obstacles above the floor.
+        seen_through_m: drop moving objects: points that beams of another cloud passed by more than this; 0.1 is usual.
+        progress: progress callback.
 
     Raises:
         RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map. Nothing is
@@ -99,18 +101,7 @@ def make_map(
     scanner = None if angles is None else as_angle_set(angles)
     tum = None if poses is None else Path(poses)
     paths = [Path(cloud) for cloud in clouds]
-    return map_files(
-        paths,
-        Path(out),
-        scanner,
-        tum,
-        floor_m,
-        from_m,
-        to_m,
-        resolution_m,
-        seen_through_m,
-        lambda step, _=None: say(step),
-    )
+    return map_files(paths, Path(out), scanner, tum, floor_m, from_m, to_m, resolution_m, seen_through_m, progress)
 
 
 def read_cloud(path: str | Path) -> Cloud:
@@ -118,12 +109,12 @@ def read_cloud(path: str | Path) -> Cloud:
 
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
-        RecordingError: the format is not known, the file is not what its suffix says, or it holds several clouds.
+        RecordingError: the format is unknown, the file does not match its suffix, or it contains several clouds.
     """
     clouds, _unread = read_clouds(Path(path))
     if len(clouds) != 1:
         raise RecordingError(
-            f"{path}: holds {len(clouds)} clouds, not one: firmware_io.clouds.formats.read_clouds reads all"
+            f"{path}: contains {len(clouds)} clouds, not one; firmware_io.clouds.formats.read_clouds reads all"
         )
     return clouds[0]
 
@@ -131,8 +122,8 @@ def read_cloud(path: str | Path) -> Cloud:
 def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organised: bool = False) -> list[str]:
     """Write a cloud: PLY, PCD, LAS, LAZ, E57, NPZ or XYZ, by its suffix.
 
-    Rows without a point are left out, unless the cloud is organised and the format says what its rows and columns are
-    (PCD, E57, NPZ).
+    Rows without a point are dropped, unless the cloud is organised and the format stores rows and columns (PCD, E57,
+    NPZ).
 
     Args:
         path: the file.
@@ -140,11 +131,11 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organi
         organised: keep the rows and columns of an organised cloud in PLY and XYZ too, in comments.
 
     Returns:
-        What the format cannot hold, one sentence each.
+        Data that the format cannot store, one sentence each.
 
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
-        RecordingError: the format is not known or cannot hold this, or the file cannot be written.
+        RecordingError: the format is unknown or cannot store this, or the file cannot be written.
     """
     record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud) * 1.0)
     return list(write_clouds(Path(path), [record], organised=organised).notes)

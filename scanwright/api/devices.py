@@ -1,4 +1,4 @@
-"""Lidar and servo, real or imagined, and the scans that they make."""
+"""Lidar, servo and scans, real or simulated."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scanwright.api.arguments import AnglesLike, Say, as_angle_set, quiet
+from scanwright.api.arguments import AnglesLike, as_angle_set, with_say
 from scanwright.api.recordings import assemble
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.posix import require_posix
 
 if TYPE_CHECKING:
@@ -26,16 +27,14 @@ def open_servo(
     spins: bool | None = None,
     undo_folder: str | Path | None = None,
 ) -> ServoDriver:
-    """Find the servo on a port, whatever its speed and protocol; it stands, without torque. Use it with `with`.
+    """Open the servo on a port, at any baud rate and protocol; it is at rest, without torque. Use it with `with`.
 
     Args:
         port: such as "/dev/serial/by-id/...".
-        model: what it must be; None for any that is known.
-        servo_id: its number on the bus; None if it is alone there.
-        spins: whether it is going to spin (True) or to sweep (False), so that a wrong mode is an error at once; None if
-            that is not known yet.
-        undo_folder: lets settings that outlast the power be written, and gets a file that undoes each such change; None
-            if the servo must stay as it is.
+        model: required model; None accepts any known one.
+        servo_id: its id on the bus; None if it is the only one.
+        spins: whether it is going to spin (True) or to sweep (False), to reject a wrong mode at once; None if unknown.
+        undo_folder: allows writing permanent settings, and gets a file that undoes each change; None changes nothing.
 
     Raises:
         ServoSetupError: such settings must change, and `undo_folder` is None; see `set_up_servo`.
@@ -48,6 +47,7 @@ def open_servo(
     return open_servo(port, model, servo_id, spins=spins, undo_folder=folder)
 
 
+@with_say
 def set_up_servo(
     port: str,
     undo_folder: str | Path,
@@ -55,17 +55,17 @@ def set_up_servo(
     spins: bool | None = None,
     model: str | None = None,
     servo_id: int | None = None,
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> Path | None:
-    """Write the settings that a scan needs to a servo, where they outlast the power.
+    """Write the permanent settings that a scan needs to a servo.
 
     Args:
         port: such as "/dev/serial/by-id/...".
         undo_folder: gets the file that undoes the changes.
         spins: whether the servo is going to spin (True) or to sweep (False); None leaves its mode as it is.
-        model: what it must be; None for any that is known.
-        servo_id: its number on the bus; None if it is alone there.
-        say: progress callback; called with one line for each setting.
+        model: required model; None accepts any known one.
+        servo_id: its id on the bus; None if it is the only one.
+        progress: progress callback.
 
     Returns:
         The undo file, for `scanwright servo-setup PORT --undo FILE`; None if every setting was right.
@@ -81,19 +81,19 @@ def set_up_servo(
         if isinstance(step, Path):
             undo = step
         else:
-            say(step)
+            progress(step)
     return undo
 
 
 def open_lidar(address: str, model: str | None = None) -> LidarDriver:
-    """Open a lidar at a serial port or HOST:PORT, whatever it is doing. Use it with `with`.
+    """Open a lidar at a serial port or HOST:PORT, in any state. Use it with `with`.
 
     Args:
-        address: where it is.
-        model: name in the catalogue, for sensors that do not tell theirs; None asks one family after the other.
+        address: serial port or HOST:PORT.
+        model: name in the catalogue, for sensors that do not report theirs; None tries all protocols.
 
     Raises:
-        DeviceError: no such port, it is in use, or what answers is no sensor that is known.
+        DeviceError: no such port, it is in use, or it is not a known sensor.
     """
     require_posix()
     from scanwright.firmware_io.lidar.families import open_lidar
@@ -103,12 +103,13 @@ def open_lidar(address: str, model: str | None = None) -> LidarDriver:
 
 @dataclass(frozen=True, slots=True)
 class Scanned:
-    """A scan: what was recorded, and the cloud of it."""
+    """A scan: its recording and its cloud."""
 
     recorded: ScanSummary
     assembled: AssembleSummary
 
 
+@with_say
 def scan(
     folder: str | Path,
     *,
@@ -121,28 +122,28 @@ def scan(
     cluster: int = 1,
     every: int = 1,
     stamp_at: Literal["step_0", "rear"] = "step_0",
-    say: Say = quiet,
+    progress: Progress = no_progress,
 ) -> Scanned:
-    """Turn the scanner of a build folder, record, and assemble the cloud beside the recording.
+    """Record a full scan with the scanner of a build folder, and assemble the cloud next to the recording.
 
     Args:
-        folder: its `angles.json` is all that is needed.
-        turns: full scans.
-        lidar: serial port or HOST:PORT; None for the emulated or the plugged-in one, as for `servo`.
+        folder: build folder; only its `angles.json` is required.
+        turns: number of full scans.
+        lidar: serial port or HOST:PORT; None detects the emulated or connected one, as for `servo`.
         servo: serial port.
-        servo_id: number of the servo, where several share its bus.
-        recording: file to write, `.mcap`; None for one in the folder, named by date and time.
-        intensity: ask the sensor for intensities too.
-        cluster: steps that share one range, the least of theirs.
-        every: one scan of so many is taken.
-        stamp_at: what the sensor's stamps mean: step 0 (the specification) or the rear.
-        say: is told what is being done.
+        servo_id: id of the servo, if several share its bus.
+        recording: file to write, `.mcap`; None writes one into the folder, named by date and time.
+        intensity: also record intensities.
+        cluster: merge this many steps into one range, the smallest.
+        every: use every Nth scan of the lidar.
+        stamp_at: beam that the lidar's timestamps refer to: step 0 (the specification) or the rear.
+        progress: progress callback.
 
     Raises:
-        ServoSetupError: settings of the servo that outlast the power must change first (`set_up_servo` writes them);
-            nothing was written, nothing moved.
-        ScanwrightError: no angle set, no motion, no port, an unusable file name, or a device fails; both devices are
-            stopped then, and what was recorded is whole.
+        ServoSetupError: permanent settings of the servo must change first (`set_up_servo` writes them); nothing was
+            written, nothing moved.
+        DeviceError: no port, or a device fails; both devices are stopped, and what was recorded is intact.
+        ScanwrightError: no angle set, no motion, or an unusable file name.
     """
     require_posix()
     from scanwright.firmware_io.scan.acquire import acquire
@@ -161,7 +162,7 @@ def scan(
         every=every,
         stamp_at=stamp_at,
     )
-    recorded = acquire(plan, say)
+    recorded = acquire(plan, progress)
     return Scanned(recorded, assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")))
 
 
@@ -173,20 +174,20 @@ def simulate(
     noise_mm: float | None = None,
     seed: int = 0,
 ) -> RecordingArrays:
-    """Record a scene without devices, faster than time: the servo obeys to the letter, ranges have their noise.
+    """Simulate a recording of a scene, faster than real time: exact servo motion, ranges with noise.
 
     Args:
         angles: angle set of the scanner, with its motion.
         scene: mesh in metres, STL, PLY, OBJ, DAE or GLB, the scanner's world frame at its origin; None for a furnished
             room.
-        turns: full scans.
-        noise_mm: range noise; None for the data sheet's.
-        seed: of the noise.
+        turns: number of full scans.
+        noise_mm: range noise; None for the value of the data sheet.
+        seed: random seed of the noise.
 
     Raises:
-        SceneError: the mesh cannot be used.
+        SceneError: the mesh is unusable.
         TaskError: the sensor is not in the catalogue.
-        DeviceError: the angle set does not say how the servo moves.
+        DeviceError: the angle set has no motion.
     """
     from scanwright.firmware_io.emulators.simulated import simulated_recording
     from scanwright.firmware_io.emulators.world import room

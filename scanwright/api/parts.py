@@ -1,51 +1,56 @@
-"""From angles to parts, and whether they hold."""
+"""Build folders, parts and their checks."""
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.api.arguments import AnglesLike, Say, TaskLike, as_angle_set, as_task, quiet
+from scanwright.api.arguments import AnglesLike, TaskLike, as_angle_set, as_task, with_say
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.angles import load_angles
+from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.build import Build, build_task
 from scanwright.pipeline.manifest import require_as_built
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
-    from scanwright.cad.checks.check import Check
+    from scanwright.design.findings import Finding
+
+_LOG = logging.getLogger(__name__)
 
 
-def build(task: TaskLike, out: str | Path = "out", *, say: Say = quiet) -> Build:
-    """Make everything of a task, into `out/<task>/`: angles, parts, drawings, parts list, frame chain, report.
+@with_say
+def build(task: TaskLike, out: str | Path = "out", *, progress: Progress = no_progress) -> Build:
+    """Generate angles, parts, drawings, parts list, frame chain and report of a task into `out/<task>/`.
 
-    Nothing is done if the folder already holds the build of this very task.
+    Does nothing if the folder is up to date.
 
     Returns:
-        The build. Every file is written even if checks of the parts fail: do not make the parts if `failed` is not
-        empty.
+        The build. Every file is written even if checks fail: do not make the parts unless `failed` is empty.
 
     Raises:
         InstallError: the CAD kernel is not installed.
         TaskError: as for `optimise`.
-        BuildError: no setting can be built, or the folder cannot be written.
+        BuildError: no mount can be built, or the folder cannot be written.
     """
     require_kernel("build")
     loaded = as_task(task)
-    return build_task(loaded, Path(out) / loaded.task.name, say)
+    return build_task(loaded, Path(out) / loaded.task.name, progress)
 
 
-def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assembly:
-    """Make the parts of a scanner in memory, in the rotation frame [mm], without labels.
+@with_say
+def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_progress) -> Assembly:
+    """Generate the parts of a scanner in memory, in the rotation frame [mm], without labels.
 
     Args:
-        task: whose printer and deck the parts are for.
+        task: a task; its printer and deck determine the parts.
         angles: angle set of the scanner, such as `optimise(task).angle_set()`.
-        say: is told what is being done.
+        progress: progress callback.
 
     Returns:
-        Solids of cadquery by name: `made["alignment_linkage"]`; `bought` are lidar, servo, ring and the like.
+        The assembly: cadquery solids by name, such as `made["alignment_linkage"]`; `bought` are the purchased products.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -56,20 +61,21 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, say: Say = quiet) -> Assem
 
     loaded = as_task(task)
     for line in loaded.misfits():
-        say(line)
-    say("making the parts")
+        _LOG.warning("%s", line)
+    progress("making the parts")
     return make_parts(loaded.scanner(as_angle_set(angles)))
 
 
-def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
-    """Check the parts of a build folder: room, beams, loads, print. `severity` is "error" where one fails.
+@with_say
+def check(folder: str | Path, *, progress: Progress = no_progress) -> list[Finding]:
+    """Check the parts of a build folder: clearance, beams, loads, printing. A failed check has severity "error".
 
-    The parts are made again from `task.toml` and `angles.json`; a folder may hold these two alone.
+    The parts are generated from `task.toml` and `angles.json`; no other file is required.
 
     Raises:
         InstallError: the CAD kernel is not installed.
         TaskError: the folder has no angle set or no task.
-        BuildError: a file of the build is gone or was edited, or a part cannot be made.
+        BuildError: a file of the build is missing or was edited, or a part cannot be made.
     """
     require_kernel("check")
     folder = Path(folder)
@@ -77,4 +83,4 @@ def check(folder: str | Path, *, say: Say = quiet) -> list[Check]:
     scanner = load_task(folder / "task.toml").scanner(load_angles(folder / "angles.json"))
     from scanwright.cad.checks.run import check_scanner
 
-    return check_scanner(scanner, say)
+    return check_scanner(scanner, progress)

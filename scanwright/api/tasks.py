@@ -1,4 +1,4 @@
-"""From a task to the mounting angles, and what they are worth."""
+"""Optimise, evaluate and compare mounting angles."""
 
 from __future__ import annotations
 
@@ -7,29 +7,32 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scanwright.api.arguments import Say, TaskLike, as_built_scanner, as_task, quiet
+from scanwright.api.arguments import TaskLike, as_built_scanner, as_task, deprecated, lever_in, pole_in, with_say
+from scanwright.design.progress import Progress, no_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from scanwright.design.evaluation.comparison import ComparisonRow
-    from scanwright.design.evaluation.evaluation import Evaluation
+    from scanwright.design.evaluation.evaluation import Evaluation, Lever
+    from scanwright.design.evaluation.poles import Pole
     from scanwright.design.search.optimum import Optimum
 
 
-def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
-    """Search all mounting angles of a task.
+@with_say
+def optimise(task: TaskLike, *, progress: Progress = no_progress) -> Optimum:
+    """Find the best mounting angles of a task.
 
     Args:
-        task: what the scanner shall see.
-        say: is told what is being done.
+        task: lidar, servo, motion and region to see.
+        progress: progress callback.
 
     Returns:
-        The best families of settings, `optimum.search.best`, the best one first; `optimum.angle_set()` is what parts
-        and frame chain are made from.
+        The optimum: `search.best` are the best groups of equivalent mounts, best first; `angle_set()` is the input of
+        parts and frame chain.
 
     Raises:
-        TaskError: the task is malformed, no direction has a weight, or no setting keeps its limits.
+        TaskError: the task is malformed, no direction has a weight, or no mount satisfies its limits.
 
     Example:
         >>> import scanwright as sw
@@ -40,25 +43,26 @@ def optimise(task: TaskLike, *, say: Say = quiet) -> Optimum:
     """
     from scanwright.design.search.optimum import find_optimum
 
-    return find_optimum(as_task(task), say)
+    return find_optimum(as_task(task), progress)
 
 
+@with_say
 def evaluate(
     task: TaskLike,
     angles_deg: Sequence[float] | None = None,
     *,
-    pole: str | None = None,
-    lever: str | None = None,
-    say: Say = quiet,
+    pole: Pole | str | None = None,
+    lever: Lever | str | None = None,
+    progress: Progress = no_progress,
 ) -> Evaluation:
-    """Judge one setting of the mounting angles, the closed form beside the paper's ball search.
+    """Evaluate given mounting angles, by the closed form and by a brute-force count of beams.
 
     Args:
-        task: what the scanner shall see, or a build folder: then `Evaluation.as_built` is with its parts.
-        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; those of the build folder if none are given.
-        pole: "WIDTH_MM,HEIGHT_MM,RANGE_M" of a thin upright pole, to tell the chance that it is hit.
-        lever: "X_MM,Y_MM,RANGE_M": the optical centre off the axis, as seen at a range.
-        say: is told what is being done.
+        task: a task; of a build folder, `Evaluation.as_built` includes its parts.
+        angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; None uses those of the build folder.
+        pole: computes the chance to hit this upright pole; a text as in version 0.1 still works.
+        lever: offset of the optical centre from the axis, as seen at a range; a text as in version 0.1 still works.
+        progress: progress callback.
 
     Raises:
         TaskError: the task is malformed, these are not four angles, or no direction has a weight.
@@ -72,17 +76,22 @@ def evaluate(
     """
     from scanwright.design.evaluation import evaluation
 
+    if isinstance(pole, str):
+        pole = pole_in(deprecated(pole, "pole"))
+    if isinstance(lever, str):
+        lever = lever_in(deprecated(lever, "lever"))
     built = as_built_scanner(task)
     loaded = as_task(task) if built is None else built.loaded
     if built is not None and (angles_deg is None or np.allclose(np.radians(angles_deg), built.setting_rad, atol=1e-9)):
-        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, say, built.shadow)
-    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg or ()), pole, lever, say)
+        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, progress, built.shadow)
+    return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg or ()), pole, lever, progress)
 
 
-def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[ComparisonRow]]:
-    """Put the optimum of a task beside the reference mounts, the scanner for little money, and ready-made ones.
+@with_say
+def compare(task: TaskLike, *, progress: Progress = no_progress) -> tuple[Optimum, list[ComparisonRow]]:
+    """Compare the optimum of a task with reference mounts, a cheap scanner and 3D lidars.
 
-    Every row is without parts, but that of a build folder, which is the first one if the task is given as its folder.
+    Rows do not include parts, except the first row of a build folder.
 
     Raises:
         TaskError: as for `optimise`.
@@ -92,20 +101,20 @@ def compare(task: TaskLike, *, say: Say = quiet) -> tuple[Optimum, list[Comparis
     from scanwright.design.search.optimum import find_optimum
 
     built = as_built_scanner(task)
-    optimum = find_optimum(as_task(task) if built is None else built.loaded, say)
+    optimum = find_optimum(as_task(task) if built is None else built.loaded, progress)
     setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
-    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, say, setting)
+    return optimum, compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, progress, setting)
 
 
 def draw_density(task: TaskLike, settings_deg: Mapping[str, Sequence[float]]) -> Figure:
-    """Draw how many beams of a full scan fall within the ball around each direction, a map for each setting.
+    """Draw maps of the beam density of a full scan, one for each mount.
 
     Args:
-        task: what the scanner shall see: its region and its masks are drawn in.
+        task: a task; its region and masks are outlined.
         settings_deg: title of a map -> its (alpha_rot, beta_rot, alpha_laser, beta_laser).
 
     Raises:
-        TaskError: the task is malformed, a setting is not four angles, or no direction has a weight.
+        TaskError: the task is malformed, a mount is not four angles, or no direction has a weight.
 
     Example:
         >>> import scanwright as sw

@@ -15,9 +15,9 @@ import typer
 
 from scanwright import __version__
 from scanwright.cli import clouds, design, devices, new, pages, parts
-from scanwright.cli.console import complain, own_voice
+from scanwright.cli.console import command_console, exit_code, print_error
 from scanwright.cli.help import Commands, GroupedHelp
-from scanwright.design.errors import NumericalError, ScanwrightError, notes_of
+from scanwright.design.errors import ScanwrightError, notes_of
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 """What typer raises when a command is called wrongly; it names only this kind of it."""
@@ -43,13 +43,14 @@ for group in (new, design, parts, devices, clouds, pages):
     cls=GroupedHelp,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Begin with `scanwright new`. `scanwright COMMAND --help` says what a command takes.",
+    epilog="Start with `scanwright new`, or try `scanwright build ground_ahead`. `scanwright COMMAND --help` lists the "
+    "options of a command.",
 )
 def scanwright(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """One task file becomes the angles, the parts and the frame chain of a rotating 2D lidar."""
+    """Design and run a 3D laser scanner made of a 2D lidar and a servo."""
     if version:
         print(f"scanwright {__version__}")
     elif context.invoked_subcommand is None:
@@ -64,26 +65,26 @@ def _named(error: Any) -> str:
 def run() -> None:
     """Entry point: a line for each fault and exit 2 for what a person can mend, a traceback for a bug."""
     try:
-        with own_voice():
+        with command_console():
             code = app(prog_name="scanwright", standalone_mode=False)
             sys.stdout.flush()  # what cannot be written is told here, not by Python at its end
             sys.exit(code)
     except USAGE_ERROR as error:
         number = re.fullmatch(r"-[\d.]+", getattr(error, "option_name", ""))
         advice = "; a value that begins with - goes behind =: --angles=0,90,0,-90" if number else ""
-        complain(f"{error.format_message()}{advice} (see `{_named(error)} --help`)")
+        print_error(f"{error.format_message()}{advice} (see `{_named(error)} --help`)")
         sys.exit(2)
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):
-            complain(line)
-        sys.exit(1 if isinstance(error, NumericalError) else 2)
+            print_error(line)
+        sys.exit(exit_code(error))
     except BrokenPipeError:  # whoever read the results has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
         if error.errno not in _OF_THE_SYSTEM:
             raise
-        complain(f"{error.filename or _unnamed(error)}: {error.strerror}")
+        print_error(f"{error.filename or _unnamed(error)}: {error.strerror}")
         sys.exit(2)
 
 

@@ -2,210 +2,133 @@
 
 from __future__ import annotations
 
-import math
-from enum import Enum
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
-from scanwright.cli.console import AsJson, Progress, show, show_json
+from scanwright.cli.arguments import Angles, AsJson
+from scanwright.cli.console import ConsoleProgress, show, show_result
 from scanwright.cli.help import Commands
+from scanwright.cli.record_options import record_options
+from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
 
 app = Commands("Clouds")
 
-Organised = Annotated[
-    bool, typer.Option("--organised", help="Keep a row for every beam of every scan, NaN where there is no point.")
-]
+Organised = Annotated[bool, Option("--organised", help="Keep one row per beam; NaN if there is no point.")]
 
 
-class AngleUnit(Enum):
-    """Unit of an angle in somebody's recording."""
-
-    deg = "deg"
-    rad = "rad"
-
-
-class Per(Enum):
-    """What makes one cloud."""
-
-    recording = "recording"
-    turn = "turn"
-    half = "half"
-
-
-@app.command("import")
+@app.command("import", example="import bag --scan /scan --angle /joint_states:pan --angle-unit rad -o rec.mcap")
 def import_(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="ROS 1 or ROS 2 bag.")],
-    scan: Annotated[str, typer.Option(metavar="TOPIC[:FIELD]", help="Where the LaserScan is.")],
+    bag: Annotated[Path, Argument(metavar="BAG", help="ROS 1 or ROS 2 bag.")],
+    scan: Annotated[str, Option(metavar="TOPIC[:FIELD]", help="LaserScan.")],
     angle: Annotated[
-        str,
-        typer.Option(
-            metavar="TOPIC[:FIELD]",
-            help="Where the servo angle is; also TOPIC:JOINT, TOPIC:PARENT:CHILD of /tf, or FILE.csv[:COLUMN].",
-        ),
+        str, Option(metavar="TOPIC[:FIELD]", help="Joint angle; or TOPIC:JOINT, /tf:PARENT:CHILD, FILE.csv[:COLUMN].")
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
-    angle_unit: Annotated[AngleUnit | None, typer.Option(help="Unit of the angle; transforms have none.")] = None,
-    hold: Annotated[bool, typer.Option("--hold", help="The motor stood still during each scan.")] = False,
-    also: Annotated[
-        list[str] | None, typer.Option(metavar="TOPIC", help="Comes along as it is, such as /odom, /imu, /tf_static.")
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
+    angle_unit: Annotated[
+        Literal["deg", "rad"] | None, Option(help="Required unless the angle is a transform.")
     ] = None,
+    hold: Annotated[bool, Option("--hold", help="The axis was at rest during each scan.")] = False,
+    also: Annotated[list[str] | None, Option(metavar="TOPIC", help="Topic to copy, such as /odom; repeatable.")] = None,
+    as_json: AsJson = False,
 ) -> None:
-    """Bring somebody's ROS recording into the project's own: MCAP, /scan and /joint_states."""
+    """Convert a ROS bag to a Scanwright recording.
+
+    The recording is an MCAP file with /scan and /joint_states.
+    """
     from scanwright import api
 
-    summary = api.import_bag(
-        bag, out, scan=scan, angle=angle, angle_unit=angle_unit and angle_unit.value, hold=hold, also=also or ()
-    )
-    show(summary.lines())
+    summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or ())
+    show_result(summary.lines, asdict(summary), as_json)
 
 
-@app.command()
+@app.command(example="repair rec.mcap")
 def repair(
-    recording: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Recording that was cut off or damaged; it stays as it is.")
-    ],
+    recording: Annotated[Path, Argument(metavar="FILE", help="Damaged or truncated recording.")],
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE.mcap", help="Recording to write; FILE.repaired.mcap if not given."),
+        Path | None, Option("--out", "-o", metavar="FILE.mcap", help="Output [default: NAME.repaired.mcap].")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
-    """Save every whole message of a recording that was cut off or damaged, into another file."""
+    """Recover a damaged or truncated recording.
+
+    Writes every intact message to a new file.
+    """
     from scanwright.firmware_io.recording.repair.repair import repair, repaired_place
 
     target = out or repaired_place(recording)
-    show(repair(recording, target).lines(recording, target))
+    summary = repair(recording, target)
+    show_result(lambda: summary.lines(recording, target), asdict(summary) | {"out": target}, as_json)
 
 
-@app.command()
+@app.command(example="assemble rec.mcap --angles out/ground_ahead/angles.json -o cloud.ply")
+@record_options(AssembleOptions, "smooth", "columns", "camera", poses="FILE|TOPIC", imu="FILE|TOPIC", outliers="SIGMAS")
 def assemble(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="Recording made by `import`.")],
-    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Cloud: ply pcd las laz e57 npz xyz.")],
-    organised: Organised = False,
-    lag_s: Annotated[float, typer.Option(help="Time by which the angle log is late, in seconds.")] = 0.0,
-    per: Annotated[
-        Per,
-        typer.Option(
-            help="One cloud for the recording, or for each (half) turn: FILE_000.ply, FILE_001.ply ... A turn ends "
-            "where the axis turns back, too: of a sweep each way is one, and a full scan is two."
-        ),
-    ] = Per.recording,
-    poses: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|TOPIC",
-            help="Where the platform was: a TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording (/tf, /odom).",
-        ),
-    ] = None,
-    imu: Annotated[
-        str | None,
-        typer.Option(metavar="FILE.csv|TOPIC", help="How it turned between poses: the gyro of a sensor_msgs/Imu."),
-    ] = None,
-    imu_rpy_deg: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(metavar="R P Y", help="How the IMU stands on the platform; from /tf_static if not given."),
-    ] = None,
-    straight: Annotated[
-        bool, typer.Option("--straight", help="Take the angle straight between its samples, steps not smoothed.")
-    ] = False,
-    columns: Annotated[
-        str, typer.Option(help="What to write of each point beside x,y,z.")
-    ] = "intensity,time_s,joint_rad,ring",
-    camera: Annotated[
-        Path | None, typer.Option(metavar="TASK", help="Colour the points from the images of a task's [camera].")
-    ] = None,
-    min_range_m: Annotated[float, typer.Option(metavar="M", help="Leave out shorter beams.")] = 0.0,
-    max_range_m: Annotated[float, typer.Option(metavar="M", help="Leave out longer beams.")] = math.inf,
-    edges_deg: Annotated[
-        float | None,
-        typer.Option(
-            metavar="DEG", help="Leave out beams that hang between two surfaces seen that grazing, such as 8."
-        ),
-    ] = None,
-    outliers: Annotated[
-        float | None,
-        typer.Option(metavar="SIGMAS", help="Leave out points that stand alone, beyond so many sigmas, such as 2."),
-    ] = None,
-    voxel_m: Annotated[float | None, typer.Option(metavar="M", help="One point to a voxel of this edge.")] = None,
-    normals: Annotated[bool, typer.Option("--normals", help="Add nx ny nz, towards the scanner.")] = False,
-) -> None:
-    """Turn a recording into a cloud: each beam at its own servo angle, through the frames of an angle set.
-
-    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out.
-    """
-    from scanwright import api
-
-    summary = api.assemble(
-        recording,
-        angles,
-        out,
-        organised=organised,
-        lag_s=lag_s,
-        per=per.value,
-        poses=poses,
-        imu=imu,
-        imu_rpy_deg=imu_rpy_deg,
-        smooth=not straight,
-        columns=[name.strip() for name in columns.split(",") if name.strip()],
-        camera=camera,
-        min_range_m=min_range_m,
-        max_range_m=max_range_m,
-        edges_deg=edges_deg,
-        outliers=outliers,
-        voxel_m=voxel_m,
-        normals=normals,
-    )
-    show(summary.lines())
-
-
-@app.command()
-def calibrate(
-    recordings: Annotated[
-        list[Path], typer.Argument(metavar="RECORDING...", help="Recordings of scenes that stand still.")
-    ],
-    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner, as designed.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.json", help="Calibrated angle set to write.")],
-    one_place: Annotated[
-        bool, typer.Option("--one-place", help="The scanner stood still from the first recording to the last.")
-    ] = False,
+    recording: Annotated[Path, Argument(metavar="RECORDING", help="Recording made by `scan` or `import`.")],
+    angles: Angles,
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE", help="Cloud: ply pcd las laz e57 npz xyz.")],
+    options: AssembleOptions,
+    straight: Annotated[bool, Option("--straight", help="Interpolate joint angles linearly.")] = False,
+    columns: Annotated[str, Option(metavar="LIST", help="Columns besides x,y,z.")] = ",".join(COLUMNS),
+    camera: Annotated[Path | None, Option(metavar="TASK", help="Colour points with images of its [camera].")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find a scanner's mounting errors from scans of any scene with walls; no targets needed.
+    """Assemble a point cloud from a recording.
 
-    Where an own_body.npz stands beside the angle set, the beams that end on the scanner itself are left out; where a
-    scanner.urdf stands there, scanner.calibrated.urdf is written beside the calibrated one.
+    If own_body.npz is next to the angle set, beams that end on the scanner itself are dropped.
     """
     from scanwright import api
 
-    found = api.calibrate(recordings, angles, out, one_place=one_place, say=Progress())
-    if as_json:
-        show_json(found.record)
-    else:
-        show(found.lines())
+    names = tuple(name.strip() for name in columns.split(",") if name.strip())
+    summary = api.assemble(recording, angles, out, options, smooth=not straight, columns=names, camera=camera)
+    show_result(summary.lines, asdict(summary), as_json)
 
 
-@app.command()
-def register(
-    clouds: Annotated[list[Path], typer.Argument(metavar="CLOUD...", help="Clouds of one place, two or more.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Map to write.")],
-    poses: Annotated[
-        Path | None, typer.Option(metavar="FILE.tum", help="Poses to write; beside the map by default.")
-    ] = None,
-    start: Annotated[
-        Path | None, typer.Option(metavar="FILE.tum", help="Start poses, a line for each cloud; found if not given.")
-    ] = None,
-    angles: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Calibrated angle set of the clouds: its error counts too.")
-    ] = None,
-    spacing_m: Annotated[float, typer.Option(help="Distance of the points that are registered.")] = 0.1,
-    map_spacing_m: Annotated[float, typer.Option(help="Distance of the points of the map.")] = 0.02,
+@app.command(example="calibrate rec.mcap --angles out/t/angles.json -o out/t/angles.calibrated.json")
+def calibrate(
+    recordings: Annotated[list[Path], Argument(metavar="RECORDING", help="Recordings of static scenes.")],
+    angles: Angles,
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE.json", help="Calibrated angle set to write.")],
+    one_place: Annotated[bool, Option("--one-place", help="The scanner did not move between the recordings.")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Find where clouds stand to each other, from no start if need be, and merge them into one map."""
+    """Estimate mounting errors from recordings.
+
+    Needs static scenes with walls in several directions, and no targets. If own_body.npz is next to the angle set,
+    beams that hit the scanner itself are dropped; if scanner.urdf is there, scanner.calibrated.urdf is written next to
+    the calibrated angle set.
+    """
     from scanwright import api
 
-    found = api.register(
+    result = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
+    show_result(result.lines, result.record, as_json)
+
+
+@app.command(example="register a.ply b.ply -o merged.ply", no="a cloud could not be aligned")
+def register(
+    clouds: Annotated[list[Path], Argument(metavar="CLOUD", help="Two or more clouds of one place.")],
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE", help="Merged cloud to write.")],
+    poses: Annotated[
+        Path | None, Option(metavar="FILE.tum", help="Output poses [default: next to the output].")
+    ] = None,
+    start: Annotated[Path | None, Option(metavar="FILE.tum", help="Initial poses, one line per cloud.")] = None,
+    angles: Annotated[
+        Path | None, Option(metavar="FILE.json", help="Angle set: include its uncertainty in the errors.")
+    ] = None,
+    spacing_m: Annotated[float, Option(metavar="M", help="Point spacing for alignment.")] = 0.1,
+    map_spacing_m: Annotated[float, Option(metavar="M", help="Point spacing of the merged cloud.")] = 0.02,
+    as_json: AsJson = False,
+) -> None:
+    """Align point clouds and merge them.
+
+    Works without initial poses.
+    """
+    from scanwright import api
+
+    result = api.register(
         clouds,
         out,
         poses=poses,
@@ -213,39 +136,35 @@ def register(
         angles=angles,
         spacing_m=spacing_m,
         map_spacing_m=map_spacing_m,
-        say=Progress(),
+        progress=ConsoleProgress(),
     )
-    show(found.lines())
-    raise typer.Exit(0 if found.complete else 1)
+    record = {"complete": result.complete, "points": result.points, "files": result.wrote, "notes": result.notes}
+    show_result(result.lines, record, as_json)
+    raise typer.Exit(0 if result.complete else 1)
 
 
-@app.command("map")
+@app.command("map", example="map a.ply b.ply --poses merged.tum -o room.yaml")
 def map_(
-    clouds: Annotated[
-        list[Path], typer.Argument(metavar="CLOUD...", help="Clouds of one place in one frame, or with --poses; z up.")
-    ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.yaml", help="Map to write; its .pgm goes beside.")],
-    angles: Annotated[
-        Path | None, typer.Option(metavar="angles.json", help="Angle set of the clouds: where they were seen from.")
-    ] = None,
+    clouds: Annotated[list[Path], Argument(metavar="CLOUD", help="Clouds of one place, z up.")],
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE.yaml", help="Map to write, with a .pgm next to it.")],
+    angles: Annotated[Path | None, Option(metavar="FILE", help="Angle set: position of the scanner.")] = None,
     poses: Annotated[
-        Path | None, typer.Option(metavar="FILE.tum", help="Where the clouds stand, a line each, as register writes.")
+        Path | None, Option(metavar="FILE.tum", help="Poses of the clouds, as written by `register`.")
     ] = None,
-    resolution_m: Annotated[float, typer.Option(metavar="M", help="Edge of a cell.")] = 0.05,
-    floor_m: Annotated[float | None, typer.Option(metavar="Z", help="Height of the floor; found if not given.")] = None,
-    from_m: Annotated[float, typer.Option(metavar="M", help="Above the floor: what is lower is driven over.")] = 0.1,
-    to_m: Annotated[float, typer.Option(metavar="M", help="Above the floor: what is higher is driven under.")] = 1.8,
+    resolution_m: Annotated[float, Option(metavar="M", help="Cell size.")] = 0.05,
+    floor_m: Annotated[float | None, Option(metavar="Z", help="Floor height [default: detect].")] = None,
+    from_m: Annotated[float, Option(metavar="M", help="Lowest height of obstacles above the floor.")] = 0.1,
+    to_m: Annotated[float, Option(metavar="M", help="Highest height of obstacles above the floor.")] = 1.8,
     seen_through_m: Annotated[
         float | None,
-        typer.Option(
-            metavar="M", help="Leave out what moved: other clouds were seen through it, by more than, say, 0.1."
-        ),
+        Option(metavar="M", help="Drop moving objects: beams passed by more than this; 0.1 is usual."),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
-    """Turn clouds into an occupancy grid for Nav2: a YAML and a PGM, cells occupied, free or unknown.
+    """Create a Nav2 occupancy grid from point clouds.
 
-    Free is where beams passed close above the floor, so it takes where they came from: name --angles, or --poses.
-    Clouds without are mapped all the same, with nothing free.
+    A cell is free only if beams passed low above the floor, so give --angles or --poses (the position of the scanner);
+    otherwise no cell is free.
     """
     from scanwright import api
 
@@ -259,20 +178,22 @@ def map_(
         from_m=from_m,
         to_m=to_m,
         seen_through_m=seen_through_m,
-        say=Progress(),
+        progress=ConsoleProgress(),
     )
-    show(summary.lines())
+    record = {"points": summary.points, "moved": summary.moved, "files": summary.wrote, "notes": summary.notes}
+    show_result(summary.lines, record, as_json)
 
 
-@app.command()
+@app.command(example="convert cloud.ply cloud.laz")
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="Cloud to read, or a recording (.mcap).")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="Cloud to write, or a bag (.bag, or a new folder).")],
+    source: Annotated[Path, Argument(metavar="IN", help="Cloud, or recording (.mcap).")],
+    target: Annotated[Path, Argument(metavar="OUT", help="Cloud, .bag, or a new folder for a bag.")],
     organised: Organised = False,
 ) -> None:
-    """Turn a cloud into another format (ply pcd las laz e57 npz xyz), and say what that one cannot hold.
+    """Convert a point cloud or recording to another format.
 
-    A recording becomes a ROS 1 bag where OUT ends in .bag, else a ROS 2 bag in sqlite3.
+    Clouds: ply pcd las laz e57 npz xyz. A recording becomes a ROS 1 bag if OUT ends in .bag, otherwise a ROS 2 bag
+    (sqlite3).
     """
     from scanwright.firmware_io.recording.convert import convert
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
 import re
-import shutil
 import signal
 import sys
 import time
@@ -14,69 +14,75 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from types import FrameType
-from typing import IO, Annotated, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import typer
 
-from scanwright.design.errors import require
+from scanwright.design.errors import DeviceError, NumericalError, ScanwrightError, require
 
-TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="Task file, or the name of a shipped task.")]
-TaskOrBuild = Annotated[
-    Path, typer.Argument(metavar="TASK", help="Task file, name of a shipped task, or build folder (with its parts).")
-]
-BuildFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Build folder of the scanner, with angles.json.")]
-AllowOrigin = Annotated[
-    list[str] | None,
-    typer.Option(metavar="ORIGIN", help="Web page that may look beside Foxglove's own; can be given several times."),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object for a program to read.")]
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 
-class Voice(Enum):
-    """How much is said beside the results."""
+class Verbosity(Enum):
+    """How much a command prints beside its results."""
 
     QUIET = "quiet"
     USUAL = ""
     VERBOSE = "verbose"
 
 
-_VOICE = "SCANWRIGHT_VOICE"  # in the environment, so that a second process of the same command hears of it
+_VERBOSITY = "SCANWRIGHT_VERBOSITY"  # in the environment, so that other processes of the command follow it
+_OLD_VERBOSITY = "SCANWRIGHT_VOICE"  # its name in version 0.1
 _STYLES: dict[str, dict[str, Any]] = {
     "heading": {"bold": True},
     "error": {"fg": "red", "bold": True},
     "warning": {"fg": "yellow"},
+    "note": {"bold": True},
     "progress": {"fg": "cyan"},
     "next": {"fg": "green", "bold": True},
 }
-_APART_S = 10.0  # between two lines of one progress, where nobody looks on
-_BAR = 24  # characters
+_PRIORITY = -10  # nice value: before every ordinary program, behind the system's own at -20
+_APART_S = 10.0  # between two lines of one step in a file: a log of an hour stays readable
+_BAR_CHARACTERS = 24  # leaves 50 of a terminal's 80 for the step and the time that is left
+_SPEED_S = 3600.0  # over which the time that is left is estimated: stages of a build are minutes apart
 _NUMBER = re.compile(r"[\d.,]+")
-_PERCENTAGE = re.compile(r"\s*\(?(\d{1,3})%\)?\s*")
+_FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
+_options: dict[str, str] = {}
 
 
-def set_voice(voice: Voice) -> None:
-    """Say more or less from now on."""
-    os.environ[_VOICE] = voice.value
+def set_verbosity(value: Verbosity) -> None:
+    """Print more or less from now on, in this process and in those that it starts."""
+    os.environ[_VERBOSITY] = value.value
 
 
-def voice() -> Voice:
-    """How much is to be said."""
-    told = os.environ.get(_VOICE, "")
-    return Voice(told) if told in {each.value for each in Voice} else Voice.USUAL
+def verbosity() -> Verbosity:
+    """Return how much to print."""
+    value = os.environ.get(_VERBOSITY, os.environ.get(_OLD_VERBOSITY, ""))
+    return Verbosity(value) if value in {each.value for each in Verbosity} else Verbosity.USUAL
+
+
+class _Log(logging.Handler):
+    """Warnings that the packages log, on standard error."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one."""
+        warn([record.getMessage()])
 
 
 @contextmanager
-def own_voice() -> Iterator[None]:
-    """A voice that is set within the block ends with it."""
-    before = os.environ.get(_VOICE)
+def command_console() -> Iterator[None]:
+    """Print logged warnings while the block runs, and end with it what it sets as verbosity."""
+    before, log = os.environ.get(_VERBOSITY), _Log(logging.WARNING)
+    logging.getLogger("scanwright").addHandler(log)
     try:
         yield
     finally:
-        os.environ.pop(_VOICE, None)
+        logging.getLogger("scanwright").removeHandler(log)
+        os.environ.pop(_VERBOSITY, None)
         if before is not None:
-            os.environ[_VOICE] = before
+            os.environ[_VERBOSITY] = before
 
 
 def on_terminal(stream: IO[str]) -> bool:
@@ -91,101 +97,141 @@ def styled(text: str, style: str, stream: IO[str] | None = None) -> str:
 
 
 def show(lines: Iterable[str]) -> None:
-    """Results, on standard output."""
+    """Print results on standard output, and the warnings among them on standard error."""
     _end_bar()
-    for line in lines:
-        print(styled(line, "warning") if line.startswith("warning") else line)
+    warning = False
+    for line in lines:  # goes when no result of a lower package is a list of lines
+        warning = line.startswith("warning: ") or (warning and line.startswith(" "))
+        if warning:
+            warn([line.removeprefix("warning: ")])
+        else:
+            print(line)
 
 
 def warn(lines: Iterable[str]) -> None:
-    """Warnings, on standard error, in every voice; a line that begins with a space belongs to the one before it."""
+    """Print warnings in every verbosity; a line that begins with a space belongs to the one before it."""
+    for line in lines:
+        _print_aside("" if line.startswith(" ") else "warning", line)
+
+
+def print_error(line: str) -> None:
+    """Print what went wrong."""
+    _print_aside("error", line)
+
+
+def print_note(line: str) -> None:
+    """Print what became of the work of a command that was stopped."""
+    _print_aside("note", line)
+
+
+def _print_aside(kind: str, line: str) -> None:
+    """Print a line on standard error, after all that went to standard output; its fields are spelt as options."""
     _end_bar()
     sys.stdout.flush()
-    for line in lines:
-        text = line if line.startswith(" ") else f"warning: {line}"
-        print(styled(text, "warning", sys.stderr), file=sys.stderr, flush=True)
+    text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
+    label = f"{styled(f'{kind}:', kind, sys.stderr)} " if kind else ""
+    print(f"{label}{text}", file=sys.stderr, flush=True)
+
+
+def exit_code(error: ScanwrightError) -> int:
+    """Return the exit code of an error: 1 a result that is wrong, 2 wrong input, 3 a device."""
+    return 1 if isinstance(error, NumericalError) else 3 if isinstance(error, DeviceError) else 2
+
+
+def name_options(options: dict[str, str]) -> None:
+    """Set the options of the running command: field of an error -> option, such as `min_range_m` -> `--min-range-m`."""
+    _options.clear()
+    _options.update(options)
 
 
 def show_json(value: Any) -> None:
-    """One JSON object, on standard output."""
-    print(json.dumps(value, indent=2))
+    """Print one JSON object on standard output; paths become texts."""
+    print(json.dumps(value, indent=2, default=str))
+
+
+def show_result(lines: Callable[[], Iterable[str]], record: Any, as_json: bool) -> None:
+    """Print a result as lines, or its record as one JSON object."""
+    if as_json:
+        show_json(record)
+    else:
+        show(lines())
 
 
 def hint(line: str) -> None:
     """What to do next, the last line of a command; on standard error, so that results can be piped."""
-    if voice() is not Voice.QUIET:
+    if verbosity() is not Verbosity.QUIET:
         _end_bar()
         sys.stdout.flush()
         print(styled(line, "next", sys.stderr), file=sys.stderr, flush=True)
 
 
 @dataclass
-class Progress:
-    """Says what is being done, on standard error so that results can be piped.
+class ConsoleProgress:
+    """A `Progress` that prints to standard error, so that results can be piped.
 
-    A line that holds a percentage is one of many of the same work. On a terminal they become one bar with the time that
-    is left, which the next line takes the place of; elsewhere those that differ by their numbers only are printed every
-    `_APART_S` seconds.
+    On a terminal the steps with a known fraction are one bar, which the next line replaces. In a file such a step is
+    one line every `_APART_S` seconds.
 
     Attributes:
-        clock: seconds that never run backwards.
-        began_s: when the work that a percentage is of began; None before the first.
-        said_s: when a percentage was last printed.
-        said: what of, without numbers.
+        clock: monotonic time [s].
+        printed_s: when a step with a fraction was last printed.
+        printed: that step, without numbers.
     """
 
     clock: Callable[[], float] = time.monotonic
-    began_s: float | None = None
-    said_s: float = -math.inf
-    said: str = ""
+    printed_s: float = -math.inf
+    printed: str = ""
+    _bar: Progress | None = None
 
-    def __call__(self, line: str, fraction: float | None = None) -> None:
-        """Say it."""
-        line = line if fraction is None else f"{fraction:4.0%}  {line}"
-        if voice() is Voice.QUIET:
+    def __reduce__(self) -> tuple[type[ConsoleProgress], tuple[()]]:
+        """Begin anew in another process: a bar belongs to the process that draws it."""
+        return ConsoleProgress, ()
+
+    def __call__(self, step: str, fraction: float | None = None, /) -> None:
+        """See `design.progress.Progress`."""
+        if verbosity() is Verbosity.QUIET:
             return
-        now_s = self.clock()
-        share = _PERCENTAGE.search(line)
-        if share is None and not on_terminal(sys.stderr):
-            print(f"  .. {line}", file=sys.stderr, flush=True)
-        elif share is None or voice() is Voice.VERBOSE:
-            start = "\r\033[K" if on_terminal(sys.stderr) else ""
-            print(f"{start}  {styled('..', 'progress', sys.stderr)} {line}", file=sys.stderr, flush=True)
-        elif on_terminal(sys.stderr):
-            done = int(share[1]) / 100
-            self.began_s = now_s if self.began_s is None or done == 0 else self.began_s
-            words = _PERCENTAGE.sub(" ", line, count=1).strip()
-            bar = f"  {progress_bar(done)} {words}{_left(done, now_s - self.began_s)}"
-            print(f"\r\033[K{bar[: shutil.get_terminal_size().columns - 1]}", end="", file=sys.stderr, flush=True)
-        elif now_s - self.said_s >= _APART_S or self.said != _NUMBER.sub("", line):
-            self.said_s, self.said = now_s, _NUMBER.sub("", line)
-            print(f"  .. {line}", file=sys.stderr, flush=True)
+        verbose, terminal = verbosity() is Verbosity.VERBOSE, on_terminal(sys.stderr)
+        if terminal and fraction is not None and not verbose:
+            print(f"\r\033[K{self._drawn(step, fraction)}", end="", file=sys.stderr, flush=True)
+            return
+        now_s, kind = self.clock(), _NUMBER.sub("", step)
+        if fraction is not None and not verbose:
+            if now_s - self.printed_s < _APART_S and self.printed == kind:
+                return
+            self.printed_s, self.printed = now_s, kind
+        share = "" if fraction is None else f" ({fraction:.0%})"
+        _end_bar()
+        print(f"  {styled('..', 'progress', sys.stderr)} {step}{share}", file=sys.stderr, flush=True)
+
+    def _drawn(self, step: str, fraction: float) -> str:
+        """Return the bar as text of one line."""
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+        from rich.table import Column
+
+        if self._bar is None or fraction < self._bar.tasks[0].completed:
+            column = Column(no_wrap=True, overflow="ellipsis")
+            words = TextColumn("{task.description}", markup=False, table_column=column)
+            self._bar = Progress(
+                *(BarColumn(_BAR_CHARACTERS), TaskProgressColumn(), TimeRemainingColumn(), words),
+                console=Console(stderr=True),
+                get_time=self.clock,
+                speed_estimate_period=_SPEED_S,
+            )
+            self._bar.add_task(step, total=1.0)
+            self._bar.update(TaskID(0), completed=max(fraction, 1e-9))  # rich times from here on, but not from 0
+        console = self._bar.console
+        self._bar.update(TaskID(0), completed=fraction, description=step)
+        with console.capture() as capture:
+            console.print(self._bar.get_renderable(), end="", width=console.width - 1)
+        return capture.get().rstrip("\n")
 
 
 def _end_bar() -> None:
-    """A bar that is left on a terminal goes before anything else is written there."""
+    """Clear the bar on a terminal before anything else is written there."""
     if on_terminal(sys.stderr):
         print("\r\033[K", end="", file=sys.stderr, flush=True)
-
-
-def progress_bar(done: float) -> str:
-    """The share that is done as a bar and as a percentage."""
-    filled = round(_BAR * done)
-    return f"[{'=' * filled}{' ' * (_BAR - filled)}] {done:4.0%}"
-
-
-def _left(done: float, since_s: float) -> str:
-    """How long it will take yet, once that can be told."""
-    if not 0.05 <= done < 1 or since_s < 2:
-        return ""
-    left_s = since_s * (1 - done) / done
-    return f", about {left_s / 60:.0f} min left" if left_s > 90 else f", about {left_s:.0f} s left"
-
-
-def complain(line: str) -> None:
-    """What went wrong, on standard error."""
-    _end_bar()
-    print(f"{styled('scanwright:', 'error', sys.stderr)} {line}", file=sys.stderr)
 
 
 def require_pages(work: str) -> None:
@@ -198,11 +244,14 @@ def require_pages(work: str) -> None:
 
 
 @contextmanager
-def on_duty() -> Iterator[None]:
-    """Go first where the system allows it (times get blurred on a busy computer), and end well on every signal."""
+def high_priority() -> Iterator[None]:
+    """Run the block at a high priority, if the system allows it, and end it by KeyboardInterrupt on every signal.
+
+    Arrival times of device data are late if other programs come first.
+    """
     usual = os.nice(0)
     with suppress(PermissionError):
-        os.nice(-10)
+        os.nice(_PRIORITY)
 
     def interrupt(number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt(signal.Signals(number).name)

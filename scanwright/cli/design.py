@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 import typer
+from typer import Argument, Option
 
 from scanwright.cad.kernel import require_kernel
-from scanwright.cli.console import AsJson, Progress, TaskFile, TaskOrBuild, hint, show, show_json
+from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
+from scanwright.cli.console import ConsoleProgress, hint, show, show_json, show_result
 from scanwright.cli.help import Commands
 
 app = Commands("Design")
 
 
-@app.command()
+@app.command(example="optimise ground_ahead")
 def optimise(
     task: TaskFile,
-    picture: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Draw the lowest J over scan planes and over axes.")
-    ] = None,
+    picture: Annotated[Path | None, Option(metavar="FILE.png", help="Plot of the objective.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Search all mounting angles of a task and print the best ten families of settings."""
+    """Find the best mounting angles for a task.
+
+    Searches all angles within the task's ranges and prints the ten best distinct mounts.
+    """
     from scanwright import api
 
-    optimum = api.optimise(task, say=Progress())
+    optimum = api.optimise(task, progress=ConsoleProgress())
     if picture is not None:
         from scanwright.design.evaluation.landscape_picture import landscape_picture
 
@@ -43,72 +45,70 @@ def optimise(
         show([*optimum.lines(), *scan, *(f"warning: {warning}" for warning in optimum.asked.warnings())])
         if picture is not None:
             print(f"wrote {picture}")
-        hint(f"next: `scanwright build {task}` makes it")
+        hint(f"next: `scanwright build {task}`")
 
 
-@app.command()
+@app.command(example="evaluate ground_ahead --angles=0,90,0,-90", no="the two counts of beams disagree")
 def evaluate(
     task: TaskOrBuild,
     angles: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A_ROT,B_ROT,A_LASER,B_LASER", help="The setting, in degrees; default: that of a build folder."
-        ),
+        str | None, Option(metavar="A_ROT,B_ROT,A_LASER,B_LASER", help="Mounting angles in degrees.")
     ] = None,
-    cloud: Annotated[
-        Path | None, typer.Option(metavar="FILE.ply", help="Write the simulated beams as points on the unit sphere.")
-    ] = None,
+    cloud: Annotated[Path | None, Option(metavar="FILE.ply", help="Simulated beams on the unit sphere.")] = None,
     pole: Annotated[
-        str | None,
-        typer.Option(metavar="WIDTH_MM,HEIGHT_MM,RANGE_M", help="Tell the chance to hit a thin upright pole."),
+        str | None, Option(metavar="WIDTH_MM,HEIGHT_MM,RANGE_M", help="Probability of hitting an upright pole.")
     ] = None,
     lever: Annotated[
-        str | None,
-        typer.Option(metavar="X_MM,Y_MM,RANGE_M", help="Optical centre off the axis by (x, y), as seen at a range."),
+        str | None, Option(metavar="X_MM,Y_MM,RANGE_M", help="Evaluate with the optical centre off the axis.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Judge one setting of the mounting angles, the closed form beside the paper's ball search."""
+    """Report what given mounting angles can see."""
     import numpy as np
 
     from scanwright import api
-    from scanwright.api.arguments import as_built_scanner
-    from scanwright.design.evaluation.evaluation import angles_in
+    from scanwright.api.arguments import as_built_scanner, lever_in, numbers_in, pole_in
 
     built = as_built_scanner(task)
     if built is None and angles is None:
-        raise typer.BadParameter("missing: only a build folder has angles of its own", param_hint="--angles")
+        raise typer.BadParameter("required unless TASK is a build folder", param_hint="--angles")
     loaded = api.load_task(task) if built is None else built.loaded
-    found = api.evaluate(task, None if angles is None else angles_in(angles), pole=pole, lever=lever, say=Progress())
-    angles_deg = np.degrees(found.angles_rad).round(9).tolist()
+    form = "A_ROT,B_ROT,A_LASER,B_LASER in degrees, such as 0,90,0,-90"
+    result = api.evaluate(
+        task,
+        None if angles is None else numbers_in(angles, "angles", form),
+        pole=None if pole is None else pole_in(pole),
+        lever=None if lever is None else lever_in(lever),
+        progress=ConsoleProgress(),
+    )
+    angles_deg = np.degrees(result.angles_rad).round(9).tolist()
     if cloud is not None:
         from scanwright.firmware_io.clouds.ply import write_points
 
-        beams = found.beam_directions()
+        beams = result.beam_directions()
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
     if as_json:
-        show_json({"task": loaded.task.name, "angles_deg": angles_deg, **found.facts()})
+        show_json({"task": loaded.task.name, "angles_deg": angles_deg, **result.facts()})
     else:
-        show(found.lines())
+        show(result.lines())
         if cloud is not None:
             print(f"wrote {len(beams):,} points to {cloud}")
-    if not found.agree:
+    if not result.agree:
         raise typer.Exit(1)
 
 
-@app.command()
+@app.command(example="accuracy ground_ahead", no="a stress case fails")
 def accuracy(
     task: TaskFile,
-    stress: Annotated[bool, typer.Option("--stress", help="The table of stiff and extreme cases instead.")] = False,
-    choices: Annotated[
-        bool, typer.Option("--choices", help="Meshes, integrator of the emulated servo and its angle instead.")
-    ] = False,
-    search: Annotated[bool, typer.Option("--search", help="What the search spends and gains instead.")] = False,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one folder of reports per task.")] = Path(
-        "out/accuracy"
-    ),
+    stress: Annotated[bool, Option("--stress", help="Stiff and extreme cases instead.")] = False,
+    choices: Annotated[bool, Option("--choices", help="Meshes and integrators instead.")] = False,
+    search: Annotated[bool, Option("--search", help="Effort of the search instead.")] = False,
+    out: Annotated[Path, Option(metavar="DIR", help="Parent of the folder of reports.")] = Path("out/accuracy"),
 ) -> None:
-    """Report error against run time of every way to compute J, at the optimum of a task; of other choices too."""
+    """Measure the error and run time of the optimiser.
+
+    Without an option: every method to compute the objective, at the optimum of the task.
+    """
     from scanwright import api
 
     if choices:
@@ -118,7 +118,7 @@ def accuracy(
     if choices:
         from scanwright.trials.report import report_choices
 
-        show(report_choices(loaded, folder, Progress()))
+        show(report_choices(loaded, folder, ConsoleProgress()))
         return
     from scanwright.design.accuracy.report import report_precision, report_search, report_stress
 
@@ -127,60 +127,47 @@ def accuracy(
         from scanwright.trials.stress import range_rows, servo_rows
 
         more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
-        told = report_stress(loaded, folder, Progress(), more)
-        show(told.lines)
-        raise typer.Exit(0 if told.passed else 1)
-    show((report_search if search else report_precision)(loaded, folder, Progress()))
+        report = report_stress(loaded, folder, ConsoleProgress(), more)
+        show(report.lines)
+        raise typer.Exit(0 if report.passed else 1)
+    show((report_search if search else report_precision)(loaded, folder, ConsoleProgress()))
 
 
-@app.command()
+@app.command(example="compare ground_ahead")
 def compare(
     task: TaskOrBuild,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder that holds one folder of comparisons per task.")
-    ] = Path("out/compare"),
+    out: Annotated[Path, Option(metavar="DIR", help="Parent of the folder of the comparison.")] = Path("out/compare"),
     as_json: AsJson = False,
 ) -> None:
-    """Compare the optimum with the reference mounts, a cheap scanner and ready-made ones: table, CSV, picture."""
+    """Compare the optimum with other mounts and 3D lidars.
+
+    Prints a table, and writes it as a CSV file and a picture.
+    """
     from scanwright import api
     from scanwright.api.arguments import as_built_scanner
     from scanwright.pipeline.comparison import write_comparison
 
     built = as_built_scanner(task)
     loaded = api.load_task(task) if built is None else built.loaded
-    found = write_comparison(loaded, out / loaded.task.name, Progress(), built)
-    if as_json:
-        gains = [gain.facts() for gain in found.optimum.gains]
-        show_json({"task": loaded.task.name, "rows": [asdict(row) for row in found.rows], "gains": gains})
-    else:
-        show(found.lines())
+    result = write_comparison(loaded, out / loaded.task.name, ConsoleProgress(), built)
+    gains = [gain.facts() for gain in result.optimum.gains]
+    record = {"task": loaded.task.name, "rows": [asdict(row) for row in result.rows], "gains": gains}
+    show_result(result.lines, record, as_json)
 
 
-class Kind(Enum):
-    """What a product is."""
-
-    lidar = "lidar"
-    servo = "servo"
-    slip_ring = "slip_ring"
-    bearing = "bearing"
-    belt = "belt"
-    printer = "printer"
-    multibeam = "multibeam"
+Kind = Literal["lidar", "servo", "slip_ring", "bearing", "belt", "printer", "multibeam"]
 
 
-@app.command()
+@app.command(example="catalogue --kind lidar --min-range-m 8")
 def catalogue(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one product with all sources.")] = None,
-    kind: Annotated[Kind | None, typer.Option(help="Only products of this kind.")] = None,
-    min_range_m: Annotated[
-        float | None,
-        typer.Option(metavar="M", help="Only lidars that see as far: in practice where known, else as stated."),
-    ] = None,
-    max_mass_g: Annotated[float | None, typer.Option(metavar="G", help="Only what is as light.")] = None,
-    max_price_usd: Annotated[float | None, typer.Option(metavar="USD", help="Only what is as cheap.")] = None,
+    name: Annotated[str | None, Argument(metavar="NAME", help="Print one product with all sources.")] = None,
+    kind: Annotated[Kind | None, Option(metavar="KIND", help=f"Only this kind: {', '.join(get_args(Kind))}.")] = None,
+    min_range_m: Annotated[float | None, Option(metavar="M", help="Minimum range, practical if known.")] = None,
+    max_mass_g: Annotated[float | None, Option(metavar="G", help="Maximum mass in grams.")] = None,
+    max_price_usd: Annotated[float | None, Option(metavar="USD", help="Maximum price.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the products that a task can name, in tables, or one of them with the source of every value."""
+    """List lidars, servos, slip rings and other products."""
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.table import chosen, table_lines
 
@@ -190,21 +177,22 @@ def catalogue(
         if name
         else chosen(
             products,
-            kind=kind and kind.value,
+            kind=kind,
             min_range_m=min_range_m,
             max_mass_g=max_mass_g,
             max_price_usd=max_price_usd,
         )
     )
-    if as_json:
-        show_json({"products": [product.facts() for product in listed]})
-    else:
-        show(listed[0].lines() if name else table_lines(listed))
+    record = {"products": [product.facts() for product in listed]}
+    show_result(lambda: listed[0].lines() if name else table_lines(listed), record, as_json)
 
 
-@app.command()
+@app.command(example="schema > task.schema.json")
 def schema() -> None:
-    """Print the JSON schema of a task file, so that an editor completes and checks it."""
+    """Print the JSON schema of a task file.
+
+    Editors complete and check task files by it.
+    """
     from scanwright.design.task.task import Task
 
     show_json(Task.model_json_schema())

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, closing, suppress
-from dataclasses import replace
-from enum import Enum
+from dataclasses import asdict, replace
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+from typer import Argument, Option
 
-from scanwright.cli.console import AllowOrigin, BuildFolder, Progress, complain, on_duty, require_pages, show
+from scanwright.cli.arguments import AllowOrigin, AsJson, BuildFolder, Intensity, Lidar, Rate, ServoId, ServoPort
+from scanwright.cli.console import (
+    ConsoleProgress,
+    exit_code,
+    high_priority,
+    print_error,
+    require_pages,
+    show,
+    show_json,
+)
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command
-from scanwright.design.errors import DeviceError, ScanwrightError, notes_of, require
+from scanwright.design.errors import ScanwrightError, notes_of, require
+from scanwright.design.findings import errors_in
 from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
@@ -24,32 +34,6 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 app = Commands("Devices", first=require_posix)
-
-
-class StampAt(Enum):
-    """Which moment of a turn the stamps of a sensor mean."""
-
-    step_0 = "step_0"
-    rear = "rear"
-
-
-class PointsPer(Enum):
-    """What makes one message of points."""
-
-    scan = "scan"
-    turn = "turn"
-
-
-class PointsIn(Enum):
-    """In which frame points are published."""
-
-    world = "world"
-    rot = "rot"
-
-
-ServoId = Annotated[
-    int | None, typer.Option(min=0, max=252, metavar="ID", help="Number of the servo, where several share its bus.")
-]
 
 
 def _viewer(
@@ -66,23 +50,24 @@ def _viewer(
     return live_page(out, wanted=live)
 
 
-@app.command()
+@app.command(example="emulate out/ground_ahead")
 def emulate(
     out: BuildFolder,
-    scene: Annotated[
-        Path | None, typer.Option(metavar="MESH", help="STL, PLY, OBJ, DAE or GLB; default is a furnished room.")
-    ] = None,
-    unit_m: Annotated[float, typer.Option(metavar="M", help="Length of one unit of the mesh, 0.001 for mm.")] = 1.0,
-    at: Annotated[
-        tuple[float, float, float], typer.Option(metavar="X Y Z", help="Where the scanner stands in the mesh, metres.")
-    ] = (0.0, 0.0, 0.0),
-    noise_mm: Annotated[float | None, typer.Option(min=0, help="Range noise; default is the data sheet's.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the noise.")] = 0,
-    factory_servo: Annotated[
-        bool, typer.Option("--factory-servo", help="Servo as it comes from the factory, not yet set up.")
-    ] = False,
+    scene: Annotated[Path | None, Option(metavar="MESH", help="Surroundings [default: a furnished room].")] = None,
+    unit_m: Annotated[float, Option(metavar="M", help="Length of one mesh unit; 0.001 for mm.")] = 1.0,
+    at: Annotated[tuple[float, float, float], Option(metavar="X Y Z", help="Position in the scene, metres.")] = (
+        0.0,
+        0.0,
+        0.0,
+    ),
+    noise_mm: Annotated[float | None, Option(min=0, metavar="SIGMA", help="Range noise [default: data sheet].")] = None,
+    seed: Annotated[int, Option(min=0, metavar="N", help="Random seed.")] = 0,
+    factory_servo: Annotated[bool, Option("--factory-servo", help="Servo with factory settings.")] = False,
 ) -> None:
-    """Run a servo and a lidar without hardware, in a room, until Ctrl-C; `scan OUT` finds them."""
+    """Run an emulated lidar and servo.
+
+    Runs until Ctrl-C. `scan`, `doctor` and `ros2` detect the emulated devices of the same build folder.
+    """
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
     from scanwright.firmware_io.emulators.head import read_load
@@ -93,7 +78,7 @@ def emulate(
     place = room(scene, unit_m, at)
     with (
         suppress(KeyboardInterrupt),
-        on_duty(),
+        high_priority(),
         emulated_scanner(
             angles, place, load=read_load(out, angles), sigma_mm=noise_mm, seed=seed, factory_servo=factory_servo
         ) as emulators,
@@ -106,34 +91,34 @@ def emulate(
         Event().wait()
 
 
-@app.command()
+@app.command(example="scan out/ground_ahead --live")
 def scan(
     out: BuildFolder,
-    turns: Annotated[int, typer.Option(help="Full scans.")] = 1,
-    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
-    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    turns: Annotated[int, Option(metavar="N", help="Number of full scans.")] = 1,
+    lidar: Lidar = None,
+    servo: ServoPort = None,
     servo_id: ServoId = None,
     recording: Annotated[
-        Path | None, typer.Option("--recording", "-o", metavar="FILE.mcap", help="Default: OUT/recordings/DATE.mcap.")
+        Path | None,
+        Option("--recording", "-o", metavar="FILE.mcap", help="Output [default: BUILD/recordings/DATE.mcap]."),
     ] = None,
-    intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
-    cluster: Annotated[int, typer.Option(min=1, max=99, help="Steps that share one range, the least of theirs.")] = 1,
-    every: Annotated[int, typer.Option(min=1, max=10, help="Take one scan of so many.")] = 1,
-    stamp_at: Annotated[
-        StampAt, typer.Option(help="What the sensor's stamps mean: step 0 (the specification) or the rear.")
-    ] = StampAt.step_0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done, and stop.")] = False,
-    live: Annotated[
-        bool, typer.Option("--live", help="Show the cloud while it grows, in a page of your browser.")
-    ] = False,
-    foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve scans, points and frames to Foxglove.")] = False,
+    intensity: Intensity = False,
+    cluster: Annotated[int, Option(min=1, max=99, metavar="N", help="Merge N steps into the smallest range.")] = 1,
+    every: Annotated[int, Option(min=1, max=10, metavar="N", help="Use every Nth scan of the lidar.")] = 1,
+    stamp_at: Annotated[Literal["step_0", "rear"], Option(help="Beam of the lidar's timestamps.")] = "step_0",
+    dry_run: Annotated[bool, Option("--dry-run", help="Print the plan and exit.")] = False,
+    live: Annotated[bool, Option("--live", help="Show the growing cloud in the browser.")] = False,
+    foxglove: Annotated[bool, Option("--foxglove", help="Serve scans and points to Foxglove.")] = False,
     allow_origin: AllowOrigin = None,
 ) -> None:
-    """Turn the scanner, record, and assemble the cloud beside the recording."""
+    """Record a full scan and assemble its point cloud.
+
+    The cloud is written next to the recording.
+    """
     if live:
         require_pages("scan --live")
     if live and foxglove:
-        raise DeviceError("--live and --foxglove: one of them")
+        raise ScanwrightError("--live, --foxglove: choose one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright import api
     from scanwright.firmware_io.scan.plan import plan_scan
@@ -148,33 +133,33 @@ def scan(
         intensity=intensity,
         cluster=cluster,
         every=every,
-        stamp_at=stamp_at.value,
+        stamp_at=stamp_at,
     )
-    say = Progress()
+    progress = ConsoleProgress()
     show(plan.lines())
     if dry_run:
         return
     with viewer as watch, closing(watch):
         try:
-            recorded = _acquired(plan, say, watch, out, servo_id)
+            recorded = _acquired(plan, progress, watch, out, servo_id)
             watch.ended(finished(recorded))  # the devices stand, whatever becomes of the cloud
-            say(f"recorded {recorded.duration_s:.1f} s, assembling")
+            progress(f"recorded {recorded.duration_s:.1f} s, assembling")
             show(recorded.lines())
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
             watch.ended(finished(recorded, cloud.lines()))
             show(cloud.lines())
         except ScanwrightError as error:
             _end(watch, failed(error), plan.recording)
-            raise typer.Exit(2) from None
+            raise typer.Exit(exit_code(error)) from None
 
 
-def _acquired(plan: ScanPlan, say: Progress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
+def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
     """Record, after the person has agreed to what the servo needs; Ctrl-C ends the command."""
     from scanwright.firmware_io.scan.acquire import acquire
 
     try:
-        with on_duty():
-            return asking_first(lambda: acquire(plan, say, watch), out, servo_id)
+        with high_priority():
+            return asking_first(lambda: acquire(plan, progress, watch), out, servo_id)
     except KeyboardInterrupt as stop:
         _end(watch, stopped(stop), plan.recording)
         raise typer.Exit(130) from None
@@ -182,42 +167,41 @@ def _acquired(plan: ScanPlan, say: Progress, watch: Viewer, out: Path, servo_id:
 
 def _end(watch: Viewer, end: ScanEnd, recording: Path) -> None:
     """Say how a scan ended early, in the same words on standard error and to the viewer."""
-    kept = (f"what was recorded is in {recording}",) if recording.exists() else ()
-    end = replace(end, lines=(*end.lines, *kept))
+    recorded_in = (f"what was recorded is in {recording}",) if recording.exists() else ()
+    end = replace(end, lines=(*end.lines, *recorded_in))
     for line in end.lines:
-        complain(line)
+        print_error(line)
     watch.ended(end)
 
 
-@app.command()
+@app.command(example="ros2 out/ground_ahead -- --ros-args -r scan:=front/scan")
 def ros2(
     out: BuildFolder,
     ros_args: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[-- --ros-args ...]", help="As nodes of ROS 2 take them: -r scan:=front/scan."),
+        Argument(metavar="-- ROS_ARGS", help="Arguments of the node."),
     ] = None,
     recording: Annotated[
-        Path | None, typer.Option(metavar="FILE.mcap", help="Publish a recording at its own pace, with /clock.")
+        Path | None, Option(metavar="FILE.mcap", help="Publish a recording instead, with /clock.")
     ] = None,
-    rate: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
-    straight: Annotated[
-        bool, typer.Option("--straight", help="Points straight between angles: later by one angle, not 0.35 s.")
-    ] = False,
-    points_per: Annotated[PointsPer, typer.Option(help="A message of points for each scan, or for each turn.")] = (
-        PointsPer.scan
-    ),
-    points_in: Annotated[PointsIn, typer.Option(help="Frame of the points; a turn has none that turns.")] = (
-        PointsIn.world
-    ),
-    no_tf: Annotated[bool, typer.Option("--no-tf", help="Leave the frames to robot_state_publisher.")] = False,
-    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
-    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    rate: Rate = 1.0,
+    straight: Annotated[bool, Option("--straight", help="Interpolate joint angles linearly (less latency).")] = False,
+    points_per: Annotated[Literal["scan", "turn"], Option(help="One message of points per scan or turn.")] = "scan",
+    points_in: Annotated[
+        Literal["world", "rot"], Option(help="Frame of the points; rot needs --points-per scan.")
+    ] = "world",
+    no_tf: Annotated[bool, Option("--no-tf", help="Do not publish tf.")] = False,
+    lidar: Lidar = None,
+    servo: ServoPort = None,
     servo_id: ServoId = None,
-    intensity: Annotated[bool, typer.Option("--intensity", help="Ask the sensor for intensities too.")] = False,
-    foxglove: Annotated[bool, typer.Option("--foxglove", help="Serve the same to Foxglove, without a bridge.")] = False,
+    intensity: Intensity = False,
+    foxglove: Annotated[bool, Option("--foxglove", help="Also serve the data to Foxglove.")] = False,
     allow_origin: AllowOrigin = None,
 ) -> None:
-    """Publish scans, angles, frames and de-skewed points as a node of ROS 2, until Ctrl-C."""
+    """Run the scanner as a ROS 2 node.
+
+    Publishes scans, joint angles, frames and motion-corrected points until Ctrl-C.
+    """
     require(
         "ros",
         "ros2 needs rclpy: source the setup.bash of your ROS 2 (its Python is the one to install scanwright in), or",
@@ -225,42 +209,45 @@ def ros2(
         "sensor_msgs",
     )
     if foxglove and recording is not None:
-        raise DeviceError("--foxglove and --recording: `scanwright view` serves a recording to Foxglove")
+        raise ScanwrightError(
+            "--foxglove, --recording: choose one of them (`scanwright view` serves a recording to Foxglove)"
+        )
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from scanwright.firmware_io.scan.plan import plan_scan
 
-    given = ros_args or []
-    points = Publishing(not straight, points_per is PointsPer.turn, points_in.value, not no_tf)
+    node_arguments = ros_args or []
+    points = Publishing(not straight, points_per == "turn", points_in, not no_tf)
     try:
         if recording is not None:
-            serve_recording(out, recording, given, Progress(), points, rate=rate)
+            serve_recording(out, recording, node_arguments, ConsoleProgress(), points, rate=rate)
             return
         plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
         show(plan.lines())
-        with on_duty(), viewer as watch:
-            asking_first(lambda: serve_devices(out, plan, given, Progress(), points, watch), out, servo_id)
+        with high_priority(), viewer as watch:
+            asking_first(
+                lambda: serve_devices(out, plan, node_arguments, ConsoleProgress(), points, watch), out, servo_id
+            )
     except KeyboardInterrupt as stop:
         for line in ("stopped", *notes_of(stop)):
-            complain(line)
+            print_error(line)
         raise typer.Exit(130) from None
 
 
-@app.command()
+@app.command(example="doctor out/ground_ahead", no="a problem was found")
 def doctor(
-    out: Annotated[Path | None, typer.Argument(metavar="[OUT]", help="Build folder of the scanner.")] = None,
-    lidar: Annotated[str | None, typer.Option(metavar="ADDR", help="Serial port or HOST:PORT of the lidar.")] = None,
-    servo: Annotated[str | None, typer.Option(metavar="PORT", help="Serial port of the servo.")] = None,
+    out: Annotated[Path | None, Argument(metavar="BUILD", help="Build folder of the scanner.")] = None,
+    lidar: Lidar = None,
+    servo: ServoPort = None,
     servo_id: ServoId = None,
-    fix: Annotated[
-        bool,
-        typer.Option("--fix", help="Set up the servo first, as servo-setup does; keeps a file to undo it."),
-    ] = False,
-    restore: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Undo the changes of --fix or servo-setup, and stop.")
-    ] = None,
+    fix: Annotated[bool, Option("--fix", help="Correct servo settings; saves the old ones.")] = False,
+    restore: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
+    as_json: AsJson = False,
 ) -> None:
-    """Examine the devices: ports, models, firmware, rates, clock; what is wrong, and the remedy. It only reads."""
+    """Diagnose the connected lidar and servo.
+
+    Reads only, unless --fix or --restore is given.
+    """
     from scanwright.firmware_io.scan import doctor as diagnosis
     from scanwright.firmware_io.servo import settings
 
@@ -269,38 +256,36 @@ def doctor(
         return
     if fix:
         print_steps(*diagnosis.fix(out, servo, servo_id))
-    failed = False
+    findings = []
     for finding in diagnosis.examine(out, lidar, servo, servo_id):
         hint = finding.hint
         if finding.code == diagnosis.SERVO_SETTING:
             hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
-        print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
-        failed |= finding.severity == "error"
-    raise typer.Exit(1 if failed else 0)
+        findings.append(replace(finding, hint=hint))
+        if not as_json:
+            print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
+    if as_json:
+        show_json({"findings": [asdict(finding) for finding in findings]})
+    raise typer.Exit(1 if errors_in(findings) else 0)
 
 
-@app.command("servo-setup")
+@app.command("servo-setup", example="servo-setup /dev/ttyUSB0 --id 1 --baud 1000000")
 def servo_setup(
-    port: Annotated[str, typer.Argument(metavar="PORT", help="Serial port of the servo.")],
-    scanner: Annotated[
-        Path | None, typer.Option(metavar="OUT", help="Build folder whose motion the servo is set up for.")
-    ] = None,
-    new_id: Annotated[int | None, typer.Option("--id", metavar="N", help="New number, 0 to 252; sets no more.")] = None,
-    new_baud: Annotated[
-        int | None, typer.Option("--baud", metavar="B", help="New speed, such as 1000000; sets no more.")
-    ] = None,
+    port: Annotated[str, Argument(metavar="PORT", help="Serial port of the servo.")],
+    scanner: Annotated[Path | None, Option(metavar="BUILD", help="Build folder with the motion.")] = None,
+    new_id: Annotated[int | None, Option("--id", metavar="N", help="New id, 0 to 252; nothing else.")] = None,
+    new_baud: Annotated[int | None, Option("--baud", metavar="B", help="New baud rate; nothing else.")] = None,
     from_id: Annotated[
-        int | None, typer.Option(min=0, max=252, metavar="N", help="Its number now; needed if several answer.")
+        int | None, Option(min=0, max=252, metavar="N", help="Current id, if several servos answer.")
     ] = None,
-    from_baud: Annotated[
-        int | None, typer.Option(metavar="B", help="Its speed now; default is to look at all.")
-    ] = None,
-    undo: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Undo the changes of an earlier set-up, and stop.")
-    ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print what would be written, and stop.")] = False,
+    from_baud: Annotated[int | None, Option(metavar="B", help="Current baud rate [default: try all].")] = None,
+    undo: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
+    dry_run: Annotated[bool, Option("--dry-run", help="Print what would be written, and exit.")] = False,
 ) -> None:
-    """Write the settings that a scan needs to the servo; keeps a file to undo it."""
+    """Set up a servo, or set its id or baud rate.
+
+    Writes the settings that a scan needs, verifies them, and saves the old ones for --undo.
+    """
     from scanwright.design.angles import load_angles
     from scanwright.design.motion import Spin
     from scanwright.firmware_io.servo import settings
@@ -308,7 +293,7 @@ def servo_setup(
 
     numbers = new_id is not None or new_baud is not None
     if sum([numbers, undo is not None, scanner is not None or dry_run]) > 1:
-        raise DeviceError("--id and --baud, --undo, --scanner and --dry-run: one at a time")
+        raise ScanwrightError("--id and --baud, --undo, --scanner and --dry-run: choose one of these")
     folder = scanner or Path()
     if undo is not None:
         print_steps(port, settings.restore(undo, port))

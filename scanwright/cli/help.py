@@ -9,14 +9,15 @@ from functools import wraps
 from typing import Annotated, Any, ClassVar, TypeVar
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
+from typer.models import OptionInfo
 
-from scanwright.cli.console import Voice, set_voice, styled
+from scanwright.cli.console import Verbosity, name_options, set_verbosity, styled
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Results only: no progress, no hints.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Every step on its own line, every warning in full.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print results only.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print every step and full warnings.")]
 
 
 class Commands(typer.Typer):
@@ -26,15 +27,26 @@ class Commands(typer.Typer):
         super().__init__(rich_markup_mode=None, pretty_exceptions_enable=False)
         self.title, self.first = title, first
 
-    def command(self, name: str | None = None, **options: Any) -> Callable[[F], F]:
-        """As typer's own."""
-        register = super().command(name, rich_help_panel=self.title, **options)
+    def command(self, name: str | None = None, *, example: str = "", no: str = "", **options: Any) -> Callable[[F], F]:
+        """As typer's own; the help ends with an `example` and the exit codes, of which 1 means `no` if given."""
+        codes = ["0 done", *([f"1 {no}"] if no else []), "2 wrong input"]
+        codes += ["3 device fault", "130 interrupted"] if self.title == "Devices" else ["130 interrupted"]
+        epilog = f"Example: scanwright {example}\n\nExit codes: {'; '.join(codes)}"
+        register = super().command(name, cls=_Command, epilog=epilog, rich_help_panel=self.title, **options)
 
         def registered(function: F) -> F:
-            register(_with_voice(function, self.first))
+            register(_with_verbosity(function, self.first))
             return function
 
         return registered
+
+
+class _Command(TyperCommand):
+    """A command whose usage line has no braces around arguments."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """As typer's own, `RECORDING` in place of `{RECORDING}`."""
+        return [re.sub(r"[{}]", "", piece) for piece in super().collect_usage_pieces(ctx)]
 
 
 class GroupedHelp(TyperGroup):
@@ -59,20 +71,32 @@ def first_sentence(command: Any) -> str:
     return re.split(r"\.(?: (?=[A-Z])|$)", paragraph, maxsplit=1)[0]
 
 
-def _with_voice(function: Callable[..., Any], first: Callable[[], None]) -> Callable[..., Any]:
-    """The function with `quiet` and `verbose`, which it does not see; it runs after `first`."""
+def _with_verbosity(function: Callable[..., Any], first: Callable[[], None]) -> Callable[..., Any]:
+    """Return the function with options for its verbosity, which it does not see; it runs after `first`."""
+    signature = inspect.signature(function, eval_str=True)
+    options = {name: option for name, each in signature.parameters.items() if (option := _option(name, each))}
 
     @wraps(function)
-    def spoken(*args: Any, quiet: bool = False, verbose: bool = False, **kwargs: Any) -> Any:
+    def run(*args: Any, quiet: bool = False, verbose: bool = False, **kwargs: Any) -> Any:
+        name_options(options)
         if quiet or verbose:
-            set_voice(Voice.QUIET if quiet else Voice.VERBOSE)
+            set_verbosity(Verbosity.QUIET if quiet else Verbosity.VERBOSE)
         first()
         return function(*args, **kwargs)
 
-    signature = inspect.signature(function, eval_str=True)
     added = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in (("quiet", Quiet), ("verbose", Verbose))
     ]
-    vars(spoken)["__signature__"] = signature.replace(parameters=[*signature.parameters.values(), *added])
-    return spoken
+    vars(run)["__signature__"] = signature.replace(parameters=[*signature.parameters.values(), *added])
+    return run
+
+
+def _option(name: str, parameter: inspect.Parameter) -> str:
+    """Return the option of a parameter, such as `--min-range-m`; empty for an argument."""
+    for info in getattr(parameter.annotation, "__metadata__", ()):
+        if isinstance(info, OptionInfo):
+            written = (info.default, *(info.param_decls or ()))  # typer takes the first one for a default
+            named = (text for text in written if isinstance(text, str) and text.startswith("--"))
+            return next(named, f"--{name.replace('_', '-')}")
+    return ""

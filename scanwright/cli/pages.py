@@ -6,48 +6,47 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from scanwright.cad.kernel import require_kernel
-from scanwright.cli.console import AllowOrigin, Progress, require_pages
+from scanwright.cli.arguments import AllowOrigin, Angles, Out, Rate
+from scanwright.cli.console import ConsoleProgress, require_pages
 from scanwright.cli.help import Commands
 from scanwright.design.errors import require
 
 app = Commands("Pages")
 
 
-@app.command()
+@app.command(example="studio ground_ahead")
 def studio(
-    task: Annotated[Path, typer.Argument(metavar="[TASK]", help="Task file, or the name of a shipped task.")] = Path(
+    task: Annotated[Path, Argument(metavar="TASK", help="Task file, or name of a shipped task.")] = Path(
         "ground_ahead"
     ),
-    port: Annotated[int, typer.Option(help="Port on this computer; 0 is any that is free.")] = 0,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one build folder per task.")] = Path(
-        "out"
-    ),
+    port: Annotated[int, Option(metavar="N", help="Port; 0 chooses a free one.")] = 0,
+    out: Out = Path("out"),
 ) -> None:
-    """Drag the angles and paint what matters in a page of your browser, and see what it comes to."""
+    """Explore mounting angles in the browser."""
     require_pages("studio")
 
     require_kernel("studio")
     from scanwright.design.task.task import load_task
     from scanwright.studio.session import run_studio
 
-    run_studio(load_task(task), port=port, out=out, say=Progress())
+    run_studio(load_task(task), port=port, out=out, progress=ConsoleProgress())
 
 
-@app.command()
+@app.command(example="view rec.mcap --angles out/ground_ahead/angles.json")
 def view(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="MCAP recording of the scanner.")],
-    angles: Annotated[Path, typer.Option(metavar="angles.json", help="Angle set of the scanner.")],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this computer; 0 is any that is free.")] = 8765,
-    rate: Annotated[float, typer.Option(help="How many times as fast as it was recorded.")] = 1.0,
+    recording: Annotated[Path, Argument(metavar="RECORDING", help="Recording of the scanner.")],
+    angles: Angles,
+    port: Annotated[int, Option(min=0, max=65535, metavar="N", help="Port; 0 chooses a free one.")] = 8765,
+    rate: Rate = 1.0,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE.mcap", help="Write what would be shown into a file, and stop."),
+        Path | None, Option("--out", "-o", metavar="FILE.mcap", help="Write a file for Foxglove and exit.")
     ] = None,
     allow_origin: AllowOrigin = None,
 ) -> None:
-    """Show a recording in Foxglove: its scans, and the points, frames and scanner that they make."""
+    """Show a recording in Foxglove."""
     require("foxglove", "view needs a websocket server", "websockets")
     from scanwright.live.foxglove_view import view_recording, write_for_foxglove
     from scanwright.serving.handshake import as_origins
@@ -56,6 +55,8 @@ def view(
         print(f"wrote {write_for_foxglove(recording, angles, out):,} scans with their points to {out}")
         return
     try:
-        view_recording(recording, angles, Progress(), port=port, rate=rate, allow_origins=as_origins(allow_origin))
+        view_recording(
+            recording, angles, ConsoleProgress(), port=port, rate=rate, allow_origins=as_origins(allow_origin)
+        )
     except KeyboardInterrupt:
         raise typer.Exit(0) from None

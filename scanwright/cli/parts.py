@@ -4,135 +4,138 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
+from scanwright.cli.arguments import AsJson, BuildFolder, Out, TaskFile
 from scanwright.cli.console import (
-    AsJson,
-    BuildFolder,
-    Progress,
-    TaskFile,
-    Voice,
-    complain,
+    ConsoleProgress,
+    Verbosity,
     hint,
+    print_error,
+    print_note,
     show,
     show_json,
-    voice,
+    show_result,
+    verbosity,
     warn,
 )
 from scanwright.cli.help import Commands
 from scanwright.design.errors import notes_of, require
 
 if TYPE_CHECKING:
-    from scanwright.cad.checks.check import Check, Severity
+    from scanwright.design.findings import Finding, Severity
 
 app = Commands("Parts")
 
 
-@app.command()
+@app.command(example="build ground_ahead", no="a check of the parts fails, or --check finds a difference")
 def build(
     task: TaskFile,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder that holds one build folder per task.")] = Path(
-        "out"
-    ),
-    check: Annotated[
-        bool, typer.Option("--check", help="TASK is a build folder: build it again elsewhere, compare every file.")
-    ] = False,
+    out: Out = Path("out"),
+    check: Annotated[bool, Option("--check", help="Rebuild the folder TASK elsewhere and compare.")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Make everything of a task: angles, parts, drawings, pictures, into DIR/<task>/. Exit 1 if a check fails."""
+    """Generate parts, drawings, parts list and report.
+
+    Writes everything into DIR/<task>/; does nothing if the build is current.
+    """
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
         from scanwright.pipeline.manifest import listed_files
 
-        difference = difference_when_rebuilt(task, Progress())
+        difference = difference_when_rebuilt(task, ConsoleProgress())
         print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
+    from scanwright.cad.checks.checks_json import entries_of
 
     try:
-        built = api.build(task, out, say=Progress())
+        built = api.build(task, out, progress=ConsoleProgress())
     except KeyboardInterrupt as stop:
-        complain("; ".join(("stopped", *notes_of(stop))))
+        print_note("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
-    _complain_of(built.checks)
-    show(built.lines(in_full=voice() is Voice.VERBOSE))
+    _print_failed_checks(built.checks)
+    record = {"folder": built.folder, "files": built.files, "warnings": built.warnings, "misfits": built.misfits}
+    record |= {"checks": entries_of(built.checks)}
+    show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
     warn(built.misfits)
     report = built.folder / "report.html"
     if built.failed:
         hint(f"next: read the failed checks in {report}, and change the task")
         raise typer.Exit(1)
     coupon = f"then print {built.folder / 'print/fit_coupon.3mf'} and try it"
-    hint(f"next: open {report}; {'print no part yet, for the reasons above' if built.misfits else coupon}")
+    hint(f"next: open {report}; {'do not print parts yet (see the warnings)' if built.misfits else coupon}")
 
 
-@app.command()
+@app.command(example="report out/ground_ahead")
 def report(out: BuildFolder) -> None:
-    """Write report.html of a build folder from the files in it: the answer, 3D view, checks, parts, steps, drawings."""
+    """Regenerate report.html of a build."""
     require("cad", "report needs jinja2", "jinja2")
     from scanwright.pipeline.records import write_report
 
     print(f"wrote {write_report(out)}")
 
 
-@app.command()
+@app.command(example="check out/ground_ahead", no="a check fails")
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
-    """Check the parts of a build folder: room, beams, loads, print. Exit 1 if one fails."""
+    """Check the parts of a build (fit, loads, printing)."""
     from scanwright import api
+    from scanwright.cad.checks.checks_json import entries_of
+    from scanwright.design.findings import errors_in, sentence
 
-    checks = api.check(out, say=Progress())
-    _complain_of(checks)
+    checks = api.check(out, progress=ConsoleProgress())
+    _print_failed_checks(checks)
     warn(api.load_task(out / "task.toml").misfits())
     if as_json:
-        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": [asdict(entry) for entry in checks]})
+        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": entries_of(checks)})
     else:
-        show(f"{entry.severity:7} {entry.message}" for entry in checks)
+        show(f"{entry.severity:7} {sentence(entry)}" for entry in checks)
         print(_tally(Counter(entry.severity for entry in checks)))
-    raise typer.Exit(1 if any(entry.severity == "error" for entry in checks) else 0)
+    raise typer.Exit(1 if errors_in(checks) else 0)
 
 
-@app.command()
+@app.command(example="study fleet --plan")
 def study(
-    study: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file, or the name of a shipped study.")],
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="tcp://HOST:PORT", help="A running Dask scheduler; else this computer works.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of tables and winners; default: out/STUDY.")
-    ] = None,
-    results: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Results, shared with the workers or not; default: OUT/results.")
-    ] = None,
-    processes: Annotated[int | None, typer.Option(min=1, help="Of this computer; default: one for each core.")] = None,
-    plan: Annotated[bool, typer.Option("--plan", help="Say what it would cost, and stop.")] = False,
+    study: Annotated[Path, Argument(metavar="STUDY", help="Study file, or name of a shipped study.")],
+    scheduler: Annotated[str | None, Option(metavar="tcp://HOST:PORT", help="Use a running Dask cluster.")] = None,
+    out: Annotated[Path | None, Option(metavar="DIR", help="Tables and winners [default: out/STUDY].")] = None,
+    results: Annotated[Path | None, Option(metavar="DIR", help="Cache of results [default: OUT/results].")] = None,
+    processes: Annotated[int | None, Option(min=1, metavar="N", help="Workers [default: one per core].")] = None,
+    plan: Annotated[bool, Option("--plan", help="Print the estimated cost and exit.")] = False,
 ) -> None:
-    """Cross tasks with products, judge every candidate with its parts, and build the winners of the trade-off."""
+    """Optimise and build many scanners, rank the results.
+
+    Combines tasks with products, evaluates every candidate with its parts, and builds the winners. The same command
+    resumes an interrupted study.
+    """
     if plan:
         from scanwright.study.plan import plan_study
 
-        show(plan_study(study, out, results, Progress()))
+        show(plan_study(study, out, results, ConsoleProgress()))
         return
     from scanwright.study.run import run_study
 
     try:
-        show(run_study(study, out, results, scheduler, processes, Progress()))
+        show(run_study(study, out, results, scheduler, processes, ConsoleProgress()))
     except KeyboardInterrupt:
-        complain("stopped; the same command goes on where it was")
+        print_note("stopped; run the same command to continue")
         raise typer.Exit(130) from None
 
 
-def _complain_of(checks: Sequence[Check]) -> None:
+def _print_failed_checks(checks: Sequence[Finding]) -> None:
     """Print the failed checks on standard error, before any result."""
-    from scanwright.cad.checks.check import failure_lines
+    from scanwright.cad.checks.checks_json import failure_lines
 
     for line in failure_lines(checks):
-        complain(line)
+        print_error(line)
 
 
-def _tally(found: Counter[Severity]) -> str:
-    """How many checks came to what, as the report says it."""
+def _tally(counts: Counter[Severity]) -> str:
+    """Return how many checks have each severity, as in the report."""
     named: tuple[Severity, ...] = ("error", "warning", "note")
-    counts = [f"{found[severity]} {severity}{'' if found[severity] == 1 else 's'}" for severity in named]
-    return ", ".join([*counts, f"{found['pass']} passed"])
+    words = [f"{counts[severity]} {severity}{'' if counts[severity] == 1 else 's'}" for severity in named]
+    return ", ".join([*words, f"{counts['ok']} passed"])

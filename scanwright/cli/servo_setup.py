@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
-from scanwright.cli.console import complain
+from scanwright.cli.console import print_error
 
 if TYPE_CHECKING:
     from scanwright.firmware_io.servo.fitness import ServoSetupError
@@ -34,7 +34,7 @@ def print_steps(port: str, steps: Iterable[str | Path]) -> None:
     """Print each change as it is made, and first how to undo them all."""
     for step in steps:
         if isinstance(step, Path):
-            print(f"the old settings are kept; `{undo_command(port, step)}` restores them", flush=True)
+            print(f"the old settings are saved; `{undo_command(port, step)}` restores them", flush=True)
         else:
             print(step, flush=True)
 
@@ -49,7 +49,7 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
 
     Raises:
         ServoSetupError: nobody is there to be asked, or a setting does not last; nothing moves.
-        typer.Exit: the person declines, code 2; nothing moves.
+        typer.Exit: the person declines, code 3; nothing moves.
     """
     from scanwright.firmware_io.servo.fitness import ServoSetupError
     from scanwright.firmware_io.servo.settings import set_up
@@ -61,15 +61,15 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
         except ServoSetupError as error:
             names = {change.register.name for change in error.changes}
             if names & written:
-                error.add_note("it was written and did not last: the servo has restarted; look at its supply")
+                error.add_note("it was written and lost: the servo has restarted; check its supply")
                 raise
             remedy = f"`{set_up_command(error.port, out, servo_id)}` writes that, and keeps a file to undo it"
             if not (sys.stdin.isatty() and sys.stderr.isatty()):
                 error.add_note(remedy)
                 raise
             if not _agrees(error):
-                complain(f"nothing was written, nothing was moved; {remedy}")
-                raise typer.Exit(2) from None
+                print_error(f"nothing was written, nothing was moved; {remedy}")
+                raise typer.Exit(3) from None
             written |= names
             print_steps(error.port, set_up(error.port, error.model, error.servo_id, out, agreed=error.changes))
 
@@ -77,7 +77,7 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
 def _agrees(error: ServoSetupError) -> bool:
     """Whether the person at the terminal, who sees the list, agrees to write it."""
     for line in str(error).splitlines():
-        complain(line)
+        print_error(line)
     number = len(error.changes)
     try:
         return typer.confirm(

@@ -1,4 +1,4 @@
-"""The cloud while it grows: what a scan has measured so far, coloured by height, range, intensity or time."""
+"""The growing cloud of a scan, coloured by height, range, intensity or time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ColourBy = Literal["height", "range", "intensity", "time"]
 COLOUR_BY: tuple[ColourBy, ...] = get_args(ColourBy)
 CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
 MOST_POINTS = 5_000_000  # the page drops the oldest beyond, and says so
-POINT_M = 0.012
+POINT_M = 0.012  # 12 mm; the slider offers 2 to 50
 
 
 @dataclass(slots=True)
@@ -41,7 +41,7 @@ class CloudView:
     """The page of one scan."""
 
     def __init__(self, server: viser.ViserServer, name: str, centre_m: Vector) -> None:
-        """`name` is that of files that are saved, `centre_m` the optical centre, from which ranges are told."""
+        """`name` is that of saved files, `centre_m` the optical centre, the origin of ranges."""
         self._server, self._name, self._centre_m = server, name, centre_m
         self.chunks: deque[_Chunk] = deque()
         self._number = 0
@@ -60,11 +60,11 @@ class CloudView:
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
         self.ruler = Ruler(server, lambda: [chunk.points_m for chunk in list(self.chunks)])
-        save = server.gui.add_button("Save what is seen", hint="As a PLY file, where your browser puts downloads")
+        save = server.gui.add_button("Save what is seen", hint="As a PLY file, into the downloads of your browser")
         save.on_click(self._save)
 
     def add(self, growth: CloudGrowth) -> None:
-        """Show what is new, and say what the scan said."""
+        """Show new points and messages of the scan."""
         if len(growth.points_m):
             values: dict[ColourBy, Float32s] = {
                 "height": growth.points_m[:, 2],
@@ -79,8 +79,8 @@ class CloudView:
                 oldest = self.chunks.popleft()
                 self.forgotten += len(oldest.points_m)
                 oldest.handle.remove()
-        left = f"; the view forgot the oldest {self.forgotten:,}" if self.forgotten else ""
-        left += f"; it left out {growth.lost:,} scans, the recording none" if growth.lost else ""
+        left = f"; the view dropped the oldest {self.forgotten:,}" if self.forgotten else ""
+        left += f"; it dropped {growth.lost:,} scans, the recording none" if growth.lost else ""
         self.facts.content = note_html(f"{self.points:,} points{left}")
         for line in growth.lines:
             self.tell(line)
@@ -93,17 +93,17 @@ class CloudView:
         self.banner.content = banner_html(end.outcome, (end.heading, *end.lines))
 
     def tell(self, line: str) -> None:
-        """Speed, rates, dropped and bad packets, as the scan says them."""
+        """Show a message of the scan: speed, rates, dropped packets."""
         self._line.content = note_html(line)
 
     def cloud(self) -> Cloud:
-        """All that is shown."""
+        """Return the cloud that is shown."""
         chunks = list(self.chunks)
         points = np.concatenate([np.empty((0, 3), np.float32), *(chunk.points_m for chunk in chunks)])
-        kept: tuple[tuple[ColourBy, str, str], ...] = (("intensity", "intensity", "<f4"), ("time", "time_s", "<f8"))
+        saved: tuple[tuple[ColourBy, str, str], ...] = (("intensity", "intensity", "<f4"), ("time", "time_s", "<f8"))
         columns = {
             name: np.concatenate([np.empty(0, np.float32), *(chunk.values[by] for chunk in chunks)]).astype(kind)
-            for by, name, kind in kept
+            for by, name, kind in saved
         }
         return Cloud(points, columns)
 
@@ -137,7 +137,7 @@ class CloudView:
         )
 
     def _spread(self, values: dict[ColourBy, Float32s]) -> None:
-        """Widen the scales; when one has grown by much, what is there takes the new colours."""
+        """Widen the colour scales; recolour all points if the present one grew by much."""
         grown = False
         for by, new in values.items():
             low, high = (float(x) for x in np.percentile(new, [1, 99]))
@@ -163,5 +163,5 @@ class CloudView:
 
 
 def _out_of_order(chunk: _Chunk) -> Int64[ndarray, " n"]:
-    """The order in which a page gets a chunk's points: the first of them are all of them, thinned."""
+    """Return a random order of a chunk's points, so that its first ones are a thinned cloud."""
     return np.random.default_rng(0).permutation(len(chunk.points_m))

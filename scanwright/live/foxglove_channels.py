@@ -1,4 +1,4 @@
-"""A scan for Foxglove: the channels of the recording, and beside them points, frames and the scanner's description.
+"""A scan for Foxglove: the channels of the recording, points, frames and the scanner's description.
 
     /scan /joint_states    as recorded
     /points                sensor_msgs/PointCloud2, one message a scan, in `world`
@@ -26,7 +26,7 @@ from scanwright.firmware_io.ros.point_rows import point_rows
 from scanwright.firmware_io.ros.robot_frames import fixed_frames
 from scanwright.firmware_io.samples import JointSample, Scan
 
-_DESCRIBED_NS = 1_000_000_000
+_DESCRIBED_NS = 1_000_000_000  # a viewer that connects later waits at most a second for the description
 _ANEW_NS = 1_000_000_000  # without an angle: the devices stood still, and began anew
 Log = Callable[[str, bytes, int], None]
 """Takes a topic, a message, and its time in ns."""
@@ -75,7 +75,7 @@ class FoxgloveChannels:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew: nothing of what came before is assembled with what comes."""
+        """Begin anew: earlier data are not assembled with later ones."""
         self._assembler, self._described_ns, self._joint_ns = self._place(), -(2**62), -(2**62)
 
     def joint(self, time_ns: int, position_rad: float) -> None:

@@ -1,4 +1,4 @@
-"""A server of Foxglove's websocket protocol, `foxglove.sdk.v1`, for programs and pages of this computer that may look.
+"""A server of Foxglove's websocket protocol, `foxglove.sdk.v1`, for programs and allowed pages of this computer.
 
 The server of Foxglove's SDK checks no Origin, so any page of the browser could read a scan. A relay in front of it
 would leave that server's own port open, which a page can find. Here one server has one port, and checks each handshake.
@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import struct
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from operator import index
@@ -27,7 +28,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
+from scanwright.design.progress import Progress
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
+
+_LOG = logging.getLogger(__name__)
 
 SUBPROTOCOL = Subprotocol("foxglove.sdk.v1")
 APP = "https://app.foxglove.dev"
@@ -44,14 +48,14 @@ _FLUSH_S = 2.0  # at the end, for what clients have not yet taken
 
 @dataclass(eq=False, slots=True)
 class _Client:
-    """A program that listens: number of each subscription -> topic, and messages on their way to it."""
+    """A viewer: number of each subscription -> topic, and the messages to send."""
 
     topics: dict[int, str] = field(default_factory=dict)
     waiting: deque[bytes] = field(default_factory=lambda: deque(maxlen=BACKLOG))
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def hear(self, text: str | bytes, topics: tuple[str, ...]) -> None:
-        """Take a message of the client; what is malformed or unknown is dropped."""
+    def receive(self, text: str | bytes, topics: tuple[str, ...]) -> None:
+        """Handle a message of the client; malformed and unknown ones are dropped."""
         with suppress(ValueError, TypeError, KeyError, IndexError, RecursionError):
             message: Any = json.loads(text) if isinstance(text, str) else {}
             if message["op"] == "subscribe":
@@ -65,14 +69,13 @@ class _Client:
 
 
 class FoxgloveServer:
-    """Messages out to all who subscribed; made by `foxglove_server`."""
+    """A server that sends messages to all subscribers; made by `foxglove_server`."""
 
     def __init__(
         self,
         name: str,
         channels: Mapping[str, tuple[str, str]],
         port: int,
-        say: Callable[[str], None],
         origins: Collection[str],
     ) -> None:
         """Bind the port; arguments as for `foxglove_server`."""
@@ -82,7 +85,7 @@ class FoxgloveServer:
         self._loop = asyncio.new_event_loop()
         self._clients: set[_Client] = set()
         self._ended = asyncio.Event()
-        self._say, self._refused = say, set[str]()
+        self._refused = set[str]()
         about = {"name": name, "capabilities": [], "metadata": {}, "sessionId": str(time.time_ns() // 10**6)}
         described = [
             {
@@ -102,21 +105,21 @@ class FoxgloveServer:
 
     @property
     def address(self) -> str:
-        """What a viewer opens."""
+        """The address for a viewer."""
         return f"ws://127.0.0.1:{self.port}"
 
     @property
     def app_url(self) -> str:
-        """Foxglove's page, which opens the address by itself."""
+        """The address of Foxglove's page that opens this server."""
         return f"{APP}?ds=foxglove-websocket&ds.url={quote(self.address, safe='')}"
 
     @property
-    def heard(self) -> bool:
-        """Whether somebody has subscribed to anything."""
+    def has_subscribers(self) -> bool:
+        """Whether any viewer has subscribed to a topic."""
         return any(client.topics for client in tuple(self._clients))
 
     def log(self, topic: str, data: bytes, time_ns: int) -> None:
-        """Send a message to those who subscribed to its topic; never waits for one of them."""
+        """Send a message to the subscribers of its topic, without waiting for them."""
         self._loop.call_soon_threadsafe(self._publish, topic, data, time_ns)
 
     def _publish(self, topic: str, data: bytes, time_ns: int) -> None:
@@ -127,18 +130,18 @@ class FoxgloveServer:
                     client.ready.set()
 
     def check(self, _connection: ServerConnection, request: Request) -> Response | None:
-        """Refuse a handshake of a foreign page, and of one viewer too many; None if it may pass."""
+        """Refuse the handshake of a foreign page or of too many viewers; None accepts it."""
         why = foreign(request.headers, local_hosts(self.port), self._origins)
         if not why and len(self._clients) >= MOST_VISITORS:
             why = "too many visitors"
         if not why:
             return None
         origin = request.headers.get_all("Origin")[:1]
-        line = f"warning: refused a viewer: {why}" + (f" {origin[0][:100]!r}" if why == "foreign origin" else "")
+        line = f"refused a viewer: {why}" + (f" {origin[0][:100]!r}" if why == "foreign origin" else "")
         if line not in self._refused and len(self._refused) < _MOST_REFUSALS:  # a page may try for ever
             self._refused.add(line)
-            self._say(line)
-        return refusal(why, "to allow a page, name its origin: --allow-origin")
+            _LOG.warning(line)
+        return refusal(why, "to allow a page, start scanwright with --allow-origin ORIGIN")
 
     async def _serve_client(self, connection: ServerConnection) -> None:
         client = _Client()
@@ -148,8 +151,8 @@ class FoxgloveServer:
             with suppress(ConnectionClosed):
                 for text in self._greeting:
                     await connection.send(text)
-                async for said in connection:
-                    client.hear(said, self._topics)
+                async for message in connection:
+                    client.receive(message, self._topics)
         finally:
             self._clients.discard(client)
             sending.cancel()
@@ -196,7 +199,7 @@ def foxglove_server(
     name: str,
     channels: Mapping[str, tuple[str, str]],
     port: int,
-    say: Callable[[str], None],
+    progress: Progress,
     allow_origins: Collection[str] = (),
 ) -> Iterator[FoxgloveServer]:
     """Serve channels to Foxglove while the body runs.
@@ -205,13 +208,13 @@ def foxglove_server(
         name: what Foxglove shows.
         channels: topic -> name and definition of its ROS 2 message.
         port: on this computer; 0 for any that is free.
-        say: is called with the address, and with each viewer that is refused.
+        progress: progress callback; gets the address.
         allow_origins: pages that may look, beside Foxglove's own and programs that are no browser.
 
     Raises:
         TaskError: the port is taken.
     """
-    server = FoxgloveServer(name, channels, port, say, {*FOXGLOVE, *allow_origins})
+    server = FoxgloveServer(name, channels, port, {*FOXGLOVE, *allow_origins})
     with server.running():
-        say(f"open {server.address} in Foxglove, or {server.app_url}")
+        progress(f"open {server.address} in Foxglove, or {server.app_url}")
         yield server

@@ -6,6 +6,7 @@ takes nothing from who connects but what to send: no parameters, no services, no
 
 from __future__ import annotations
 
+import logging
 import signal
 import time
 from collections.abc import Callable, Collection, Iterator
@@ -19,6 +20,7 @@ from mcap.writer import Writer
 from scanwright.design.angles import angles_in_use, load_angles
 from scanwright.design.errors import RecordingError, TaskError
 from scanwright.design.files.atomic_file import atomic_write, check_place
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.recording.mcap_chunks import read_note
 from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
@@ -30,26 +32,26 @@ from scanwright.firmware_io.scan.live_feed import Batch, Feed, Viewer, Watch, ba
 from scanwright.live.foxglove_channels import FoxgloveChannels, Log, channels
 from scanwright.live.foxglove_server import foxglove_server
 
+_LOG = logging.getLogger(__name__)
 PORT = 8765  # where Foxglove looks first
 _SETTLED_S = 0.5  # who subscribes does so topic by topic, and is served from a moment later on
-Say = Callable[[str], None]
 
 
 def view_recording(
     recording: Path,
     angles: Path,
-    say: Say,
+    progress: Progress,
     *,
     port: int = PORT,
     rate: float = 1.0,
     allow_origins: Collection[str] = (),
 ) -> None:
-    """Serve a recording at its own pace to each who begins to listen, until Ctrl-C.
+    """Serve a recording at its own pace to each viewer, until Ctrl-C.
 
     Args:
         recording: MCAP recording.
         angles: angle set of the scanner; `scanner.urdf` and `own_body.npz` are looked for beside it.
-        say: is told the address, at once.
+        progress: progress callback; gets the address first.
         port: on this computer; 0 for any that is free.
         rate: how many times as fast as it was recorded.
         allow_origins: pages that may look, beside Foxglove's own, such as "https://viewer.example.org".
@@ -59,17 +61,17 @@ def view_recording(
         TaskError: the port is taken.
     """
     open_recording(recording)  # what cannot be read is refused before an address is told
-    with foxglove_server(recording.name, channels(), port, say, allow_origins) as server:
+    with foxglove_server(recording.name, channels(), port, progress, allow_origins) as server:
         shown = _shown(recording, angles, server.log)
         while True:
-            _until(lambda: server.heard)
+            _until(lambda: server.has_subscribers)
             time.sleep(_SETTLED_S)
             shown.begin()
             scans, _ = replay(recording, shown, rate=rate)
             shown.close()
-            say(f"showed {scans:,} scans; Ctrl-C to end")
-            _until(lambda: not server.heard)
-            say("nobody listens any more: all again for the next one who does")
+            progress(f"showed {scans:,} scans; Ctrl-C to end")
+            _until(lambda: not server.has_subscribers)
+            progress("no viewer is connected; the next one gets the recording from its start")
 
 
 def _until(condition: Callable[[], bool]) -> None:
@@ -111,10 +113,10 @@ def mcap_log(path: Path) -> Iterator[Log]:
 
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
-    found = load_angles(angles)
+    angle_set = load_angles(angles)
     smooth = not rests_in_scans(read_note(recording, NOTE))
-    urdf = description(angles.parent, found)
-    return FoxgloveChannels(found, own_body_of(angles), urdf, log, smooth=smooth)
+    urdf = description(angles.parent, angle_set)
+    return FoxgloveChannels(angle_set, own_body_of(angles), urdf, log, smooth=smooth)
 
 
 @contextmanager
@@ -136,21 +138,22 @@ def _serve(receiving: Connection, folder: Path, allow_origins: tuple[str, ...]) 
     urdf, wall_minus_ns = description(folder, in_use.angles), time.time_ns() - time.monotonic_ns()
     own_body = own_body_of(in_use.path)
 
-    def say(line: str) -> None:
-        print(line, flush=True)
-
     try:
-        with foxglove_server(f"scan of {folder.name}", channels(), PORT, say, allow_origins) as server:
+        with foxglove_server(f"scan of {folder.name}", channels(), PORT, _print, allow_origins) as server:
             shown = FoxgloveChannels(in_use.angles, own_body, urdf, server.log, wall_minus_ns=wall_minus_ns)
             for batch in batches(receiving):
                 tell(batch, shown)
             shown.close()
     except TaskError as error:  # the port is taken: the scan goes on
-        say(f"warning: --foxglove: {error}")
+        _LOG.warning("no viewer can connect: %s", error)
+
+
+def _print(step: str, _fraction: float | None = None, /) -> None:
+    print(step, flush=True)
 
 
 def tell(batch: Batch, watch: Watch) -> None:
-    """Tell a batch in the order in which its things were measured."""
+    """Pass on the data of a batch in the order in which they were measured."""
     angles = [JointSample(*pair) for pair in zip(batch.time_ns.tolist(), batch.position_rad.tolist(), strict=True)]
     ended = [(one.time_ns, one) for one in angles] + [(int(scan.time_ns[-1]), scan) for scan in batch.scans]
     for _, thing in sorted(ended, key=lambda pair: pair[0]):

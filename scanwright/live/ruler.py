@@ -1,4 +1,4 @@
-"""A ruler on a cloud that grows: two points are clicked, the distance between them is told."""
+"""A ruler on a growing cloud: the distance between two clicked points."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy import ndarray
 from scanwright.design.arrays import Float32s, Vector
 
 REACH_RAD = np.radians(1.0)  # of a click about its ray
-COLOUR = (224, 49, 49)
+COLOUR = (224, 49, 49)  # red: no colour scale of the points contains it
 
 
 def nearest_to_ray(
     clouds: Sequence[Float[ndarray, "n 3"]], origin_m: Vector, direction: Vector
 ) -> Float[ndarray, " 3"] | None:
-    """The point that a click means: of those within its reach of the ray the nearest one to the eye; None of none.
+    """Return the point that a click selects: the nearest one to the eye of those near its ray; None if there is none.
 
     Args:
         clouds: points [m].
@@ -30,10 +30,10 @@ def nearest_to_ray(
     for points in clouds:
         to = np.asarray(points, float) - origin_m
         ahead_m = to @ along
-        beside_m = np.sqrt(np.maximum((to**2).sum(axis=1) - ahead_m**2, 0.0))
-        hit = (ahead_m > 0) & (beside_m < np.tan(REACH_RAD) * ahead_m)
+        off_ray_m = np.sqrt(np.maximum((to**2).sum(axis=1) - ahead_m**2, 0.0))
+        hit = (ahead_m > 0) & (off_ray_m < np.tan(REACH_RAD) * ahead_m)
         # of a wall seen at a low angle the middle of the click, not its near edge
-        cost_m = np.where(hit, ahead_m + beside_m / np.tan(REACH_RAD), np.inf)
+        cost_m = np.where(hit, ahead_m + off_ray_m / np.tan(REACH_RAD), np.inf)
         first = int(np.argmin(cost_m)) if len(cost_m) else 0
         if len(cost_m) and cost_m[first] < best_m:
             best, best_m = np.asarray(points[first], float), float(cost_m[first])
@@ -41,7 +41,7 @@ def nearest_to_ray(
 
 
 class Ruler:
-    """Button, clicks, line and words. `points` gives what is shown; `ends` are the one or two that were clicked."""
+    """The ruler of a page. `points` returns the points shown; `ends` are the clicked ones."""
 
     def __init__(self, server: viser.ViserServer, points: Callable[[], Sequence[Float32s]]) -> None:
         self._scene, self._points = server.scene, points
@@ -50,12 +50,12 @@ class Ruler:
         self.on.on_update(lambda _: self._arm())
 
     @property
-    def said(self) -> str:
-        """The distance in words; nothing before the second end."""
+    def text(self) -> str:
+        """The distance as text; empty before the second click."""
         return f"{np.linalg.norm(self.ends[1] - self.ends[0]):.3f} m" if len(self.ends) == 2 else ""
 
     def click(self, origin_m: Vector, direction: Vector) -> None:
-        """Take the point that is meant as the next end; a third one begins anew."""
+        """Use the selected point as the next end; a third one begins anew."""
         end = nearest_to_ray(self._points(), np.asarray(origin_m, float), np.asarray(direction, float))
         if end is None:
             return
@@ -86,4 +86,4 @@ class Ruler:
             self._scene.add_line_segments(
                 "/ruler/line", ends[None], colors=COLOUR, thickness=3.0, thickness_units="screen"
             )
-            self._scene.add_label("/ruler/length", self.said, position=tuple(((first + last) / 2).tolist()))
+            self._scene.add_label("/ruler/length", self.text, position=tuple(((first + last) / 2).tolist()))

@@ -1,4 +1,4 @@
-"""The page of a scan in a process of its own, and the way to feed it: the scan must never wait for a browser.
+"""The page of a scan, in a process of its own so that the scan never waits for a browser.
 
 The page is served, and said where, before any device is opened; on a terminal the browser is opened too, and given some
 seconds, so that the first scan is already seen.
@@ -18,14 +18,14 @@ from pathlib import Path
 from threading import Thread
 
 from scanwright.design.angles import angles_in_use
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import ScanwrightError
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.scan.live_feed import UNWATCHED, Feed, Placing, Viewer, growing
 from scanwright.firmware_io.scan.scan_end import LOST
 
-ALONE_S = 10.0
+ALONE_S = 10.0  # without a visitor; a page that is reloaded returns sooner
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
-_GONE_S = 1.0  # for the page to end if nobody looks at it
+_CLOSED_S = 1.0  # for the page to end if nobody looks at it
 OPENED_S = 15.0  # at most until the browser has it
 
 
@@ -41,7 +41,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         browse: opens an address; None for the person's browser where this runs on a terminal.
 
     Raises:
-        DeviceError: the page cannot be served.
+        ScanwrightError: the page cannot be served.
     """
     if not wanted:
         yield UNWATCHED
@@ -59,7 +59,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         address = hearing.recv()
     except EOFError:
         page.terminate()
-        raise DeviceError("--live: the page could not be served; scan without it") from None
+        raise ScanwrightError("live: the page could not be served; scan without it") from None
     print(f"open {address}", flush=True)
     if browse is None and sys.stdout.isatty():
         browse = webbrowser.open
@@ -71,14 +71,14 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
     finally:
         if feed.end is not None:
             with suppress(KeyboardInterrupt):
-                page.join(_GONE_S)
+                page.join(_CLOSED_S)
                 if page.is_alive():
                     print("the page shows how the scan ended: close it, or press Ctrl-C", file=sys.stderr, flush=True)
                 page.join()
 
 
 def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
-    """What the page's process does: show the cloud, and once it is full, wait until nobody looks at it."""
+    """Show the growing cloud in the page's process, and wait until its last visitor leaves."""
     from scanwright.live.cloud_view import CloudView
     from scanwright.serving.page_server import guarded_server, wait_until_alone
 

@@ -1,1 +1,1 @@
-"""From a task to `out/<task>/`: the order of a build, its folder, its manifest, what is current."""
+"""Builds: their stages, their folder `out/<task>/` and its manifest."""

@@ -1,17 +1,21 @@
-"""The order of a build: task, search, angles, parts, checks, drawings, files, report, into `out/<task>/`."""
+"""The stages of a build: task, search, angles, parts, checks, drawings, files, report, into `out/<task>/`."""
 
 from __future__ import annotations
 
+import logging
 import tempfile
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.checks.check import Check, failed_of, read_checks
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.concurrency.processes import Packed, worker_processes
+from scanwright.design.findings import Finding, errors_in, sentence
+from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
@@ -20,7 +24,6 @@ from scanwright.pipeline.ros2.package import write_package
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
     from scanwright.cad.files.part_files import PartReport, PartsResult
-    from scanwright.cad.findings import PartFinding
     from scanwright.design.evaluation.as_built import AsBuilt
     from scanwright.design.evaluation.metres import PlaneFigures
     from scanwright.design.left_out import LeftOut
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
     from scanwright.design.search.optimum import Optimum
     from scanwright.design.search.with_parts import Chosen, Workshop
 
-Say = Callable[[str], None]
+_LOG = logging.getLogger(__name__)
 
 KERNEL = (
     "scanwright.cad.checks.run",
@@ -47,7 +50,7 @@ BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files"
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """What the work of one build came to.
+    """The results of one build.
 
     Attributes:
         optimum: the search.
@@ -60,7 +63,7 @@ class Made:
     optimum: Optimum
     chosen: Chosen
     as_built: AsBuilt
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     planes: tuple[PlaneFigures, ...]
 
 
@@ -80,64 +83,56 @@ class Build:
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
-    checks: tuple[Check, ...]
+    checks: tuple[Finding, ...]
     made: Made | None
     misfits: tuple[str, ...] = ()
 
     @property
-    def failed(self) -> tuple[Check, ...]:
+    def failed(self) -> tuple[Finding, ...]:
         """The checks that failed; the parts are safe to make only if there are none."""
-        return failed_of(self.checks)
+        return errors_in(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
-        """The same in words; warnings of one remedy are one, unless they are asked for `in_full`."""
+        """Return the result as lines; warnings with the same remedy are one, unless `in_full`."""
         if self.made is None:
-            return [f"{self.folder}: nothing has changed, no work to do ({len(self.files)} files)"]
+            return [f"{self.folder} is up to date ({len(self.files)} files)"]
         return [
             *self.made.optimum.table(),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
-            *(_one_by_one(self.made.findings) if in_full else _gathered(self.made.findings)),
+            *finding_lines(self.made.findings, self.checks, in_full),
             f"wrote {len(self.files)} files to {self.folder}",
         ]
 
 
 @dataclass(frozen=True, slots=True)
 class PartsMade:
-    """What came of the parts: facts, findings, what was left out, and the parts for those who have the kernel."""
+    """The parts: reports, findings, omissions, and the solids for processes that have the kernel."""
 
     parts: tuple[PartReport, ...]
-    findings: tuple[PartFinding, ...]
+    findings: tuple[Finding, ...]
     left_out: tuple[LeftOut, ...]
     result: Packed[PartsResult]
 
 
-def _one_by_one(findings: Sequence[PartFinding]) -> list[str]:
-    return [f"{finding.severity}: {finding.message}" for finding in findings]
+def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_full: bool) -> list[str]:
+    """Return one line for each finding and each unverified value; unless `in_full`, only a count of these."""
+    unverified = [check for check in checks if check.code == "unverified"]
+    lines = [f"{each.severity}: {sentence(each)}" for each in (*findings, *(unverified if in_full else ()))]
+    counts = Counter(check.subject for check in unverified) if not in_full else {}
+    todo = "measure yours before you print, report.html lists them"
+    return lines + [f"warning: {name}: unverified values that shape parts: {n}: {todo}" for name, n in counts.items()]
 
 
-def _gathered(findings: Sequence[PartFinding]) -> list[str]:
-    """Each finding, but those about a value of a product as one list of what to measure."""
-    to_measure: dict[str, list[str]] = {}
-    for finding in findings:
-        if finding.value:
-            to_measure.setdefault(finding.subject, []).append(finding.value)
-    lines = _one_by_one([finding for finding in findings if not finding.value])
-    if to_measure:
-        lines.append("warning: measure these on your own before you print, nobody has verified them (-v says more):")
-        lines += [f"  {product}: {', '.join(values)}" for product, values in to_measure.items()]
-    return lines
-
-
-def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
-    """Make the build folder of a task, unless it is current. Failed checks do not raise: see `Build.failed`.
+def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
+    """Build the folder of a task, unless it is up to date. Failed checks do not raise: see `Build.failed`.
 
     Args:
         loaded: the task.
         target: the folder, `out/<task>`.
-        say: progress.
+        progress: progress callback.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -147,7 +142,7 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
     """
     require_kernel("build")
     try:
-        made = None if is_current(target, loaded) else _made_again(loaded, target, say)
+        made = None if is_current(target, loaded) else _made_again(loaded, target, progress)
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
@@ -155,8 +150,8 @@ def build_task(loaded: LoadedTask, target: Path, say: Say) -> Build:
     return Build(target, listed_files(target), tuple(loaded.warnings()), checks, made, tuple(loaded.misfits()))
 
 
-def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
-    """Build the task of a build folder again, elsewhere: the first difference in words, None where there is none.
+def difference_when_rebuilt(folder: Path, progress: Progress) -> str | None:
+    """Rebuild the task of a build folder elsewhere, and describe the first difference; None if there is none.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -167,12 +162,12 @@ def difference_when_rebuilt(folder: Path, say: Say) -> str | None:
     loaded = load_task(folder / "task.toml")
     with tempfile.TemporaryDirectory() as elsewhere:
         again = Path(elsewhere) / loaded.task.name
-        _make(loaded, again, say)
+        _make(loaded, again, progress)
         return first_difference(folder, again)
 
 
 def setting_built(optimum: Optimum) -> Chosen:
-    """The setting of an optimum that a build takes: the best with what its parts hide.
+    """Return the mount of an optimum that a build chooses: the best one with the beams that its parts block.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -181,107 +176,109 @@ def setting_built(optimum: Optimum) -> Chosen:
     require_kernel("what parts hide")
     from scanwright.cad.assembly.shadow import PartsWorkshop
 
-    return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), lambda _: None)
+    return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), no_progress)
 
 
-def _chosen(optimum: Optimum, workshop: Workshop, say: Say) -> Chosen:
+def _chosen(optimum: Optimum, workshop: Workshop, progress: Progress) -> Chosen:
     from scanwright.design.objective.self_check import require_counted
     from scanwright.design.search.with_parts import choose_with_parts
 
     task = optimum.loaded.task
-    chosen = choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, say)
+    chosen = choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, progress)
     require_counted(optimum.loaded, chosen.family.angles_rad, chosen.family.score, chosen.shadow)
     return chosen
 
 
-def _chosen_and_made(optimum: Optimum, task_sha256: str, say: Say) -> tuple[Chosen, Scanner, Packed[Assembly]]:
-    """The setting, the scanner with it, and its parts."""
+def _chosen_and_made(
+    optimum: Optimum, task_sha256: str, progress: Progress
+) -> tuple[Chosen, Scanner, Packed[Assembly]]:
+    """Choose the mount, and make the scanner and its parts."""
     from scanwright.cad.assembly.shadow import PartsWorkshop
     from scanwright.cad.layout.layout import mount_offset_mm
     from scanwright.design.search.optimum import angle_set
 
     loaded = optimum.loaded
     workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
-    chosen = _chosen(optimum, workshop, _at(say, "shadow"))
+    chosen = _chosen(optimum, workshop, _at(progress, "shadow"))
     angles = angle_set(loaded, chosen.family).model_copy(update={"task_sha256": task_sha256})
     offset = mount_offset_mm(loaded.scanner(angles))
     scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": offset}))
     return chosen, scanner, Packed.of(workshop.assembly(scanner))
 
 
-def _checked(scanner: Scanner, assembly: Packed[Assembly], say: Say) -> dict[str, bytes]:
-    """Checks and shadow as files."""
+def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
+    """Return the files of the checks and the self-occlusion."""
     from scanwright.cad.checks.run import check_files
 
-    return check_files(scanner, assembly.open(), say)
+    return check_files(scanner, assembly.open(), progress)
 
 
-def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, say: Say) -> PartsMade:
-    """The parts in the folder, with their labels."""
+def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progress: Progress) -> PartsMade:
+    """Write the parts with their labels into the folder."""
     from scanwright.cad.files.part_files import build_parts
 
-    parts = build_parts(scanner, folder, _at(say, "parts"), lambda _: assembly.open())
+    parts = build_parts(scanner, folder, _at(progress, "parts"), lambda _: assembly.open())
     return PartsMade(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
 
 
 def _exported(
-    scanner: Scanner, parts: Packed[PartsResult], folder: Path, say: Say
-) -> tuple[tuple[PartFinding, ...], tuple[LeftOut, ...]]:
-    """What goes to the workshop, in the folder, but the drawings; findings, and what was left out."""
+    scanner: Scanner, parts: Packed[PartsResult], folder: Path, progress: Progress
+) -> tuple[tuple[Finding, ...], tuple[LeftOut, ...]]:
+    """Write the files for the workshop except the drawings; returns findings and omissions."""
     from scanwright.cad.files.workshop_files import export_scanner
 
-    exports = export_scanner(scanner, parts.open(), folder, _at(say, "files"))
+    exports = export_scanner(scanner, parts.open(), folder, _at(progress, "files"))
     return exports.findings, exports.left_out
 
 
-def _drawn(scanner: Scanner, parts: Packed[PartsResult], say: Say) -> dict[str, bytes]:
-    """Drawings as files."""
+def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
+    """Return the files of the drawings."""
     from scanwright.cad.drawings.files import drawing_files
     from scanwright.cad.layout.layout import config_hash
 
-    say("drawing the parts")
+    progress("drawing the parts")
     made = parts.open()
     return drawing_files(scanner, made.assembly, made.masses_g(), config_hash(scanner))
 
 
-def _at(say: Say, stage: str) -> Say:
-    """Progress that tells how much of the whole build is behind it."""
+def _at(progress: Progress, stage: str) -> Progress:
+    """Return progress that reports the share of the build that is done when a stage begins."""
     share = BEHIND[stage]
-    return lambda line: say(f"{line} ({share:.0%})")
+    return lambda step, _fraction=None, /: progress(step, share)
 
 
-def _made_again(loaded: LoadedTask, target: Path, say: Say) -> Made:
-    """Make a folder that is not current, and say whose work is lost by that."""
-    found = changes(target)
-    if found:
-        say(f"{target}: {found.words()}: making it again")
-    return _make(loaded, target, say)
+def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
+    """Build a folder that is not up to date, and log the edits that are lost."""
+    edits = changes(target)
+    if edits:
+        _LOG.warning("%s: %s: built again", target, edits.words())
+    return _make(loaded, target, progress)
 
 
-def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
-    """All of it, in the order in which one thing follows from another."""
+def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
+    """Run all stages in order."""
     from scanwright.cad.files.part_files import write_files
     from scanwright.design.evaluation.as_built import as_built
     from scanwright.design.evaluation.metres import on_planes
     from scanwright.design.search.optimum import find_optimum
 
     with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this one never loads the kernel
-        optimum = find_optimum(asked, _at(say, "search"))
+        optimum = find_optimum(requested, _at(progress, "search"))
         # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
 
-        made = begin(_chosen_and_made, optimum, asked.sha256(), say)
+        made = begin(_chosen_and_made, optimum, requested.sha256(), progress)
         begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
-        records.write_task(work, asked)
+        records.write_task(work, requested)
         records.write_search(work, result)
         chosen, scanner, assembly = made()
         best, angles = chosen.family, scanner.angles
-        written = begin(_written, scanner, assembly, work, say)
-        checked = begin(_checked, scanner, assembly, say)
+        written = begin(_written, scanner, assembly, work, progress)
+        checked = begin(_checked, scanner, assembly, progress)
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
-        _at(say, "pictures")("drawing the density")
+        _at(progress, "pictures")("drawing the density")
         settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {
             f"{gain.mount.name}, without parts: J = {gain.mount.score.J:.3f}": gain.mount.angles_rad
@@ -290,16 +287,16 @@ def _make(asked: LoadedTask, target: Path, say: Say) -> Made:
         density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
         parts = written()
         exported, drawn = (
-            begin(_exported, scanner, parts.result, work, say),
-            begin(_drawn, scanner, parts.result, say),
+            begin(_exported, scanner, parts.result, work, progress),
+            begin(_drawn, scanner, parts.result, progress),
         )
         write_files(work, checked())
         findings, left_out = exported()
         write_files(work, drawn())
         records.write_left_out(work, [*optimum.left_out, *parts.left_out, *left_out])
         write_package(work)
-        write_manifest(work, asked, [asdict(part) for part in parts.parts])
-        _at(say, "report")("writing report.html")
+        write_manifest(work, requested, [asdict(part) for part in parts.parts])
+        _at(progress, "report")("writing report.html")
         records.write_report(work, begin)
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)

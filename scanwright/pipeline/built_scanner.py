@@ -1,4 +1,4 @@
-"""A build folder read back: its task, its angles, and the beams that its parts block."""
+"""The scanner of a build folder: its task, its angles, and the beams that its parts block."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scanwright.report.answer import mounting_rad, task_as_built
 
 @dataclass(frozen=True, slots=True)
 class BuiltScanner:
-    """What a build folder holds.
+    """The scanner of a build folder.
 
     Attributes:
         loaded: the task, with the motion that was built.

@@ -1,14 +1,14 @@
-"""`out/compare/<task>/`: the optimum of a task beside the reference mounts, a cheap scanner and ready-made ones."""
+"""`out/compare/<task>/`: the optimum of a task compared with reference mounts, a cheap scanner and 3D lidars."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.design.evaluation.comparison import ComparisonRow, compare
 from scanwright.design.evaluation.comparison_picture import compare_picture
 from scanwright.design.evaluation.comparison_table import notes, table, write_csv
+from scanwright.design.progress import Progress
 from scanwright.design.search.mounts.gain import gain_lines
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask
@@ -25,7 +25,7 @@ class Comparison:
     folder: Path
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Return the comparison as lines."""
         return [
             *table(self.rows),
             *(f"optimum: {line}" for line in self.optimum.hole_lines(tabled=False)),
@@ -37,7 +37,7 @@ class Comparison:
 
 
 def write_comparison(
-    loaded: LoadedTask, target: Path, say: Callable[[str], None], built: BuiltScanner | None = None
+    loaded: LoadedTask, target: Path, progress: Progress, built: BuiltScanner | None = None
 ) -> Comparison:
     """Compare, and write `compare.csv`, `compare.png` and `compare.svg`; `built` is a build of the task.
 
@@ -46,9 +46,9 @@ def write_comparison(
         BuildError: the folder is a build folder, or cannot be written.
     """
     with report_folder(target) as folder:
-        optimum = find_optimum(loaded, say)
+        optimum = find_optimum(loaded, progress)
         setting = None if built is None or built.shadow is None else (built.setting_rad, built.shadow)
-        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, say, setting)
+        rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, progress, setting)
         write_csv(folder / "compare.csv", rows)
-        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, and what else there is")
+        compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, compared")
     return Comparison(optimum, rows, target)

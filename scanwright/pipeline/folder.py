@@ -1,9 +1,9 @@
-"""The build folder `out/<task>/`: written whole or not at all, one build at a time, and nothing outside of it touched.
+"""The build folder `out/<task>/`: written completely or not at all, by one build at a time.
 
 A build is made in `.<task>.building` beside its folder, and then moved file by file. What the move is about to do
 stands in `.<task>.moving`, so that the next build cleans up after one that was killed in the middle: none of its files,
 and none of those before it, stay behind unlisted. Names of files come from manifests that anybody may have written, and
-the folder may hold links: `_refuse_what_is_in_the_way` checks each name before anything moves.
+the folder may hold links: `_require_free_names` checks each name before anything moves.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ except ImportError:  # Windows
 
 @contextmanager
 def fresh_folder(target: Path) -> Iterator[Path]:
-    """A folder beside `target` that takes the place of its build when the block ends, and vanishes if it fails.
+    """Make a folder next to `target` that replaces its build when the block ends; it is removed if the block fails.
 
     Files of the previous build that the new one does not have are removed; anything else in `target`, such as a
     recording, stays. `target` may be a link to a folder.
@@ -42,18 +42,18 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     created = [folder for folder in (target.parent, *target.parent.parents) if not folder.exists()]
     work, moving = (target.with_name(f".{target.name}.{what}") for what in ("building", "moving"))
     try:
-        with _told_of(target):
+        with _disk_errors(target):
             target.parent.mkdir(parents=True, exist_ok=True)
         with _alone(target):
             try:
-                with _told_of(target):
+                with _disk_errors(target):
                     shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
                     work.mkdir()
                 yield work
-                with _told_of(target), sigint_deferred():  # a folder is as it was, or finished
+                with _disk_errors(target), sigint_deferred():  # a folder is as it was, or finished
                     made = _files_in(work)
-                    known = {*listed_files(target), *_told(moving), *made}
-                    _refuse_what_is_in_the_way(target, made, known)
+                    known = {*listed_files(target), *_names_in_transit(moving), *made}
+                    _require_free_names(target, made, known)
                     _move(work, target, moving, made, known)
             finally:
                 shutil.rmtree(work, ignore_errors=True)
@@ -64,8 +64,8 @@ def fresh_folder(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _told_of(target: Path) -> Iterator[None]:
-    """Our own dealings with the disk: what the system refuses is told of the folder."""
+def _disk_errors(target: Path) -> Iterator[None]:
+    """Raise errors of the system as errors of the folder."""
     try:
         yield
     except ScanwrightError:
@@ -76,13 +76,13 @@ def _told_of(target: Path) -> Iterator[None]:
 
 @contextmanager
 def report_folder(target: Path) -> Iterator[Path]:
-    """A folder for the report, made if need be, and removed again if nothing came into it.
+    """Make a folder for reports if needed, and remove it if it stays empty.
 
     Raises:
         BuildError: it is a build folder, or cannot be written.
     """
     if read_manifest(target):
-        raise BuildError(f"{target}: --out: this is a build folder, and holds nothing but the build: take another one")
+        raise BuildError(f"{target}: is a build folder, which must not contain other files; choose another folder")
     try:
         target.mkdir(parents=True, exist_ok=True)
         try:
@@ -98,7 +98,7 @@ def report_folder(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def _alone(target: Path) -> Iterator[None]:
-    """Hold the lock of a build folder; it goes with the process, however that ends.
+    """Lock a build folder; the lock ends with the process.
 
     Raises:
         BuildError: another process holds it.
@@ -122,7 +122,7 @@ def _locked(path: Path, target: Path) -> TextIO:
         BuildError: another process holds it.
     """
     busy = f"{target}: another build of this folder is at work: wait for it"
-    with _told_of(target):
+    with _disk_errors(target):
         try:
             lock = path.open("x" if fcntl is None else "a+", encoding="utf-8")
         except FileExistsError:
@@ -136,7 +136,7 @@ def _locked(path: Path, target: Path) -> TextIO:
     return lock
 
 
-def _refuse_what_is_in_the_way(target: Path, made: Iterable[str], known: Iterable[str]) -> None:
+def _require_free_names(target: Path, made: Iterable[str], known: Iterable[str]) -> None:
     """Stop the build before anything moves if a name of `target` cannot be written or removed.
 
     Args:
@@ -148,7 +148,7 @@ def _refuse_what_is_in_the_way(target: Path, made: Iterable[str], known: Iterabl
         BuildError: a file is where a folder must be, a folder where a file must be, or a link is on the way.
     """
     if target.exists() and not target.is_dir():
-        raise BuildError(f"{target}: cannot write the build folder: a file of that name is in the way")
+        raise BuildError(f"{target}: cannot write the build folder: a file has that name")
     for name in sorted({MANIFEST, *known}):
         place_in(target, name, BuildError)
     for name in made:
@@ -156,13 +156,13 @@ def _refuse_what_is_in_the_way(target: Path, made: Iterable[str], known: Iterabl
             if parent == target:
                 break
             if parent.exists() and not parent.is_dir():
-                raise BuildError(f"{parent}: a file is where the build needs a folder: move it away")
+                raise BuildError(f"{parent}: is a file, but the build needs a folder of that name: move it")
         if (target / name).is_dir():
-            raise BuildError(f"{target / name}: a folder is where the build needs a file: move it away")
+            raise BuildError(f"{target / name}: is a folder, but the build needs a file of that name: move it")
 
 
 def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[str]) -> None:
-    """Put every file of `work` into `target`, the manifest last, and remove what only earlier builds had."""
+    """Move every file of `work` into `target`, the manifest last, and remove files of earlier builds."""
     write_json(moving, sorted(known))
     target.mkdir(exist_ok=True)
     (target / MANIFEST).unlink(missing_ok=True)  # a build cut off while files move is no build
@@ -178,17 +178,17 @@ def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[st
     moving.unlink(missing_ok=True)
 
 
-def _told(moving: Path) -> set[str]:
-    """What a build that was killed may have left in the folder."""
+def _names_in_transit(moving: Path) -> set[str]:
+    """Return the files that a killed build may have left in the folder."""
     try:
-        told = json.loads(moving.read_text(encoding="utf-8"))
+        names = json.loads(moving.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return set()
-    return {name for name in told if isinstance(name, str) and inside(name)} if isinstance(told, list) else set()
+    return {name for name in names if isinstance(name, str) and inside(name)} if isinstance(names, list) else set()
 
 
 def _drop_empty_folders(target: Path, names: Iterable[str]) -> None:
-    """Folders that held nothing but files of builds, and hold none any more."""
+    """Remove folders of build files that are empty now."""
     for folder in sorted({parent for name in names for parent in Path(name).parents if parent.parts}, reverse=True):
         if (target / folder).is_dir() and not any((target / folder).iterdir()):
             (target / folder).rmdir()

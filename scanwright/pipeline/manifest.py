@@ -1,4 +1,4 @@
-"""The manifest of a build folder: every file with its digest, the task, the versions and the code that wrote them.
+"""The manifest of a build folder: the digest of every file, the task, the versions and the code.
 
 Cheap to import: asking whether a build is current must not load what makes one.
 """
@@ -28,36 +28,36 @@ _NAMED = 3  # files of a kind in one line; of more their number
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What became of the files of a build folder since its manifest was written.
+    """Files of a build folder that changed since its manifest was written.
 
     Attributes:
-        gone: files that are no more.
+        missing: files that are not there.
         edited: files with other bytes.
     """
 
-    gone: tuple[str, ...]
+    missing: tuple[str, ...]
     edited: tuple[str, ...]
 
     def __bool__(self) -> bool:
-        """Whether any file is not as it was built."""
-        return bool(self.gone or self.edited)
+        """Return whether any file is not as it was built."""
+        return bool(self.missing or self.edited)
 
     def words(self) -> str:
-        """The same in words, such as "a.stl is gone, b.csv was edited"."""
-        told = (self.gone, "is gone", "are gone"), (self.edited, "was edited", "were edited")
-        return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in told if names)
+        """Return a text such as "a.stl is missing, b.csv was edited"."""
+        kinds = (self.missing, "is missing", "are missing"), (self.edited, "was edited", "were edited")
+        return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in kinds if names)
 
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of this program and of everything that writes bytes of a build: what the extra `cad` pins."""
+    """Return the versions of this program and of all packages that the extra `cad` pins."""
     pinned = {line.split("==")[0] for line in requires("scanwright") or () if re.search(r"extra == .cad\b", line)}
     return {name: _version(name) for name in ("scanwright", *sorted(pinned))}
 
 
 @cache
 def code_digest() -> str:
-    """Digest of our own code, 12 hex digits: a checkout may be ahead of its version."""
+    """Return the digest of our own code, 12 hex digits: a checkout can be newer than its version."""
     digest = hashlib.sha256()
     for package in _PACKAGES:
         spec = find_spec(package)
@@ -71,7 +71,7 @@ def code_digest() -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The manifest of a build folder; empty where there is none, or none that can be one."""
+    """Return the manifest of a build folder; empty if it is missing or invalid."""
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -82,7 +82,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def listed_files(folder: Path) -> tuple[str, ...]:
-    """Files of a build folder as its manifest lists them, those inside of it only; none where there is none.
+    """Return the files inside a build folder that its manifest lists.
 
     A name is data that somebody may have written: one that leads out of the folder names nothing of ours.
     """
@@ -90,38 +90,37 @@ def listed_files(folder: Path) -> tuple[str, ...]:
 
 
 def inside(name: str) -> bool:
-    """Whether a name of a file stays in the folder that it is taken from."""
+    """Return whether a relative file name stays inside its folder."""
     path = PurePosixPath(name)
     return bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\0" not in name
 
 
 def changes(folder: Path, but: str | None = None) -> Changes:
-    """What is gone or was edited of a build folder, `but` left out; nothing where there is no manifest to tell."""
+    """Return the missing and edited files of a build folder except `but`; none without a manifest."""
     manifest = read_manifest(folder)
     if not manifest and (folder / MANIFEST).exists():
         return Changes((), (MANIFEST,))
     files = {name: facts for name, facts in manifest.get("files", {}).items() if name != but}
     here = {name: facts for name, facts in files.items() if inside(name) and (folder / name).is_file()}
-    gone = tuple(name for name in files if name not in here)
-    return Changes(gone, tuple(name for name, facts in here.items() if not _is_as_written(folder / name, facts)))
+    missing = tuple(name for name in files if name not in here)
+    return Changes(missing, tuple(name for name, facts in here.items() if not _is_as_written(folder / name, facts)))
 
 
 def require_as_built(folder: Path, but: str | None = None) -> None:
-    """Refuse a build folder whose files are no longer of one build, `but` left out; one without a manifest passes.
+    """Reject a build folder with missing or edited files except `but`; a folder without a manifest passes.
 
     Raises:
         BuildError: a file is gone or was edited.
     """
-    found = changes(folder, but)
-    if found:
+    if edits := changes(folder, but):
         raise BuildError(
-            f"{folder}: {found.words()} since it was built: build the folder again, or copy angles.json and task.toml, "
-            "with the files that it names, to a folder of their own"
+            f"{folder}: {edits.words()} since it was built: build the folder again, or copy angles.json, task.toml and "
+            "the files that it names to another folder"
         )
 
 
 def is_current(folder: Path, loaded: LoadedTask) -> bool:
-    """Whether a folder holds the finished build of this very task by this very program, every file as it was made."""
+    """Return whether a folder is the complete, unchanged build of this task by this program."""
     manifest = read_manifest(folder)
     files = manifest.get("files")
     if not files or manifest.get("task_sha256") != loaded.sha256():
@@ -132,7 +131,7 @@ def is_current(folder: Path, loaded: LoadedTask) -> bool:
 
 
 def first_difference(folder: Path, again: Path) -> str | None:
-    """What tells a build folder from a second build of its task, in words; None where every byte is the same.
+    """Describe the first difference between a build folder and a rebuild of its task; None if all bytes are equal.
 
     Raises:
         BuildError: the first one is no finished build.
@@ -155,7 +154,7 @@ def first_difference(folder: Path, again: Path) -> str | None:
 
 
 def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]) -> None:
-    """Digest every file in the folder; what is made later enters itself."""
+    """Write the digests of all files in the folder; later files are entered by `enter`."""
     files = {path.relative_to(folder).as_posix(): _facts(path) for path in sorted(folder.rglob("*")) if path.is_file()}
     manifest = {
         "schema": "scanwright/manifest/1",
@@ -170,7 +169,7 @@ def write_manifest(folder: Path, loaded: LoadedTask, parts: list[dict[str, Any]]
 
 
 def enter(folder: Path, name: str) -> None:
-    """Digest a file that was made from a build into the manifest of that build; nothing to do where there is none."""
+    """Add the digest of a later file to the manifest of its build, if there is one."""
     manifest = read_manifest(folder)
     if manifest:
         files = manifest["files"] | {name: _facts(folder / name)}
@@ -179,7 +178,7 @@ def enter(folder: Path, name: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """One JSON file as all of them are written: whole, two spaces, keys in their order, a line feed at the end."""
+    """Write a JSON file atomically: two spaces, keys in order, a line feed at the end."""
     part = path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)  # a link of that name would be followed
     part.write_text(json.dumps(value, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -198,7 +197,7 @@ def _is_as_written(path: Path, facts: Any) -> bool:
 
 
 def _some(names: tuple[str, ...]) -> str:
-    """A few names, and how many there are beside them."""
+    """Return a few names and the number of the others."""
     if len(names) > _NAMED:
         return f"{', '.join(names[:_NAMED])} and {len(names) - _NAMED} more"
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

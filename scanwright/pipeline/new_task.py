@@ -1,4 +1,4 @@
-"""A task file from five answers in metres: which lidar, which servo, where it stands, what it must see, how fast."""
+"""A task file from a few answers in metres: lidar, servo, position, region to see, time of a scan."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
 from scanwright.design.task.shapes import LEAST_M, MOST_M
 from scanwright.design.task.task import load_task
-from scanwright.pipeline.wishes import density_lines, known_wishes, parse_wish, region_lines
+from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines
 
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
 
@@ -44,14 +44,14 @@ ANGLES = r"""
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What `scanwright new` asks for.
+    """The answers of `scanwright new`.
 
     Attributes:
         name: of the task and its build folder.
         lidar: by its name in the catalogue.
         servo: the same.
         height_m: of the scanner's optical centre over the ground.
-        see: what it must see, each as `scanwright.pipeline.wishes.SEEN` says.
+        see: what it must see, each as `scanwright.pipeline.seen_regions.SEEN` says.
         scan_s: time of one full scan.
         robot: what of it the scanner must look past: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
         ahead_m: where on the robot it stands, ahead of the middle of the box or of the origin of the mesh.
@@ -68,7 +68,7 @@ class Answers:
 
 
 def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -> str:
-    """The commented task file.
+    """Return the commented task file.
 
     Args:
         answers: what to write.
@@ -82,12 +82,12 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     lidar, servo = products.get(answers.lidar, Lidar), products.get(answers.servo, Servo)
     _require_strength(lidar, servo)
     if not LEAST_M <= answers.height_m <= MOST_M:
-        raise TaskError(f"--height-m {answers.height_m:g}: from {LEAST_M:g} to {MOST_M:g} m over the ground")
-    wishes = [parse_wish(each) for each in answers.see]
-    if not wishes:
-        raise TaskError(f"--see: nothing is to be seen: {known_wishes()}")
-    things = [numbers for word, numbers in wishes if word == "thing"]
-    regions = [(word, numbers) for word, numbers in wishes if word != "thing"] or [("all", ())]
+        raise TaskError(f"height_m = {answers.height_m:g}: must be between {LEAST_M:g} and {MOST_M:g} m")
+    seen = [parse_region(each) for each in answers.see]
+    if not seen:
+        raise TaskError(f"see: no region; {known_regions()}")
+    things = [numbers for word, numbers in seen if word == "thing"]
+    regions = [(word, numbers) for word, numbers in seen if word != "thing"] or [("all", ())]
     blocks = [
         f"# {answers.name}: {lidar.name} turned by {servo.name}, {answers.height_m:g} m over the ground.",
         "# World: x ahead, y to the left, z up. Every key: `scanwright schema`, or the pages of documentation.",
@@ -113,7 +113,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
 
 
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
-    """Reject a lidar whose weight alone, its middle off a level axis, needs more than the servo's continuous torque."""
+    """Reject a lidar whose weight, off a level axis, needs more than the continuous torque of the servo."""
     off_m = abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
     needed = lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * off_m
     if needed > servo.continuous_torque_nm:
@@ -124,7 +124,7 @@ def _require_strength(lidar: Lidar, servo: Servo) -> None:
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
-    """Return the ring that lets the cable turn on and on; None if the servo must sweep.
+    """Return the slip ring for continuous rotation; None for a servo that must sweep.
 
     Rings that are rated for the lidar's data come first, then those with a bore, which need no belt, and of those the
     ones whose speed is known. A servo that does not read its angle all around sweeps, and so does one that no ring of
@@ -154,7 +154,7 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
 
 def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
     if ring is not None:
-        how = "the shaft goes through it" if ring.bore_mm > 0 else "a belt turns the shaft from beside it"
+        how = "the shaft goes through it" if ring.bore_mm > 0 else "a belt turns the shaft next to it"
         return [
             f'slip_ring = "{ring.name}"  # lets the cable turn on and on; {how}',
             "",
@@ -178,7 +178,7 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
     ahead = answers.ahead_m
     if answers.robot == "none":
         return [
-            "# [[mask]]  # what the robot hides never counts: a mesh of it, and where in it the scanner is",
+            "# [[mask]]  # directions that the robot hides do not count: its mesh, and the scanner's position in it",
             '# shape = "mesh"',
             '# file = "robot.stl"',
             "# unit_m = 0.001",
@@ -186,24 +186,26 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
         ]
     if not answers.robot.startswith("box"):
         return [
-            "[[mask]]  # what the robot hides never counts",
+            "[[mask]]  # directions that the robot hides do not count",
             'shape = "mesh"',
             f"file = {json.dumps(os.path.relpath(answers.robot, folder))}",
-            "unit_m = 1            # of the file: 0.001 where it is in mm",
+            "unit_m = 1            # of the file: 0.001 if it is in mm",
             f"sensor_m = [{ahead:g}, 0, {answers.height_m:g}]  # the scanner in the mesh",
         ]
     try:
         length, width, height = (float(each) for each in answers.robot.split(":")[1:])
     except ValueError as error:
-        raise TaskError(f"--robot {answers.robot}: box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh") from error
+        raise TaskError(
+            f"robot = '{answers.robot}': must be box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh"
+        ) from error
     over = answers.height_m - height
     if not (over > 0 and abs(ahead) <= length / 2):
         raise TaskError(
-            f"--robot {answers.robot}: the scanner, {answers.height_m:g} m over the ground, {ahead:g} m ahead of its "
-            f"middle, is not over it: --height-m above {height:g}, --ahead-m from {-length / 2:g} to {length / 2:g}"
+            f"robot = '{answers.robot}': the scanner ({answers.height_m:g} m high, {ahead:g} m ahead of the "
+            f"middle) is not above it: needs height_m above {height:g}, ahead_m from {-length / 2:g} to {length / 2:g}"
         )
     return [
-        f"[[mask]]  # the robot's own top, {over:g} m below the scanner: what it hides never counts",
+        f"[[mask]]  # the robot's own top, {over:g} m below the scanner: directions that it hides do not count",
         'shape = "ground"',
         f"height_m = {over:g}",
         f"from_m = {-length / 2 - ahead:g}",
@@ -213,7 +215,7 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
 
 
 def check_answers(answers: Answers, products: Catalogue) -> None:
-    """Refuse answers that make no task, before there is a file; a mesh is looked for from the working folder.
+    """Reject answers that make no valid task, before a file is written; mesh paths are relative to the working folder.
 
     Raises:
         TaskError: as `task_text` and `design.task.task.load_task`.
@@ -222,7 +224,7 @@ def check_answers(answers: Answers, products: Catalogue) -> None:
 
 
 def write_task_file(path: Path, text: str) -> list[str]:
-    """Write a task file where there is none: its warnings.
+    """Write a new task file, and return its warnings.
 
     Raises:
         TaskError: the file exists or cannot be written, or an answer makes no task; then there is no file.
@@ -232,7 +234,7 @@ def write_task_file(path: Path, text: str) -> list[str]:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise TaskError(f"{path}: exists already: take another name, or another file with -o") from error
+        raise TaskError(f"{path}: exists; choose another name") from error
     except OSError as error:
         raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
     return warnings

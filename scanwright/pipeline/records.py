@@ -1,4 +1,4 @@
-"""The files of a build that say what the scanner is: task, angle set, search table, what was left out."""
+"""The files of a build that describe it: task, search table, omissions, report."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from scanwright.pipeline.manifest import enter, require_as_built, write_json
 
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
-    """`task.toml` with every default written out; files that it names come along, so the folder builds by itself."""
+    """Write `task.toml` with all defaults, and copy the files that it names, so that the folder can be built alone."""
     table = loaded.task.model_dump(mode="json", exclude_none=True, exclude={"camera"})  # it makes no part
     rename_files(table, loaded.task, lambda file, role: _bring(folder, loaded.source.parent / file, role))
     (folder / "task.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
 def rename_files(table: dict[str, Any], task: Task, name: Callable[[str, str], str]) -> None:
-    """Give every file that a task names another name in its table; `name` gets the present one and what the file is."""
+    """Rename every file in the table of a task; `name` gets its present name and its role."""
     for key in ("weight", "mask"):
         for i, region in enumerate(getattr(task, key)):
             if isinstance(region, MapRegion | MeshRegion):
@@ -40,7 +40,7 @@ def rename_files(table: dict[str, Any], task: Task, name: Callable[[str, str], s
 
 
 def write_search(folder: Path, result: SearchResult) -> None:
-    """`search.csv`: for every scan-plane setting of the grid the lowest J, and the axis it was found about.
+    """Write `search.csv`: for every scan plane of the grid the lowest J, and its axis.
 
     And `axes.csv`: for every axis of the grid the lowest J of all scan planes. J is that of the search, on few nodes;
     where it cannot win it is the bound from the mean density.
@@ -52,13 +52,13 @@ def write_search(folder: Path, result: SearchResult) -> None:
 
 
 def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:
-    """`left_out.json`: what the task made superfluous."""
+    """Write `left_out.json`: what the task made unnecessary."""
     entries = [{"what": x.what, "why": x.why, "saved": x.saved, "unit": x.unit} for x in left_out]
     write_json(folder / "left_out.json", {"schema": "scanwright/left_out/1", "left_out": entries})
 
 
 def write_report(folder: Path, begin: Begin = in_turn) -> Path:
-    """`report.html` of a build folder from the files in it, and its digest into the manifest; `begin` as for the page.
+    """Write `report.html` of a build folder from its files, and enter it into the manifest; `begin` as for the page.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.

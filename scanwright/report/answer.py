@@ -1,4 +1,4 @@
-"""The answer of a build, from its files: what it sees with its parts, what stays blind, what the parts block."""
+"""The result of a build from its files: what it sees with its parts, what stays blind, what the parts block."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
-OFF_DEG = 1.0  # what a printed and screwed mount may be off by
+OFF_DEG = 1.0  # error of a printed and screwed mount: assumed, its fits and screw holes allow it
 
 
 @dataclass(frozen=True, slots=True)
 class ConeOnMap:
-    """A blind cone, its axis as the density map has it: theta from up, phi from ahead to the left."""
+    """A blind cone, its axis as in the density map: theta from up, phi from ahead to the left."""
 
     half_angle_deg: float
     theta_deg: float
@@ -32,7 +32,7 @@ class ConeOnMap:
 
 @dataclass(frozen=True, slots=True)
 class Hidden:
-    """What the parts hide, as counts of beams and as the share of all beams over one turn of the axis."""
+    """Hidden beams, as counts and as the share of all beams over one turn of the axis."""
 
     beams: int
     always: int
@@ -42,14 +42,14 @@ class Hidden:
 
 @dataclass(frozen=True, slots=True)
 class BuildAnswer:
-    """What a setting sees, computed from `task.toml`, `angles.json` and `own_body.npz`.
+    """What a mount sees, computed from `task.toml`, `angles.json` and `own_body.npz`.
 
     Attributes:
-        as_built: what it sees with its parts, and the reference mounts beside it.
+        as_built: what it sees with its parts, and the reference mounts.
         ball_deg: within which a beam counts for a direction.
         cones: about the axis, that no beam enters; with parts.
-        rises: without parts, by mounting angle: how much J rises if it alone is 1 deg off, the worse of the two ways.
-        worst: the largest of `rises` as the share of beams per direction that it costs; None where J is no logarithm.
+        rises: without parts, by mounting angle: how much J rises if it alone is 1 deg off, the worse direction.
+        worst: the largest of `rises` as the share of beams per direction that it costs; None if J is no logarithm.
     """
 
     as_built: AsBuilt
@@ -91,14 +91,14 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = 
 
 
 def task_as_built(loaded: LoadedTask, angles: AngleSet) -> LoadedTask:
-    """The task with the motion that was built: `period_s = "shortest"` does not say what was found."""
+    """Return the task with the motion that was built: `period_s = "shortest"` does not state the result."""
     if angles.motion is None:
         return loaded
     return replace(loaded, task=loaded.task.model_copy(update={"motion": angles.motion}))
 
 
 def problem_as_built(loaded: LoadedTask, angles: AngleSet) -> Problem:
-    """The same as numbers.
+    """Return the same as numbers.
 
     Raises:
         TaskError: no direction of the task has a weight.
@@ -107,12 +107,12 @@ def problem_as_built(loaded: LoadedTask, angles: AngleSet) -> Problem:
 
 
 def mounting_rad(angles: AngleSet) -> Array:
-    """(alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
+    """Return (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
     return np.radians([getattr(angles.angles_deg, name) for name in NAMES])
 
 
 def hidden_by(shadow: SelfOcclusion) -> Hidden:
-    """The counts of a shadow."""
+    """Return the counts of a self-occlusion mask."""
     share = shadow.hidden()
     return Hidden(len(share), int((share == 1).sum()), int(((share > 0) & (share < 1)).sum()), shadow.share())
 

@@ -1,4 +1,4 @@
-"""The assembly steps as HTML: just the Markdown that `assembly.md` is written in.
+"""The assembly steps as HTML: only the Markdown that `assembly.md` uses.
 
 Headings, paragraphs, lists with `-`, pictures alone in a block, and in a line `**bold**` and backticks; anything else
 stays the text it is.
@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 
 def steps_html(text: str, address: Callable[[str], str | None] = lambda _: None) -> str:
-    """HTML of the steps, without the title: the page has one; headings begin at the third level.
+    """Return HTML of the steps without the title; headings begin at the third level.
 
     Args:
         text: Markdown.
-        address: of a picture that the text names; None where there is none.
+        address: returns the address of a picture, None if there is none.
     """
     blocks = []
     for block in re.split(r"\n\s*\n", text.strip()):
@@ -24,8 +24,8 @@ def steps_html(text: str, address: Callable[[str], str | None] = lambda _: None)
         picture = re.fullmatch(r"!\[(.*)\]\((.*)\)", block)
         source = None if picture is None else address(picture[2])
         if picture is not None and source is not None:
-            said = html.escape(picture[1])
-            blocks.append(f'<div class="wide"><img src="{html.escape(source)}" alt="{said}"></div>')
+            alt = html.escape(picture[1])
+            blocks.append(f'<div class="wide"><img src="{html.escape(source)}" alt="{alt}"></div>')
         elif heading is None:
             lines = block.splitlines()
             listed = all(line.startswith("- ") for line in lines)

@@ -1,4 +1,4 @@
-"""Readers of a build folder's files: what is missing is None, what no build wrote is one line for a person."""
+"""Readers of a build folder's files: None if a file is missing, an error if no build wrote it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 def read(path: Path, reader: Callable[[Path], T]) -> T | None:
-    """What a reader makes of a file; None where there is none.
+    """Return the result of a reader of a file; None if there is no file.
 
     Raises:
         BuildError: the file is not as a build writes it.
@@ -35,26 +35,26 @@ def read(path: Path, reader: Callable[[Path], T]) -> T | None:
 
 
 def read_text(path: Path) -> str:
-    """UTF-8."""
+    """Return the text of a UTF-8 file."""
     return path.read_text(encoding="utf-8")
 
 
 def read_json(path: Path) -> Any:
-    """Whatever the file holds."""
+    """Return the content of a JSON file."""
     return json.loads(read_text(path))
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
-    """Rows of a CSV file by the names of its columns."""
+    """Return the rows of a CSV file by the names of its columns."""
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 
 def read_columns(path: Path, columns: tuple[str, ...]) -> Array:
-    """Columns of a table of numbers, shape (rows, columns)."""
+    """Return columns of a table of numbers, shape (rows, columns)."""
     return np.array([[float(row[column]) for column in columns] for row in read_table(path)]).reshape(-1, len(columns))
 
 
 def read_picture(path: Path) -> str:
-    """A picture as a data address."""
+    """Return a picture as a data address."""
     return data_uri(path.read_bytes(), path.suffix)

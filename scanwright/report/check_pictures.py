@@ -1,7 +1,7 @@
-"""Where a check looked: the bodies that its `where` names, and a small picture of the scanner with them in front.
+"""The bodies that a check is about, and a small picture of the scanner with them in front.
 
-What is named is dark, and shows through what stands before it in a lighter shade; all else is pale. The pictures
-read in grey. They are cast like beams, in a parallel projection from where the 3D view of the page starts.
+The named bodies are dark, and show through bodies before them in a lighter shade; all others are pale. The pictures
+are legible in grey. They are cast like beams, in a parallel projection from where the 3D view of the page starts.
 """
 
 from __future__ import annotations
@@ -17,24 +17,26 @@ from scanwright.design.scene.parallel_view import in_front, view_of
 from scanwright.design.scene.ray_caster import build_scene
 from scanwright.report.data_uri import png_uri
 
-SIZE = 200, 150  # pixels, wide and high
+SIZE_PX = 200, 150  # pixels, wide and high
 FINER = 2  # rays per pixel and side
 YAW_RAD, PITCH_RAD = np.radians(40.0), np.radians(22.0)  # as in scanner.js
 MARGIN = 1.04
 COLOURS = 32
 NAMED, OTHER = np.array([190.0, 60.0, 0.0]), np.array([235.0, 235.0, 232.0])
-THROUGH = 0.7  # of the named colour where another body stands before it
-SERVO, BEARING = ("servo_case", "servo_horn"), ("bearing_outer", "bearing_inner")
-PREFIXES = {"lidar": "lidar_", "slip ring": "ring_"}
+THROUGH = 0.7  # of the named colour if another body is before it
+LIDAR = "lidar"
+BEAM_CODES = ("beams_hidden", "beams_partly_hidden")  # their subject is a range of beams
+PREFIXES = {LIDAR: ("lidar_",), "slip ring": ("ring_",), "servo": ("servo_case", "servo_horn")}
+PREFIXES["bearing"] = ("bearing_outer", "bearing_inner")
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedBody:
-    """One body of the scanner as it stands.
+    """One body of the scanner in its place.
 
     Attributes:
         triangles_m: corners of its triangles [m], shape (t, 3, 3).
-        turns: with the axis.
+        turns: whether it turns with the axis.
         colour: sRGB, 0 to 1.
     """
 
@@ -43,31 +45,29 @@ class PlacedBody:
     colour: tuple[float, ...] = (0.6, 0.6, 0.6)
 
 
-def bodies_named(where: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]) -> tuple[str, ...]:
-    """Names of the bodies that a check's `where` is about, in alphabetical order; none where it is no place.
+def bodies_named(
+    code: str, subject: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Return the bodies that a check is about, in alphabetical order.
 
     Args:
-        where: as in `checks.json`: bodies or groups of them, joined by "and".
+        code: of the check.
+        subject: of the check: bodies or groups of bodies, joined by "and".
         bodies: of the scanner.
-        bought: by the number of a product what it is, as the parts list has them: lidar, servo, slip ring, bearing.
+        bought: lidar, servo, slip ring or bearing by the number of the product, as in the parts list.
     """
-    found: set[str] = set()
-    for word in where.split(" and "):
+    names: set[str] = set()
+    for word in [LIDAR] if code in BEAM_CODES else subject.split(" and "):
         kind = bought.get(word, word)
         if word in bodies:
-            found.add(word)
-        elif kind == "servo":
-            found |= set(SERVO) & bodies.keys()
-        elif kind == "bearing":
-            found |= set(BEARING) & bodies.keys()
+            names.add(word)
         elif word in ("rotor", "everything that turns"):
-            found |= {name for name, body in bodies.items() if body.turns}
+            names |= {name for name, body in bodies.items() if body.turns}
         elif word == "parts that move together":
-            found |= bodies.keys()
-        elif kind in PREFIXES or word == "fan" or word.startswith("beams at "):
-            prefix = PREFIXES.get(kind, PREFIXES["lidar"])
-            found |= {name for name in bodies if name.startswith(prefix)}
-    return tuple(sorted(found))
+            names |= bodies.keys()
+        else:
+            names |= {name for name in bodies if name.startswith(PREFIXES.get(kind, ()))}
+    return tuple(sorted(names))
 
 
 class CheckPictures:
@@ -75,13 +75,13 @@ class CheckPictures:
 
     def __init__(self, bodies: Mapping[str, PlacedBody]) -> None:
         corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
-        view = view_of(corners, (SIZE[0] * FINER, SIZE[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
+        view = view_of(corners, (SIZE_PX[0] * FINER, SIZE_PX[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
         self._each = {name: view.shown(build_scene(body.triangles_m)) for name, body in bodies.items()}
         self._all = in_front(list(self._each.values()))
         self._drawn: dict[tuple[str, ...], str] = {}
 
     def picture(self, names: tuple[str, ...]) -> str:
-        """The scanner with some of its bodies in front, PNG as a data address."""
+        """Return the scanner with some of its bodies in front, PNG as a data address."""
         if names not in self._drawn:
             self._drawn[names] = self._draw(names)
         return self._drawn[names]
@@ -93,6 +93,6 @@ class CheckPictures:
         pale = np.where(np.isfinite(self._all.away_m)[:, None], self._all.brightness[:, None] * OTHER, 255.0)
         strong = shown.brightness[:, None] * NAMED
         colour = np.where(front, strong, np.where(named, THROUGH * strong + (1 - THROUGH) * pale, pale))
-        width, height = SIZE
+        width, height = SIZE_PX
         fine = colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
         return png_uri(Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS))

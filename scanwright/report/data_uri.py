@@ -11,12 +11,12 @@ KINDS = {".png": "image/png", ".svg": "image/svg+xml"}
 
 
 def data_uri(data: bytes, suffix: str = ".png") -> str:
-    """A file of a picture as an address; `suffix` is its kind."""
+    """Return the file of a picture as an address; `suffix` is its kind."""
     return f"data:{KINDS[suffix]};base64,{b64encode(data).decode('ascii')}"
 
 
 def png_uri(image: Image.Image) -> str:
-    """A picture as the address of a PNG."""
+    """Return a picture as the address of a PNG."""
     stream = io.BytesIO()
     image.save(stream, format="PNG")
     return data_uri(stream.getvalue())

@@ -27,16 +27,16 @@ from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.report.answer import mounting_rad
 from scanwright.report.data_uri import png_uri
 
-STEP_DEG = 0.5
-DARKEST = 300  # times fewer beams than the most: the same as in density.png
-WORST = 0.9  # of the axes: the useless ones would take all shades for themselves
+STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
+DARKEST = 300  # ratio of most to fewest beams of the scale: as in density.png
+WORST = 0.9  # quantile of the axes: the worst ones would use most of the shades
 # the palette: shades of the map, then what is no shade
 SHADES = 250
 OUTLINE, HALO, MASKED, HATCH, NOTHING = range(SHADES, SHADES + 5)
 PLAIN = [(17, 17, 17), (255, 255, 255), (221, 221, 221), (119, 119, 119), (255, 255, 255)]
-HATCH_CELLS = 12
-MOST_LEVELS = 8
-BESIDE_DEG, STEEPEST_DEG = 25.0, 50.0  # of the camera: a ball looks round from beside
+HATCH_CELLS = 12  # period of the hatching
+MOST_LEVELS = 8  # of the weight with an outline each
+AZIMUTH_DEG, STEEPEST_DEG = 25.0, 50.0  # of the camera: a ball looks round from the side
 UPRIGHT = 0.05  # a middle less far from the vertical has no yaw
 NOWHERE = 1e-3  # a mean direction shorter than this is none
 
@@ -67,8 +67,8 @@ class DensitySphere:
     Attributes:
         maps: at least one.
         axis_world: direction of the rotation axis.
-        middle: of what counts, of length 1; nowhere, (0, 0, 0), where it is all around.
-        below: share of what counts that lies below the horizon.
+        middle: mean direction of the weight, of length 1; (0, 0, 0) if it is all around.
+        below: share of the weight below the horizon.
     """
 
     maps: tuple[SphereMap, ...]
@@ -77,7 +77,7 @@ class DensitySphere:
     below: float
 
     def data(self) -> dict[str, Any]:
-        """What the page needs beside the pictures, ready for JSON."""
+        """Return what the page needs besides the pictures, ready for JSON."""
         views = [{"title": view.title, "low": view.low, "high": view.high} for view in self.maps]
         return {"axis": list(self.axis_world), "look_deg": list(_look(*self.middle)), "views": views}
 
@@ -90,13 +90,13 @@ def density_sphere(
     step_deg: float,
     shadow: SelfOcclusion | None = None,
 ) -> DensitySphere:
-    """Density of the scanner and of the reference mounts on one scale, J over the axes, and where the axis points.
+    """Draw density of the scanner and of the reference mounts on one scale, J over the axes, and the axis.
 
     Args:
         problem: the task, `problem_as_built`.
         angles: what was built.
         mounts: the reference mounts.
-        axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None where that is not known.
+        axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None if unknown.
         step_deg: of the grid that was searched.
         shadow: beams that the parts of the scanner block; None if they are not known.
 
@@ -124,15 +124,15 @@ def density_sphere(
 
 
 def _look(x: float, y: float, z: float) -> tuple[float, float]:
-    """Where the camera of the ball stands, beside a direction: yaw and pitch [deg]."""
+    """Return yaw and pitch [deg] of the camera of the ball, to the side of a direction."""
     across = float(np.hypot(x, y))
     yaw = np.degrees(np.arctan2(y, x)) if across > UPRIGHT else 0.0
     pitch = np.clip(np.degrees(np.arctan2(z, across)), -STEEPEST_DEG, STEEPEST_DEG)
-    return round(float(yaw)) + BESIDE_DEG, float(round(float(pitch)))
+    return round(float(yaw)) + AZIMUTH_DEG, float(round(float(pitch)))
 
 
 def _directions() -> tuple[Array, tuple[int, int]]:
-    """Unit vectors of the cells of a picture, shape (n, 3), and its rows and columns."""
+    """Return unit vectors of the cells of a picture, shape (n, 3), and its rows and columns."""
     theta = np.radians(np.arange(STEP_DEG / 2, 180, STEP_DEG))
     phi = np.radians(np.arange(-180 + STEP_DEG / 2, 180, STEP_DEG))
     t, p = np.meshgrid(theta, phi, indexing="ij")
@@ -151,11 +151,11 @@ def _drawn(densities: dict[str, Array], weight: Array, masked: NDArray[np.bool_]
 
 
 def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int, int]) -> SphereMap:
-    """Lowest J about the nearest axis of the grid; nothing where none is near."""
+    """Draw the lowest J about the nearest axis of the grid; nothing if none is near."""
     known = axes[np.isfinite(axes[:, 2])]
     known = known[np.argsort(known[:, 2], kind="stable")]
     points = np.round(R_world_rot(*np.radians(known[:, :2].T))[:, :, 2], 9)
-    _, first = np.unique(points, axis=0, return_index=True)  # the lowest J of several ways to name an axis
+    _, first = np.unique(points, axis=0, return_index=True)  # the lowest J of several names of one axis
     distance, nearest = cKDTree(points[first]).query(directions)
     J = known[first, 2][nearest].reshape(shape)
     best, worst = float(known[0, 2]), float(np.quantile(known[:, 2], WORST))
@@ -167,13 +167,13 @@ def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int
 
 
 def _shades(values: Array, scale: Normalize, nothing: NDArray[np.bool_]) -> Indices:
-    """Palette entries of values, the brightest shade for the highest."""
+    """Return palette entries of values, the brightest shade for the highest."""
     shade = np.minimum(SHADES - 1, np.asarray(scale(values)) * SHADES)
     return np.where(nothing, NOTHING, shade).astype(np.uint8)
 
 
 def _framed(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> Indices:
-    """Masked directions hatched, a dark line on a bright one where the weight changes."""
+    """Hatch masked directions, and draw a dark line on a bright one where the weight changes."""
     row, column = np.indices(shades.shape)
     hatch = (row + column) % HATCH_CELLS < HATCH_CELLS // 4
     out = np.where(masked, np.where(hatch, HATCH, MASKED), shades).astype(np.uint8)
@@ -186,7 +186,7 @@ def _framed(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> Indice
 
 
 def _wider(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """By one cell to every side; phi wraps."""
+    """Widen a mask by one cell to every side; phi wraps."""
     mask = mask | np.roll(mask, 1, axis=1) | np.roll(mask, -1, axis=1)
     above, below = np.zeros_like(mask), np.zeros_like(mask)
     above[1:], below[:-1] = mask[:-1], mask[1:]

@@ -1,6 +1,6 @@
 """`report.html` from the files of a build folder: no search, no kernel, no network; equal files give equal bytes.
 
-Whatever a file is missing for is left out with one line that says so; only `angles.json` has to be there.
+If a file is missing, the page names it and omits what needs it; only `angles.json` is required.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.angles import AngleSet, load_angles
 from scanwright.design.arrays import Array
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.metres import on_planes
+from scanwright.design.findings import Finding, Severity
 from scanwright.design.objective.holes import percent
 from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
@@ -30,7 +32,7 @@ from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_gl
 from scanwright.report.sentences import sentences
 
 REPORT = "report.html"
-SEVERITIES = ("error", "warning", "note", "pass")
+SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
 PLANES_CSV = ("alpha_laser_deg", "beta_laser_deg", "J", "alpha_rot_deg", "beta_rot_deg")
 AXES_CSV = ("alpha_rot_deg", "beta_rot_deg", "J")
 DIRECTIONS = {
@@ -40,19 +42,19 @@ DIRECTIONS = {
     "right": (0, -1.1, 0),
     "up": (0, 0, 1.1),
     "down": (0, 0, -1.1),
-}  # of the world, beside the ball
+}  # of the world, around the ball
 
 
 def report_html(folder: Path, begin: Begin = in_turn) -> str:
-    """The page.
+    """Return the page.
 
     Args:
         folder: of the build.
-        begin: who does the shares of it that need the task, and the bodies of the scanner.
+        begin: runs the shares that need the task, and the bodies of the scanner.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
-        BuildError: another file is not as a build writes it.
+        BuildError: no build wrote another file in this form.
     """
     angles = load_angles(folder / "angles.json")
     on_task, on_bodies = begin(_on_task, folder), begin(_on_bodies, folder)
@@ -100,16 +102,16 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
 
 
 def _wiring_words(path: Path) -> tuple[str, str]:
-    """HTML of the cautions, which stand before the picture, and of all that follows it."""
+    """Return HTML of the cautions before the picture, and of the text after it."""
     cautions, heading, words = read_text(path).partition("\n## Power")
     return steps_html(cautions), steps_html(heading + words)
 
 
 def _on_task(folder: Path) -> dict[str, Any]:
-    """What cannot be said without the task."""
+    """Return what needs the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
-        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "said", "mounts"))
+        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "sentences", "mounts"))
     angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
     assembly = read(folder / "assembly.glb", load_glb)
     scanner = [] if assembly is None else about_centre(assembly, angles)
@@ -117,23 +119,23 @@ def _on_task(folder: Path) -> dict[str, Any]:
     setting = mounting_rad(angles)
     planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_self_occlusion)
     shadow = None if own_body is None else own_body[0]
-    found = answer(loaded, angles, shadow)
-    mounts = [mount.gain.mount for mount in found.as_built.mounts]
+    result = answer(loaded, angles, shadow)
+    mounts = [mount.gain.mount for mount in result.as_built.mounts]
     sphere = density_sphere(problem, angles, mounts, axes, task.angles.step_deg, shadow)
     figures = on_planes(loaded, problem, setting, shadow)
     return {
         "objective": task.density.objective,
         "ball_deg": task.density.ball_radius_deg,
-        "answer": found,
+        "answer": result,
         "sphere": sphere,
         "room": room_picture(task, folder, problem, setting, sphere, scanner, shadow),
-        "said": sentences(angles, found, 2 * np.tan(problem.ball_rad), figures),
+        "sentences": sentences(angles, result, 2 * np.tan(problem.ball_rad), figures),
         "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 
 
 def _on_bodies(folder: Path) -> dict[str, Any]:
-    """What shows the scanner, and what it hides."""
+    """Return what shows the scanner and its hidden beams."""
     angles, checks, bom = load_angles(folder / "angles.json"), _checks(folder), read(folder / "bom.csv", read_table)
     own_body = read(folder / "own_body.npz", load_self_occlusion)
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
@@ -144,8 +146,11 @@ def _on_bodies(folder: Path) -> dict[str, Any]:
     }
 
 
-def _checks(folder: Path) -> dict[str, list[dict[str, Any]]] | None:
-    return read(folder / "checks.json", lambda path: _by_severity(read_json(path)["checks"]))
+def _checks(folder: Path) -> dict[Severity, list[Finding]] | None:
+    checks = read(folder / "checks.json", read_checks)
+    if checks is None:
+        return None
+    return {severity: [check for check in checks if check.severity == severity] for severity in SEVERITIES}
 
 
 def _planes(path: Path) -> Array:
@@ -168,7 +173,7 @@ def _environment() -> Environment:
 
 
 def _manifest(path: Path) -> dict[str, Any]:
-    """The manifest without the report's own digest: a report made again must be the same."""
+    """Return the manifest without the report's own digest, so that a report made again is the same."""
     manifest: dict[str, Any] = read_json(path)
     return manifest | {"files": {name: facts for name, facts in manifest["files"].items() if name != REPORT}}
 
@@ -186,7 +191,7 @@ def _motion(angles: AngleSet) -> str:
 
 
 def _not_drawn(folder: Path) -> str:
-    """Why the page draws no scanner; empty where it does."""
+    """Return why the page draws no scanner; empty if it does."""
     path = folder / "assembly.glb"
     if not path.is_file():
         return "assembly.glb is not in this folder."
@@ -195,20 +200,13 @@ def _not_drawn(folder: Path) -> str:
     return ""
 
 
-def _by_severity(checks: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Checks by severity, the worst first; a severity not known here comes with the errors."""
-    known = {severity: [c for c in checks if c["severity"] == severity] for severity in SEVERITIES}
-    known["error"] += [c for c in checks if c["severity"] not in SEVERITIES]
-    return known
-
-
 def _places(
-    assembly: Any, checks: dict[str, list[dict[str, Any]]], bom: list[dict[str, str]] | None
+    assembly: Any, checks: dict[Severity, list[Finding]], bom: list[dict[str, str]] | None
 ) -> dict[str, dict[str, Any]]:
-    """By the `where` of a check the bodies that it names and a picture of them; what is no place is not there."""
+    """Return the bodies of each subject of a check and a picture of them; a subject without bodies is left out."""
     bodies = placed_bodies(assembly)
     pictures = CheckPictures(bodies)
     bought = {row.get("number", ""): row.get("part", "") for row in bom or () if row.get("kind") == "bought"}
-    wheres = dict.fromkeys(str(check.get("where", "")) for found in checks.values() for check in found)
-    named = {where: bodies_named(where, bodies, bought) for where in wheres}
-    return {where: {"bodies": names, "picture": pictures.picture(names)} for where, names in named.items() if names}
+    codes = {check.subject: check.code for each in checks.values() for check in each}
+    named = {subject: bodies_named(code, subject, bodies, bought) for subject, code in codes.items()}
+    return {subject: {"bodies": names, "picture": pictures.picture(names)} for subject, names in named.items() if names}

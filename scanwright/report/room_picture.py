@@ -1,8 +1,8 @@
-"""The first picture of the report: the scanner in a room that is cut open, and how dense it sees floor and walls.
+"""The first picture of the report: the scanner in a room that is cut open, and its beam density on floor and walls.
 
-The room stands about the scanner as the task has it: as high over the floor, and as large as what the task names in
-metres. Every point of its walls has the colour of the direction in which the optical centre sees it, so one picture
-serves tasks in metres and in angles alike. The robot is drawn where the task has a mesh of it.
+Height and size of the room are those that the task states in metres. Every point of its walls has the colour of its
+direction from the optical centre, so one picture serves tasks in metres and in angles. The robot is drawn if the task
+has a mesh of it.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from scanwright.report.cut_room import Pinhole, Room, Walls, pinhole_behind, roo
 from scanwright.report.data_uri import png_uri
 from scanwright.report.density_sphere import DensitySphere
 
-SQUARE_M, LINE_PX = 1.0, 1.0
+SQUARE_M, LINE_PX = 1.0, 1.0  # of the grid on floor and walls
 ARROW_M, ARROW_WIDE_M = 0.6, 0.05
 POST_M = 0.008  # half of the line from the scanner down to the floor
 SCALE = 1, 99  # percentiles of the density on the walls, between which the colours are
 INK, LIGHT, MASKED, HATCH, ROBOT = (np.array([float(grey)] * 3) for grey in (17, 255, 221, 119, 150))
-HATCH_PX = 16
-LITTLE = 0.02  # of what counts below the horizon: the floor is cut away
+HATCH_PX = 16  # period of the hatching
+LITTLE = 0.02  # share of the weight below the horizon, under which the floor is cut away
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ class RoomPicture:
 
     Attributes:
         picture: PNG as a data address.
-        marks: what stands where on it.
-        words: the room.
+        marks: words on it.
+        words: description of the room.
         low: mean beams within the ball at the dark end of its colours.
         high: at the bright end.
     """
@@ -78,27 +78,27 @@ def room_picture(
     scanner: Sequence[PlacedBody],
     shadow: SelfOcclusion | None = None,
 ) -> RoomPicture:
-    """Draw it.
+    """Draw the picture.
 
     Args:
         task: what was built.
-        folder: where the files are that it names.
+        folder: of the files that it names.
         problem: the same as numbers.
         setting: (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
-        sphere: says where what counts lies.
-        scanner: its bodies about the optical centre; none if they are not known.
-        shadow: beams that they block; None if that is not known.
+        sphere: mean direction of the weight.
+        scanner: its bodies about the optical centre; none if unknown.
+        shadow: beams that they block; None if unknown.
 
     Raises:
         BuildError: the shadow is of another number of beams.
     """
-    looks_up = sphere.below < LITTLE
+    from_below = sphere.below < LITTLE
     room, words = room_about(task)
-    camera = pinhole_behind(room, np.array(sphere.middle), looks_up)
+    camera = pinhole_behind(room, np.array(sphere.middle), from_below)
     rays = camera.rays()
     walls = walls_behind(room, camera, rays)
     picture, low, high = _painted(problem, setting, shadow, room, camera, walls)
-    level_m = room.high[2] if looks_up else room.low[2]  # of the ceiling, where the floor is cut away
+    level_m = room.high[2] if from_below else room.low[2]  # of the ceiling, if the floor is cut away
     post = PlacedBody(_post(level_m), False, (0.35, 0.35, 0.35))
     _add_bodies(picture, camera, rays, [*scanner, post, *_robot(task, folder)])
     ahead = np.array([room.high[0] - ARROW_M, 0.0, level_m])
@@ -110,7 +110,7 @@ def room_picture(
 def _painted(
     problem: Problem, setting: Setting, shadow: SelfOcclusion | None, room: Room, camera: Pinhole, walls: Walls
 ) -> tuple[Array, float, float]:
-    """Colour of each pixel, shape (rows, columns, 3), NaN beside the room, and the density of darkest and brightest."""
+    """Return each pixel's colour, shape (rows, columns, 3), NaN outside, and the density of darkest and brightest."""
     inside, size = walls.inside, camera.size
     points = walls.points_m[inside]
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -145,22 +145,22 @@ def _draw(picture: Array, line: Bool[ndarray, "rows columns"], wider: int) -> No
 
 
 def _squares(points_m: Array, axis: Array, pixel_m: Array) -> Float[ndarray, " n"]:
-    """How much of a line lies on each point of a face across an axis: 0 to 1; the scanner is on a corner of squares."""
+    """Return the share of a line on each point of a face across an axis; the scanner is on a corner of squares."""
     away = abs(points_m - SQUARE_M * np.round(points_m / SQUARE_M)) / pixel_m[:, None]
     away[np.arange(len(axis)), axis] = np.inf
     return np.clip(LINE_PX - away.min(axis=1) + 0.5, 0, 1)
 
 
 def _steps(values: Array) -> Bool[ndarray, "rows columns"]:
-    """Pixels whose value is not that of the next one to the right or below; NaN differs from nothing."""
-    found = np.zeros(values.shape, bool)
-    found[:, :-1] |= abs(np.diff(values, axis=1)) > 0
-    found[:-1] |= abs(np.diff(values, axis=0)) > 0
-    return found
+    """Return pixels whose value differs from the next one to the right or below; NaN differs from nothing."""
+    steps = np.zeros(values.shape, bool)
+    steps[:, :-1] |= abs(np.diff(values, axis=1)) > 0
+    steps[:-1] |= abs(np.diff(values, axis=0)) > 0
+    return steps
 
 
 def _arrow(walls: Walls, room: Room) -> Bool[ndarray, " n"]:
-    """Points of an arrow on floor or ceiling that ends where the room does, ahead of the scanner."""
+    """Return the points of an arrow on floor or ceiling that ends at the wall ahead of the scanner."""
     before, aside = room.high[0] - walls.points_m[:, 0] - 0.1, abs(walls.points_m[:, 1])
     head = (before > 0) & (before < 3 * ARROW_WIDE_M) & (aside < before * 0.8)
     shaft = (before >= 3 * ARROW_WIDE_M) & (before < ARROW_M) & (aside < ARROW_WIDE_M / 2)
@@ -168,7 +168,7 @@ def _arrow(walls: Walls, room: Room) -> Bool[ndarray, " n"]:
 
 
 def _post(level_m: float) -> Array:
-    """A thin upright from the scanner to floor or ceiling, so that one sees where it is: triangles, shape (4, 3, 3)."""
+    """Return a thin post from the scanner to floor or ceiling that shows its place: triangles, shape (4, 3, 3)."""
     r = POST_M
     feet = np.array([[r, r, level_m], [-r, -r, level_m], [r, -r, level_m], [-r, r, level_m]])
     heads = feet * [1, 1, 0]
@@ -178,7 +178,7 @@ def _post(level_m: float) -> Array:
 
 
 def _robot(task: Task, folder: Path) -> list[PlacedBody]:
-    """The meshes that hide what is behind them, about the optical centre."""
+    """Return the meshes that hide directions, about the optical centre."""
     robots = []
     for region in task.mask:
         if isinstance(region, MeshRegion):
@@ -208,7 +208,7 @@ def _add_bodies(picture: Array, camera: Pinhole, rays: Array, bodies: Sequence[P
 
 
 def _png(picture: Array) -> str:
-    """As a data address; what is NaN is transparent."""
+    """Return the picture as a data address; NaN is transparent."""
     opaque = np.where(np.isnan(picture[..., :1]), 0.0, 255.0)
     pixels = np.concatenate([np.nan_to_num(picture, nan=255.0), opaque], axis=2)
     return png_uri(Image.fromarray(pixels.round().astype(np.uint8)))

@@ -1,6 +1,6 @@
-"""The scanner in 3D for the report: the bodies of `assembly.glb`, their places in `exploded.glb`, axis and fan.
+"""The scanner in 3D for the report: bodies of `assembly.glb`, their places in `exploded.glb`, axis, field of view.
 
-The page draws what it finds here and knows nothing of files: matrices are column by column, arrays little-endian in
+The page draws this and reads no files: matrices are column by column, arrays little-endian in
 base64, all in the world frame in metres.
 """
 
@@ -23,15 +23,15 @@ from scanwright.report.check_pictures import PlacedBody
 
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
 FULL_TURN_DEG = (0.0, 360.0)
-A_TURN_S = 10.0  # shown where the motion is not known
-SQUARE_M = 0.05  # of the grid that the scanner stands over
+A_TURN_S = 10.0  # shown if the motion is unknown
+SQUARE_M = 0.05  # of the grid below the scanner
 FAN_REACH = 0.9  # of the radius of the scanner: how far the fan and the axis are drawn
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # glTF has y up
 FRAMES = ("rot", "laser")
 
 
 def load_glb(path: Path) -> Any:
-    """A scene of trimesh, as `cad` writes it.
+    """Return a scene of trimesh, as `cad` writes it.
 
     Raises:
         ValueError: a frame of the scanner is missing.
@@ -47,13 +47,13 @@ def load_glb(path: Path) -> Any:
 def scanner_scene(
     assembly: Any, exploded: Any | None, angles: AngleSet, own_body: tuple[SelfOcclusion, Array] | None
 ) -> dict[str, Any]:
-    """What the page draws, ready for JSON.
+    """Return what the page draws, ready for JSON.
 
     Args:
         assembly: of `assembly.glb`.
         exploded: of `exploded.glb`; without it nothing explodes.
         angles: for the motion.
-        own_body: what the parts hide, and the bearings of the beams [rad]; without it there is no fan.
+        own_body: hidden beams, and the bearings of all beams [rad]; without it there is no field of view.
     """
     turning = assembly.graph.transforms.successors("rot")
     bodies, together, spread = [], [], []
@@ -99,7 +99,7 @@ def scanner_scene(
 
 
 def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
-    """The bodies of `assembly.glb` as they stand in the world."""
+    """Return the bodies of `assembly.glb` in the world."""
     turning = assembly.graph.transforms.successors("rot")
     bodies = {}
     for node in sorted(assembly.graph.nodes_geometry):
@@ -110,18 +110,18 @@ def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
 
 
 def about_centre(assembly: Any, angles: AngleSet) -> list[PlacedBody]:
-    """The same bodies, from the optical centre."""
+    """Return the same bodies, from the optical centre."""
     centre_m = angles.T_world_rot(0.0)[:3, 3]
     return [replace(body, triangles_m=body.triangles_m - centre_m) for body in placed_bodies(assembly).values()]
 
 
 def _pose(scene: Any, node: str) -> Array:
-    """T_world_node, z up [m]."""
+    """Return T_world_node, z up [m]."""
     return Y_TO_Z @ scene.graph.get(node)[0]
 
 
 def _fan(shadow: SelfOcclusion, bearings_rad: Array) -> dict[str, Any]:
-    """Bearings, and for every beam that is ever hidden one bit an axis step, 1 where it is."""
+    """Return bearings, and for every beam that is ever hidden one bit an axis step, 1 if it is."""
     stator = np.zeros((len(bearings_rad), AXIS_STEPS), bool) if shadow.stator is None else shadow.stator
     hidden = stator | shadow.beams[:, None]
     rows = {str(beam): _packed(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
@@ -129,7 +129,7 @@ def _fan(shadow: SelfOcclusion, bearings_rad: Array) -> dict[str, Any]:
 
 
 def _grid(points: Array) -> dict[str, Any]:
-    """Squares below all points, whole ones about the z axis of the world, and how many there are to each side."""
+    """Return squares below all points, about the z axis of the world, and their number to each side."""
     reach = float(np.abs(points[:, :2]).max())
     return {
         "z": round(float(points[:, 2].min()), 6),
@@ -139,7 +139,7 @@ def _grid(points: Array) -> dict[str, Any]:
 
 
 def _fit(points: list[Array]) -> dict[str, Any]:
-    """A sphere about the middle of the box of all points."""
+    """Return a sphere about the middle of the box of all points."""
     every = np.concatenate(points)
     middle = (every.min(axis=0) + every.max(axis=0)) / 2
     radius = float(np.linalg.norm(every - middle, axis=1).max())
@@ -147,7 +147,7 @@ def _fit(points: list[Array]) -> dict[str, Any]:
 
 
 def _srgb(linear: ArrayLike) -> list[float]:
-    """Colours of glTF are linear, 0 to 255 in trimesh; those of a page are sRGB, 0 to 1."""
+    """Convert linear colours of glTF, 0 to 255 in trimesh, to sRGB, 0 to 1."""
     c = np.asarray(linear, dtype=float)[:3] / 255
     return np.round(np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055), 3).tolist()
 

@@ -1,4 +1,4 @@
-"""The answer of a build in a few sentences that need no other page."""
+"""The result of a build in a few sentences."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from scanwright.design.objective.holes import percent
 from scanwright.design.search.mounts.gain import Gain
 from scanwright.report.answer import BuildAnswer
 
-AT_M = 3.0  # from the scanner, where a ball of directions is told as a disc
+AT_M = 3.0  # from the scanner, where a neighbourhood of directions is stated as a disc
 
 
 def sentences(angles: AngleSet, answer: BuildAnswer, ball_m: float, planes: Sequence[PlaneFigures]) -> list[str]:
-    """What it is, what it sees, and what that is worth.
+    """Return what it is, what it sees, and the gain over simple mounts.
 
     Args:
         angles: what was built.
         answer: what it sees.
-        ball_m: width of the ball of directions, one metre away.
+        ball_m: width of the neighbourhood of directions, one metre away.
         planes: what it sees on the planes of the task, in metres.
     """
     return [_is(angles, answer), *_sees(answer, ball_m, planes), *_is_worth(answer)]
 
 
 def turns(motion: Motion | None) -> str:
-    """How the axis moves in one full scan."""
+    """Return the motion of the axis in one full scan."""
     if motion is None:
-        return "in a motion that the angle set does not tell"
+        return "in a motion that the angle set does not state"
     if motion.mode == "spin":
         return f"once around in {motion.duration_s:g} s"
     if motion.mode == "sweep":
@@ -48,11 +48,11 @@ def _is(angles: AngleSet, answer: BuildAnswer) -> str:
 
 
 def _sees(answer: BuildAnswer, ball_m: float, planes: Sequence[PlaneFigures]) -> list[str]:
-    said = [f"{_capital(figures.words())}." for figures in planes]
+    text = [f"{_capital(figures.words())}." for figures in planes]
     if blind := answer.as_built.own.blind:
-        return [*said, f"It is {'; and '.join(blind)}."]
+        return [*text, f"It is {'; and '.join(blind)}."]
     if planes:
-        return [*said, "No direction that counts is left out."]
+        return [*text, "No direction that counts is left out."]
     width_cm = 100 * ball_m * AT_M
     return [
         f"Wherever it counts, a disc {rounded(width_cm)} cm wide, {AT_M:g} m away and facing the scanner, gets "

@@ -1,4 +1,4 @@
-"""Who may talk to a live page: the one who has its address, from this computer, in small and known messages.
+"""Access to a live page: by its address, from this computer, in small and known messages.
 
 Every request is checked before it is answered, and every message before viser reads it. Refused are
 
@@ -36,8 +36,8 @@ from websockets.http11 import Request, Response
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
 
 MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
-MOST_TEXT = 200
-SAID = (
+MOST_TEXT = 200  # characters of a text, entries of a list: more than our pages send
+PAGE_MESSAGES = (
     "ViewerCameraMessage",
     "GuiUpdateMessage",
     "CommandTriggerMessage",
@@ -45,8 +45,10 @@ SAID = (
     "SceneNodeDragMessage",
     "ScenePointerMessage",
 )
-KNOWN: dict[str, Any] = {kind.__name__: kind for kind in viser.infra.Message.get_subclasses() if kind.__name__ in SAID}
-"""What a page may say; everything else is dropped and counted."""
+KNOWN: dict[str, Any] = {
+    kind.__name__: kind for kind in viser.infra.Message.get_subclasses() if kind.__name__ in PAGE_MESSAGES
+}
+"""Messages that a page can send; all others are dropped and counted."""
 
 ICON = (
     "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 32 32'%3E%3Crect width='32' height='32' "
@@ -55,14 +57,14 @@ ICON = (
 )
 """A fan of beams, for the tab of the browser."""
 
-MENDING = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js", "state_banner.js"
+ADDED_TO_PAGE = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js", "state_banner.js"
 """A style and scripts that are put into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
 
 
 class Gate:
-    """One page's door.
+    """The access checks of one page.
 
     Attributes:
         title: of the page.
@@ -84,24 +86,24 @@ class Gate:
 
     @property
     def address(self) -> str:
-        """What a person opens."""
+        """The address with its token."""
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     def objection(self, request: Request) -> str:
-        """Why a request is refused; empty if it is not."""
+        """Return why a request is refused; empty if it is not."""
         headers, parts = request.headers, urlsplit(request.path)
         origins = headers.get_all("Origin")
         talks = "websocket" in headers.get("Upgrade", "").lower() if len(headers.get_all("Upgrade")) < 2 else True
         query = parse_qsl(parts.query, keep_blank_values=True)
-        given = [value for key, value in query if key == "token"]
-        kept = [value for key, value in _cookies(headers) if key == self._cookie]
+        tokens = [value for key, value in query if key == "token"]
+        cookies = [value for key, value in _cookies(headers) if key == self._cookie]
         if why := foreign(headers, self._hosts, {f"http://{host}" for host in self._hosts}):
             return why
         if talks and len(origins) != 1:
             return "websocket without an origin"
         if any(site not in ("none", "same-origin") for site in headers.get_all("Sec-Fetch-Site")):
             return "cross-site"
-        if not any(secrets.compare_digest(value.encode(), self.token.encode()) for value in given + kept):
+        if not any(secrets.compare_digest(value.encode(), self.token.encode()) for value in tokens + cookies):
             return "no token"
         if request.path.startswith("//") or parts.path != "/" or [key for key, _ in query] not in ([], ["token"]):
             return "no such page"
@@ -110,7 +112,7 @@ class Gate:
         return ""
 
     def answering(self, answer: Answer) -> Answer:
-        """`process_request` of the library: viser's own, behind the check."""
+        """Return viser's `process_request` behind the checks."""
 
         def checked(connection: ServerConnection, request: Request) -> Response | None:
             if why := self.objection(request):
@@ -132,23 +134,23 @@ class Gate:
         return checked
 
     def _titled(self, page: bytes) -> bytes:
-        """The page with its own name and icon in place of the library's, and with what mends it for everybody."""
+        """Return the page with our title, icon, style and scripts."""
         head, end, rest = page.partition(b"</title>")
         head = re.sub(rb"<title>.*", lambda _: f"<title>{escape(self.title)}".encode(), head, flags=re.DOTALL)
         head = re.sub(rb'href="data:image/svg\+xml,[^"]*"', lambda _: f'href="{ICON}"'.encode(), head)
-        return head + end + _mending() + rest
+        return head + end + _added_to_page() + rest
 
     def admits(self, data: str | bytes) -> bool:
-        """Whether a message is one that the page sends, whole and of the right types."""
+        """Return whether a message is complete, known and of the right types."""
         try:
-            told: Any = msgspec.msgpack.decode(data) if isinstance(data, bytes) else None
-            kind = KNOWN[told.pop("type")]
-            fits = set(told) <= {field.name for field in dataclasses.fields(kind)} and _tame(told)
-            msgspec.convert(told, type=kind)
+            message: Any = msgspec.msgpack.decode(data) if isinstance(data, bytes) else None
+            kind = KNOWN[message.pop("type")]
+            fits = set(message) <= {field.name for field in dataclasses.fields(kind)} and _tame(message)
+            msgspec.convert(message, type=kind)
         except (msgspec.MsgspecError, KeyError, TypeError, AttributeError, RecursionError, ValueError):
             return False
         # viser writes whatever attribute of a control a message names: only its value is the page's to change
-        return fits and (kind is not KNOWN["GuiUpdateMessage"] or set(told["updates"]) == {"value"})
+        return fits and (kind is not KNOWN["GuiUpdateMessage"] or set(message["updates"]) == {"value"})
 
     def _headers(self) -> dict[str, str]:
         own = " ".join(f"ws://{host}" for host in sorted(self._hosts))
@@ -167,10 +169,10 @@ class Gate:
 
 
 @cache
-def _mending() -> bytes:
-    """Style and script that are put into the page."""
+def _added_to_page() -> bytes:
+    """Return the style and the scripts that are added to the page."""
     folder = files("scanwright.serving")
-    style, *scripts = (folder.joinpath(name).read_bytes() for name in MENDING)
+    style, *scripts = (folder.joinpath(name).read_bytes() for name in ADDED_TO_PAGE)
     return b"<style>" + style + b"</style>" + b"".join(b"<script>" + script + b"</script>" for script in scripts)
 
 
@@ -180,7 +182,7 @@ def _cookies(headers: Headers) -> list[tuple[str, str]]:
 
 
 def _tame(value: Any) -> bool:
-    """Whether all that a message holds are finite numbers and short texts."""
+    """Return whether a message contains only finite numbers and short texts."""
     if isinstance(value, dict):
         return all(_tame(key) and _tame(inner) for key, inner in value.items())
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""What every server for a browser checks of a request before it answers, and the socket that it listens on.
+"""Checks of a browser's request before a server answers, and the socket that it listens on.
 
 A browser lets any page open a websocket to this computer. Two headers, which a page cannot choose, tell who asks: Host,
 which is another name if a name was bent to 127.0.0.1 (DNS rebinding), and Origin, the page that the script comes from.
@@ -14,9 +14,9 @@ from http import HTTPStatus
 from websockets.datastructures import Headers
 from websockets.http11 import Response
 
-from scanwright.design.errors import DeviceError, TaskError
+from scanwright.design.errors import TaskError
 
-MOST_VISITORS = 8
+MOST_VISITORS = 8  # more than the windows of one person
 
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9.:\[\]-]+")
 
@@ -57,7 +57,7 @@ def bound(port: int) -> socket.socket:
     except (OSError, OverflowError) as error:
         listening.close()
         why = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "no such port"
-        raise TaskError(f"--port {port}: {why}; leave it out for any that is free") from error
+        raise TaskError(f"port = {port}: {why}; 0 chooses any free port") from error
     return listening
 
 
@@ -65,10 +65,10 @@ def as_origins(texts: Iterable[str] | None) -> tuple[str, ...]:
     """Return the origins that a person allows, as browsers send them.
 
     Raises:
-        DeviceError: one is no origin of a single page; `null` is what any page can send.
+        TaskError: one is no origin of a single page; `null` is what any page can send.
     """
     origins = tuple(text.lower().removesuffix("/") for text in texts or ())
     for origin in origins:
         if not _ORIGIN.fullmatch(origin):
-            raise DeviceError(f"--allow-origin {origin}: not an origin (allowed SCHEME://HOST[:PORT])")
+            raise TaskError(f"allow_origin = {origin}: not an origin (allowed SCHEME://HOST[:PORT])")
     return origins

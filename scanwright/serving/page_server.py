@@ -1,4 +1,4 @@
-"""A page is served through its gate, says its address, and ends when its last visitor has been gone for a while.
+"""The server of a live page: behind a gate, until its last visitor has left.
 
 viser serves its page and its websocket from one asyncio server of the `websockets` library and knows no visitors. So
 that server is opened through here: on a socket that is bound to 127.0.0.1 before viser sees it, each connection behind
@@ -19,12 +19,12 @@ from websockets.asyncio.server import ServerConnection
 
 from scanwright.serving.gate import MOST_BYTES, Answer, Gate
 
-BRAND = (35, 77, 140)
+BRAND = (35, 77, 140)  # dark blue, readable under white text
 
 
 @contextmanager
 def guarded_server(title: str, port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
-    """A viser server of a page with a title that listens behind a gate while the body runs; `port` 0 is any free one.
+    """Run a viser server behind a gate while the body runs; `port` 0 chooses a free one.
 
     Raises:
         TaskError: the port is taken.
@@ -51,7 +51,7 @@ def guarded_server(title: str, port: int = 0) -> Iterator[tuple[viser.ViserServe
 
 
 def _opening(gate: Gate, opening: Callable[..., Any]) -> Callable[..., Any]:
-    """`websockets.asyncio.server.serve` as viser is to find it."""
+    """Return the `websockets.asyncio.server.serve` that viser calls."""
 
     class Guarded(ServerConnection):
         async def recv(self, decode: bool | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""How live pages look: a line of text for a person, and the scale of colours."""
+"""The style of live pages: notes, banners and the colour scale."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Colours = NDArray[np.uint8]
 
 
 def ramp(level: Array) -> Colours:
-    """Colours of levels 0 .. 1, shape (n, 3); NaN counts as 0."""
+    """Return the colours of levels 0 to 1, shape (n, 3); NaN counts as 0."""
     stops = np.array(COLOUR_STOPS, dtype=float)
     at = np.clip(np.nan_to_num(level), 0, 1) * (len(stops) - 1)
     columns = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
@@ -43,7 +43,7 @@ def banner_html(kind: str, lines: Iterable[str], *, lost: Iterable[str] = ()) ->
 
 
 def note_html(text: str, *, bad: bool = False) -> str:
-    """One line for a person, nothing where it is empty; red where something is refused."""
+    """Return one line as HTML, red if it is an error; empty for an empty text."""
     kind = ' class="sw-bad"' if bad else ""
     line = f'<div{kind} style="font-size:12px;margin:2px 12px;overflow-wrap:anywhere">{escape(text)}</div>'
     return line if text else ""

@@ -15,7 +15,7 @@ from scanwright.studio.view.coloured_sphere import RADIUS_M, direction_hit
 from scanwright.studio.view.view_3d import View3D
 
 STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
-LEAST_DEG, MOST_DEG = 1.0, 60.0
+LEAST_DEG, MOST_DEG = 1.0, 60.0  # radius of a dab; as the slider
 
 Paint = Callable[[tuple[Dab, ...], int], None]
 """Takes all dabs as they are now, and the number of the stroke that laid the last one."""
@@ -34,7 +34,7 @@ class PaintBrush:
         """Of the cone that a dab paints."""
         return float(np.clip(self._controls.radius.value, LEAST_DEG, MOST_DEG))
 
-    def arm(self, told: Callable[[Callable[[], Any]], Callable[[Any], None]]) -> None:
+    def arm(self, guarded: Callable[[Callable[[], Any]], Callable[[Any], None]]) -> None:
         """Take it in hand, or put it away; `told` wraps what may be refused."""
         sphere = self._view.sphere
         sphere.remove_click_callback()
@@ -46,13 +46,13 @@ class PaintBrush:
         @sphere.on_click
         async def _(event: Any) -> None:
             self._strokes += 1
-            told(lambda: self.dab(event.ray_origin, event.ray_direction))(event)
+            guarded(lambda: self.dab(event.ray_origin, event.ray_direction))(event)
 
         @sphere.on_drag
         async def _(event: viser.SceneNodeDragEvent[Any]) -> None:
             self._strokes += event.phase == "start"
             eye = np.asarray(event.client.camera.position)
-            told(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
+            guarded(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
 
     def dab(self, ray_origin: Any, ray_direction: Any) -> None:
         """Touch the sphere where a ray from the camera meets it.

@@ -11,7 +11,7 @@ from scanwright.design.task.angle_ranges import NAMES
 from scanwright.studio.state import Canvas, Setting
 
 JOINED_S = 1.0  # changes of one thing that follow each other this closely are one step: a slider that is dragged
-MOST_STEPS = 500
+MOST_STEPS = 500  # more than a person takes back
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def difference(before: PageState, after: PageState) -> str:
             *_painted(len(after.canvas.dabs) - len(before.canvas.dabs), len(after.canvas.dabs)),
             *(f"keep {name}" for name in kept if name not in were),
             *(f"remove {name}" for name in were if name not in kept),
-            *(f"{name} {_said(stood[name])} to {_said(new)}" for name, new in fields.items() if new != stood[name]),
+            *(f"{name} {_text(stood[name])} to {_text(new)}" for name, new in fields.items() if new != stood[name]),
         ]
     )
 
@@ -61,7 +61,7 @@ def _painted(more: int, left: int) -> list[str]:
     return [f"paint {more} dab{'s' if more > 1 else ''}"] if more else []
 
 
-def _said(value: object) -> str:
+def _text(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -120,10 +120,10 @@ class History:
         with self._lock:
             return difference(self._done[-1], self._undone[-1]) if self._undone else ""
 
-    def _step(self, taken: list[PageState], given: list[PageState], stays: int) -> PageState | None:
+    def _step(self, steps: list[PageState], to: list[PageState], stays: int) -> PageState | None:
         with self._lock:
-            if len(taken) <= stays:
+            if len(steps) <= stays:
                 return None
             self._of = None  # what follows is a step of its own
-            given.append(taken.pop())
+            to.append(steps.pop())
             return self._done[-1]

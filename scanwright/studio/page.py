@@ -58,13 +58,13 @@ class Studio:
         self.saving = Saving(self.controls, saved_to, out)
         self.judging: LatestOnly[Setting] = LatestOnly("judge", self._follow, self._rest)
         self.painting: LatestOnly[Canvas] = LatestOnly("paint", self._take, self._rejudge)
-        self.workers = Workers(self.view, self._say_making)
+        self.workers = Workers(self.view, self._show_making)
         self.history = History(self._state())
         self.searching = Searching(
-            self.controls, self.say, lambda: (self._canvas, self.setting), self._found, self.move
+            self.controls, self.show, lambda: (self._canvas, self.setting), self._use_optimum, self.move
         )
         self._connect()
-        self._taken()
+        self._task_changed()
         self.judging.settled(FIRST_S)  # nobody is shown a picture without its colours
 
     def close(self) -> None:
@@ -78,7 +78,7 @@ class Studio:
         """Where the sliders stand."""
         return Setting.within_bounds(slider.value for slider in self.controls.angles)
 
-    def say(self, text: str, bad: bool = False) -> None:
+    def show(self, text: str, bad: bool = False) -> None:
         """One line under the facts."""
         self.controls.note.content = note_html(text, bad=bad)
 
@@ -86,7 +86,7 @@ class Studio:
         """Move the sliders; `of` is what for, where that takes more than one move."""
         for slider, angle in zip(self.controls.angles, setting.angles_deg, strict=True):
             put(slider, angle)
-        self.judging.wish(setting)
+        self.judging.request(setting)
         self._note(of, math.inf)
 
     def undo(self) -> None:
@@ -121,13 +121,13 @@ class Studio:
         if moment.kept != self.kept.settings:
             self.kept.take(moment.kept)
         if moment.canvas == before:
-            self.judging.wish(moment.setting)
+            self.judging.request(moment.setting)
         else:
-            self.painting.wish(moment.canvas)
+            self.painting.request(moment.canvas)
         self.controls.show_steps(self.history.undoes, self.history.redoes)
 
     def _keep(self) -> None:
-        self.say(f"kept as {self.kept.keep(self.setting)}: see Compare")
+        self.show(f"saved as {self.kept.keep(self.setting)}: see Compare")
         self._note()
 
     def _remove(self) -> None:
@@ -138,7 +138,7 @@ class Studio:
         c = self.controls
 
         async def moved(event: viser.GuiEvent[Any]) -> None:
-            self.judging.wish(self.setting)
+            self.judging.request(self.setting)
             noted(event)
 
         def noted(event: viser.GuiEvent[Any]) -> None:
@@ -154,14 +154,14 @@ class Studio:
             field.on_update(noted)
         for field in (c.brush, c.radius):
             field.on_update(shown)
-        c.task.on_update(self._told(self._change_task))
-        c.painting.on_update(self._told(self._arm))
-        c.undo_key.on_trigger(self._told(self.undo))
-        c.redo_key.on_trigger(self._told(self.redo))
+        c.task.on_update(self._guarded(self._change_task))
+        c.painting.on_update(self._guarded(self._arm))
+        c.undo_key.on_trigger(self._guarded(self.undo))
+        c.redo_key.on_trigger(self._guarded(self.redo))
         c.brush_key.on_trigger(lambda _: put(c.painting, not c.painting.value))
-        c.look.on_update(self._told(self._look))
-        c.scanner.on_update(self._told(self._show_scanner))
-        c.scene.on_update(self._told(self._change_scene))
+        c.look.on_update(self._guarded(self._look))
+        c.scanner.on_update(self._guarded(self._show_scanner))
+        c.scene.on_update(self._guarded(self._change_scene))
         for button, act in (
             (c.optimise, self.searching.begin),
             (c.keep, self._keep),
@@ -173,9 +173,9 @@ class Studio:
             (c.save, lambda: self.saving.save(self._canvas.painted(), self.setting)),
             (c.build, lambda: self.saving.build(self._canvas.painted(), self.setting)),
         ):
-            button.on_click(self._told(act))
+            button.on_click(self._guarded(act))
 
-    def _told(self, act: Callable[[], Any]) -> Callable[[Any], None]:
+    def _guarded(self, act: Callable[[], Any]) -> Callable[[Any], None]:
         """What goes wrong is said on the page."""
 
         @functools.wraps(act)
@@ -183,7 +183,7 @@ class Studio:
             try:
                 act()
             except ScanwrightError as error:
-                self.say(str(error), bad=True)
+                self.show(str(error), bad=True)
 
         return guarded
 
@@ -220,10 +220,10 @@ class Studio:
         self.kept.take(())  # another task asks for other angles
         self._offer_scenes()
         put(self.controls.name, name_of_copy(self._canvas.base))
-        self.painting.wish(self._canvas)
+        self.painting.request(self._canvas)
         self._note()
 
-    def _found(self, optimum: Optimum) -> None:
+    def _use_optimum(self, optimum: Optimum) -> None:
         """Judge by the task whose period was found."""
         self.judge = replace(self.judge, loaded=optimum.loaded, problem=optimum.problem)
         self.kept.rejudge(self.judge)
@@ -235,19 +235,19 @@ class Studio:
         canvas = Canvas(self._canvas.base, dabs)
         canvas.painted()  # refuses what no task could hold
         self._canvas = canvas
-        self.painting.wish(canvas)
+        self.painting.request(canvas)
         self._note(("stroke", stroke) if stroke is not None else None, math.inf)
 
     def _take(self, canvas: Canvas) -> None:
         try:
             judge = Judge.for_task(canvas.painted())
         except ScanwrightError as error:
-            self.say(str(error), bad=True)
+            self.show(str(error), bad=True)
             return
         self.judge = judge
-        self._taken()
+        self._task_changed()
 
-    def _taken(self) -> None:
+    def _task_changed(self) -> None:
         settings = [*standard_settings().values(), self.setting.angles_rad]
         self._highest = max(highest_density(self.judge.problem, angles) for angles in settings)
         self.controls.scale.content = panel_html.scale_html(self._highest)
@@ -256,7 +256,7 @@ class Studio:
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
         count = len(self._canvas.dabs)
         self.controls.painted.content = note_html(f"{count} dabs on the task, {masks} of them hide")
-        self.judging.wish(self.setting)
+        self.judging.request(self.setting)
 
     def _rejudge(self, _: Canvas) -> None:
         """The settings that were kept, by the task as it is now."""
@@ -264,7 +264,7 @@ class Studio:
 
     def _arm(self) -> None:
         """Take the brush in hand, or put it away so that dragging turns the view again."""
-        self.brush.arm(self._told)
+        self.brush.arm(self._guarded)
         if self.controls.painting.value and not self.view.on_sphere:
             put(self.controls.look, "sphere from inside")  # which is what the brush paints on
             self._look()
@@ -273,7 +273,7 @@ class Studio:
         if self.controls.look.value in SIDES:
             self.view.look(self.controls.look.value)
             self.brush.show()
-            self.judging.wish(self.setting)
+            self.judging.request(self.setting)
 
     # Other processes
 
@@ -282,7 +282,7 @@ class Studio:
         loaded, problem = self.judge.loaded, self.judge.problem
         self.workers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
 
-    def _say_making(self, text: str, bad: bool) -> None:
+    def _show_making(self, text: str, bad: bool) -> None:
         self.controls.making.content = note_html(text, bad=bad)
 
     def _show_scanner(self) -> None:

@@ -22,13 +22,13 @@ class Searching:
     def __init__(
         self,
         controls: Controls,
-        say: Callable[..., None],
+        show: Callable[..., None],
         now: Callable[[], tuple[Canvas, Setting]],
-        found: Callable[[Optimum], None],
+        use: Callable[[Optimum], None],
         move: Callable[[Setting, Hashable], None],
     ) -> None:
-        """`say` tells a person, `now` is what is on the page, `found` and `move` get what was found for it."""
-        self._controls, self._say, self._now, self._found, self._move = controls, say, now, found, move
+        """`show` shows a line, `now` is the state of the page, `use` and `move` get the optimum."""
+        self._controls, self._show, self._now, self._use, self._move = controls, show, now, use, move
 
     def begin(self) -> None:
         """Search all angles of the task, and move the sliders to what is found; one search at a time."""
@@ -40,26 +40,26 @@ class Searching:
         Thread(target=self._run, args=(self._now()[0],), name="optimise", daemon=True).start()
 
     def _run(self, canvas: Canvas) -> None:
-        said = 0
+        steps = 0
 
-        def told(line: str) -> None:
-            nonlocal said
-            said += 1
-            put(self._controls.progress, min(100.0 * said / SEARCH_STEPS, 95.0))
-            self._say(line)
+        def progress(step: str, _fraction: float | None = None, /) -> None:
+            nonlocal steps
+            steps += 1
+            put(self._controls.progress, min(100.0 * steps / SEARCH_STEPS, 95.0))
+            self._show(step)
 
         try:
-            optimum = find_optimum(canvas.painted(), told)
+            optimum = find_optimum(canvas.painted(), progress)
             if canvas != self._now()[0]:
                 return
-            self._found(optimum)
+            self._use(optimum)
             step = object()  # both moves are one
             bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
             self._move(bare, step)
-            found = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
+            title = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
             blind = optimum.hole_lines(tabled=False)
             holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
-            self._say(f"{found}: {holes}; which of the equal ones its parts hide least is still looked for")
+            self._show(f"{title}: {holes}; searching the equivalent mount whose parts block the fewest beams")
             with worker_processes() as begin:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
@@ -68,8 +68,8 @@ class Searching:
             seen = as_built(
                 optimum.problem, optimum.loaded.task, setting, chosen.shadow, chosen.family.score, optimum.mounts
             )
-            self._say("; ".join([found, *chosen.lines(), *seen.lines(), holes]))
+            self._show("; ".join([title, *chosen.lines(), *seen.lines(), holes]))
         except ScanwrightError as error:
-            self._say(str(error), bad=True)
+            self._show(str(error), bad=True)
         finally:
             self._controls.optimise.disabled, self._controls.progress.visible = False, False

@@ -1,40 +1,40 @@
-"""One sitting at the studio: its page is served until nobody has looked at it for some minutes."""
+"""The server of the studio: its page ends some minutes after the last visitor."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
 from pathlib import Path
 
+from scanwright.design.progress import Progress
 from scanwright.design.task.task import LoadedTask
 from scanwright.serving.page_server import guarded_server, wait_until_alone
 from scanwright.studio.page import Studio
 
-ALONE_S = 300.0
+_LOG = logging.getLogger(__name__)
+ALONE_S = 300.0  # without a visitor; a browser that restarts returns sooner
 
 
-def run_studio(loaded: LoadedTask, *, port: int, out: Path, say: Callable[[str], None]) -> None:
-    """Serve the studio of a task, and print its address.
-
-    Task files are saved to the folder that this was started in.
+def run_studio(loaded: LoadedTask, *, port: int, out: Path, progress: Progress) -> None:
+    """Serve the studio of a task, and print its address; task files are saved to the working folder.
 
     Args:
-        loaded: the task that is opened first.
-        port: of 127.0.0.1; 0 is any that is free.
-        out: folder that holds the builds.
-        say: is told of progress, and at the end what was refused.
+        loaded: first task.
+        port: of 127.0.0.1; 0 chooses a free one.
+        out: parent of the build folders.
+        progress: progress callback.
 
     Raises:
         TaskError: the port is taken, or the task has no region.
     """
     with guarded_server(f"Scanwright: {loaded.task.name}", port) as (server, gate):
-        say("reading the task (the first run compiles the numerics: some 5 s)")
+        progress("reading the task (first run: compiling, about 5 s)")
         studio = Studio(server, loaded, Path.cwd(), out)
         try:
             print(f"open {gate.address}", flush=True)
             studio.searching.begin()
-            print(f"Ctrl-C ends it; without a visitor it ends by itself after {ALONE_S / 60:g} minutes", flush=True)
+            print(f"press Ctrl-C to end; without a visitor the studio ends after {ALONE_S / 60:g} minutes", flush=True)
             wait_until_alone(gate, ALONE_S)
         finally:
             studio.close()
         for why, count in gate.refused.items():
-            say(f"refused {count:,}: {why}")
+            _LOG.warning("refused %d requests: %s", count, why)

@@ -23,7 +23,7 @@ BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0
 """Of the mounting angles: what a task file may say."""
 MOST_DABS = 60
 """Beyond it J takes its time: every edge of a region is a break of its quadrature."""
-DECIMALS = 4
+DECIMALS = 4  # of an axis in the task file: 0.006 deg
 
 Brush = Literal["matters", "does not matter", "hidden"]
 
@@ -45,11 +45,12 @@ class Setting:
         Raises:
             ValueError: they are not four finite numbers.
         """
-        given = np.array([float(angle) for angle in angles_deg])
-        if given.shape != (4,) or not np.isfinite(given).all():
-            raise ValueError(f"{given.tolist()}: not four finite angles")
+        angles = np.array([float(angle) for angle in angles_deg])
+        if angles.shape != (4,) or not np.isfinite(angles).all():
+            raise ValueError(f"{angles.tolist()}: not four finite angles")
         alpha_rot, beta_rot, alpha_laser, beta_laser = (
-            round(float(np.clip(angle, -bound, bound)), 2) + 0.0 for angle, bound in zip(given, BOUNDS_DEG, strict=True)
+            round(float(np.clip(angle, -bound, bound)), 2) + 0.0
+            for angle, bound in zip(angles, BOUNDS_DEG, strict=True)
         )
         return cls((alpha_rot, beta_rot, alpha_laser, beta_laser))
 
@@ -119,7 +120,7 @@ def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
         TaskError: there are more than `MOST_DABS`, or a dab is none that a task file could hold.
     """
     if len(dabs) > MOST_DABS:
-        raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; take a wider brush, or draw a map")
+        raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; use a wider brush, or a map")
     task = loaded.task
     try:
         weights: tuple[Region, ...] = tuple(dab.cone() for dab in dabs if dab.brush != "hidden")

@@ -52,12 +52,12 @@ def save_task(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None
     text = task_text(loaded, folder, name, fixed)  # refuses a name that leads elsewhere
     path = folder / f"{name}.toml"
     if path.is_symlink():
-        raise TaskError(f"{path}: a link that leads elsewhere: take another name")
+        raise TaskError(f"{path}: is a symbolic link; choose another name")
     try:
         with path.open("w" if overwrite else "x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise TaskError(f"{path}: exists; tick 'overwrite', or take another name") from error
+        raise TaskError(f"{path}: exists; tick 'overwrite', or choose another name") from error
     except OSError as error:
         raise TaskError(f"{path}: cannot be written: {error.strerror}") from error
     load_task(path)

@@ -1,1 +1,1 @@
-"""From one scanner to a fleet: a study crosses tasks and products, and answers with what they trade for each other."""
+"""Studies: combine tasks with products, and rank the candidates by their trade-offs."""

@@ -1,4 +1,4 @@
-"""One candidate with its parts: its best setting that can be built, and all that decides about it.
+"""One candidate with its parts: its best mount that can be built, and its columns.
 
 From its solids: what they hide, weigh, bear, bend and cost.
 """
@@ -21,6 +21,7 @@ from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.self_check import require_counted
+from scanwright.design.progress import no_progress
 from scanwright.design.scanner import Scanner
 from scanwright.design.search.families import Family
 from scanwright.design.search.optimum import angle_set
@@ -34,7 +35,7 @@ from scanwright.study.results import Result
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
-    from scanwright.cad.checks.check import Check
+    from scanwright.design.findings import Finding
 
 LOADS = ("static_torque", "spin_up_torque", "tilt_moment", "axial_load", "bearing_load")
 BENDS = "deflection"  # of linkage and shaft, by finite elements
@@ -42,7 +43,7 @@ BENDS = "deflection"  # of linkage and shaft, by finite elements
 
 @dataclass(frozen=True, slots=True)
 class BuiltSetting:
-    """What the parts of a setting come to.
+    """The parts of a mount in numbers.
 
     Attributes:
         shadow: what they hide.
@@ -57,7 +58,7 @@ class BuiltSetting:
 
 @dataclass(frozen=True, slots=True)
 class PartsBench:
-    """A `Workshop` of one set of products: makes the parts of a setting once, and refuses it where a check fails."""
+    """A `Workshop` of one set of products: makes the parts of a mount once, and rejects it if a check fails."""
 
     scanner: Scanner
     _made: dict[tuple[float, ...], BuiltSetting | Refused] = field(default_factory=dict)
@@ -67,35 +68,35 @@ class PartsBench:
         return PartsWorkshop(self.scanner).bound(setting_rad)
 
     def shadow(self, setting_rad: Array) -> SelfOcclusion | Refused:
-        """See `Workshop`; refused as well where clearance, loads, walls or beams fail."""
+        """See `Workshop`; also rejects a mount whose clearance, loads, walls or beams fail."""
         made = self.made(setting_rad)
         return made if isinstance(made, Refused) else made.shadow
 
     def made(self, setting_rad: Array) -> BuiltSetting | Refused:
-        """The parts of a setting, or why there can be none."""
+        """Return the parts of a mount, or why it cannot be built."""
         key = tuple(round(math.degrees(angle), 2) for angle in setting_rad)
         if key not in self._made:
             self._made[key] = _made(at_setting(self.scanner, setting_rad))
         return self._made[key]
 
 
-def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
-    """The best setting of a candidate that can be built, and everything that decides.
+def judge_candidate(loaded: LoadedTask, searched: Result) -> Result:
+    """Return the best mount of a candidate that can be built, with its columns.
 
     Args:
         loaded: the candidate's task.
-        found: `search_candidate` of its search record.
+        searched: `search_candidate` of its search record.
 
     Raises:
         InstallError: the CAD kernel is not there.
     """
     require_kernel("study")
-    families = tuple(_family(entry) for entry in found["families"])
-    loaded = with_motion(loaded, found)
+    families = tuple(_family(entry) for entry in searched["families"])
+    loaded = with_motion(loaded, searched)
     try:
         problem = problem_of(loaded)
         bench = PartsBench(loaded.scanner(angle_set(loaded, families[0])))
-        chosen = choose_with_parts(problem, families, loaded.task.angles, loaded.task.limits, bench, lambda _: None)
+        chosen = choose_with_parts(problem, families, loaded.task.angles, loaded.task.limits, bench, no_progress)
     except (TaskError, BuildError) as error:
         return {"status": "refused", "reason": why(error, loaded)}
     setting, score = chosen.family.angles_rad, chosen.family.score
@@ -105,7 +106,7 @@ def judge_candidate(loaded: LoadedTask, found: Result) -> Result:
     seen = seen_of(problem, setting, score, made.shadow)
     values = {
         "J": score.J,
-        "density_gain": density_gain(problem, found["reference_J"], score.J),
+        "density_gain": density_gain(problem, searched["reference_J"], score.J),
         **of_lidar(loaded.lidar),
         **per_ball(beams_per_ball(problem.objective, score.J), made.values["cost_usd"]),
         "blind_fraction": seen.blind_fraction,
@@ -137,7 +138,7 @@ def _family(entry: dict[str, Any]) -> Family:
 
 
 def _shortest(problem: Problem, loaded: LoadedTask, family: Family) -> float | None:
-    """See `COLUMNS`; None where not even the row's own period brings so many."""
+    """Return the column of `COLUMNS`; None if even the row's own period is too short."""
     least = int(np.ceil(loaded.task.limits.min_density or 1))
     if loaded.task.motion.mode != "spin" or family.score.least < least:
         return None
@@ -153,27 +154,27 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
 
     try:
         assembly = make_parts(scanner)
-        checks, shadow = run_checks(scanner, assembly, lambda _: None)
+        checks, shadow = run_checks(scanner, assembly, no_progress)
     except BuildError as error:
         return Refused(str(error))
     failed = [check.message for check in checks if check.severity == "error"]
     return Refused(failed[0]) if failed else _weighed(scanner, assembly, checks, shadow)
 
 
-def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Check], shadow: SelfOcclusion) -> BuiltSetting:
+def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Finding], shadow: SelfOcclusion) -> BuiltSetting:
     from scanwright.cad.assembly.masses import link_bodies
 
     margins = {
-        check.kind: check.limit / check.value
+        check.code: check.limit / check.value
         for check in checks
-        if check.kind in LOADS and check.limit is not None and check.value
+        if check.code in LOADS and check.limit is not None and check.value
     }
     weakest = min(margins, key=lambda kind: margins[kind], default="")
     ring = () if scanner.slip_ring is None else (scanner.slip_ring,)
     values = {
         "mass_g": 1000 * sum(body.mass_kg for body in link_bodies(scanner, assembly).values()),
         "load_margin": margins.get(weakest),
-        "deflection_deg": next((check.value for check in checks if check.kind == BENDS), None),
+        "deflection_deg": next((check.value for check in checks if check.code == BENDS), None),
         "cost_usd": price_usd([scanner.lidar, scanner.servo, *ring, *assembly.layout.drive.products]),
     }
     return BuiltSetting(shadow, values, weakest)

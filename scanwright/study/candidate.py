@@ -1,4 +1,4 @@
-"""One candidate before it is made: its record, the search of its angles, and what no setting of it can be better than.
+"""One candidate before its parts: its record, the search of its angles, and bounds of its columns.
 
 What a search finds does not depend on servo, slip ring and printer, so candidates that differ in these share one.
 """
@@ -19,6 +19,7 @@ from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import Problem
+from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.front import six_digits
@@ -32,16 +33,16 @@ Bought = Lidar | Servo | SlipRing | Bearing | Belt
 
 
 def search_record(loaded: LoadedTask) -> LoadedTask:
-    """The part of a candidate's record that its search depends on."""
+    """Return the part of a candidate's record that its search depends on."""
     task = loaded.task
     limits = task.limits.model_copy(update={"max_blocked": None})
-    nobody = {"name": ANYBODY, "servo": "", "slip_ring": None, "printer": "", "limits": limits}
+    anonymous = {"name": ANYBODY, "servo": "", "slip_ring": None, "printer": "", "limits": limits}
     products = Catalogue({task.sensor: loaded.products.products[task.sensor]})
-    return replace(loaded, task=task.model_copy(update=nobody), products=products)
+    return replace(loaded, task=task.model_copy(update=anonymous), products=products)
 
 
 def record_digest(loaded: LoadedTask) -> str:
-    """Of all that decides the result of a record, bearings and belts included, and the name not."""
+    """Return the digest of everything that affects the result of a record, including bearings and belts."""
     nameless = replace(loaded, task=loaded.task.model_copy(update={"name": ANYBODY}))
     choice: tuple[Product, ...] = (*loaded.products.bearings(), *loaded.products.belts())
     chosen_from = "\n".join(product.model_dump_json() for product in choice)
@@ -49,14 +50,14 @@ def record_digest(loaded: LoadedTask) -> str:
 
 
 def addresses(loaded: LoadedTask) -> tuple[str, str]:
-    """Where the search and the result of a candidate are kept."""
+    """Return the addresses of the search and of the result of a candidate."""
     return address("search", record_digest(search_record(loaded))), address("candidate", record_digest(loaded))
 
 
 def search_candidate(loaded: LoadedTask) -> Result:
-    """Families of settings of a search record, its period, and what no setting with parts can be better than."""
+    """Search a record: groups of mounts, period, and bounds for mounts with parts."""
     try:
-        optimum = find_optimum(loaded, lambda _: None)
+        optimum = find_optimum(loaded, no_progress)
     except TaskError as error:
         return {"status": "refused", "reason": why(error, loaded)}
     reference_J = min(mount.score.J for mount in optimum.mounts)
@@ -70,7 +71,7 @@ def search_candidate(loaded: LoadedTask) -> Result:
 
 
 def _bounds(optimum: Optimum, reference_J: float) -> dict[str, float | None]:
-    """Over all families: hiding beams lets no column get better than the best of them, but within its error."""
+    """Return bounds over all groups: blocked beams improve no column beyond the best of them."""
     families, problem = optimum.search.best, optimum.problem
     J = min(f.score.J for f in families) if problem.objective.name in BOUNDED else -np.inf
     return {
@@ -84,8 +85,8 @@ def _bounds(optimum: Optimum, reference_J: float) -> dict[str, float | None]:
     }
 
 
-def bounds_of(loaded: LoadedTask, found: Result) -> dict[str, float | None]:
-    """What no setting of a candidate can be better than, before anything is made; `found` by its search."""
+def bounds_of(loaded: LoadedTask, searched: Result) -> dict[str, float | None]:
+    """Return the bounds of a candidate's columns before its parts are made."""
     bought: list[Lidar | Servo | SlipRing] = [loaded.lidar, loaded.servo]
     if loaded.task.slip_ring is not None:
         bought.append(loaded.products.get(loaded.task.slip_ring, SlipRing))
@@ -94,43 +95,43 @@ def bounds_of(loaded: LoadedTask, found: Result) -> dict[str, float | None]:
         "mass_g": sum(product.mass_g for product in bought),
         "cost_usd": price,
         **of_lidar(loaded.lidar),
-        **per_ball(found["bounds"]["beams_per_ball"], price),
+        **per_ball(searched["bounds"]["beams_per_ball"], price),
     }
-    return {name: six_digits(value) for name, value in {**PARTS_DECIDE, **found["bounds"], **known}.items()}
+    return {name: six_digits(value) for name, value in {**PARTS_DECIDE, **searched["bounds"], **known}.items()}
 
 
 def of_lidar(lidar: Lidar) -> dict[str, float | None]:
-    """Columns that the lidar alone decides."""
+    """Return the columns that depend on the lidar alone."""
     return {"range_m": lidar.stated_range_m, "range_sigma_mm": lidar.range_sigma_mm}
 
 
 def per_ball(beams: float | None, cost_usd: float | None) -> dict[str, float | None]:
-    """Beams per ball, and the same per dollar; None where the objective is no logarithm or a price is not known."""
+    """Return beams per ball, and per dollar; None if the objective is not `log` or a price is unknown."""
     each = None if beams is None or cost_usd is None else beams / cost_usd
     return {"beams_per_ball": beams, "beams_per_ball_per_usd": each}
 
 
 def density_gain(problem: Problem, reference_J: float, J: float) -> float | None:
-    """Times the beams per ball of the best reference mount: differences of the logarithm are ratios."""
+    """Return the ratio of beams per ball to the best reference mount, from the difference of logarithms."""
     return exp(reference_J - J) if problem.objective.name == "log" else None
 
 
 def price_usd(products: Iterable[Bought]) -> float | None:
-    """Of all of them; None where the price of one is not known."""
+    """Return the sum of the prices; None if one is unknown."""
     prices = [product.price_usd for product in products]
     known = [price for price in prices if price is not None]
     return sum(known) if len(known) == len(prices) else None
 
 
-def with_motion(loaded: LoadedTask, found: Result) -> LoadedTask:
-    """The candidate with the motion that its search has found."""
-    table = loaded.task.model_dump(exclude_none=True) | {"motion": found["motion"]}
+def with_motion(loaded: LoadedTask, searched: Result) -> LoadedTask:
+    """Return the candidate with the motion that its search chose."""
+    table = loaded.task.model_dump(exclude_none=True) | {"motion": searched["motion"]}
     return replace(loaded, task=Task.model_validate(table))
 
 
-def winner_task(loaded: LoadedTask, found: Result, built: Result) -> LoadedTask:
-    """The task that builds just the setting that a candidate won with."""
-    moving = with_motion(loaded, found)
+def winner_task(loaded: LoadedTask, searched: Result, built: Result) -> LoadedTask:
+    """Return the task that builds the mount of a winner."""
+    moving = with_motion(loaded, searched)
     names = ("alpha_rot_deg", "beta_rot_deg", "alpha_laser_deg", "beta_laser_deg")
     fixed = dict(zip(names, built["angles_deg"], strict=True))
     angles = moving.task.angles.model_copy(update=fixed)
@@ -138,5 +139,5 @@ def winner_task(loaded: LoadedTask, found: Result, built: Result) -> LoadedTask:
 
 
 def why(error: ScanwrightError, loaded: LoadedTask) -> str:
-    """What an error says, without the file that the task came from."""
+    """Return the message of an error without the file of the task."""
     return str(error).removeprefix(f"{loaded.source}: ")

@@ -1,4 +1,4 @@
-"""All combinations of a study, one task record each, made when they are asked for: there may be millions."""
+"""All combinations of a study, one task record each, made on demand: there may be millions."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Crossing:
 
     @property
     def axes(self) -> dict[str, tuple[Any, ...]]:
-        """What each axis offers; (None,) leaves the task as it is."""
+        """Return the values of each axis; (None,) keeps the value of the task."""
         study = self.loaded.study
         lists: tuple[tuple[Any, ...], ...] = (
             self.loaded.tasks,
@@ -98,12 +98,12 @@ class Crossing:
         return self.loaded.products.products if self.loaded.study.catalogue else {}
 
     def _own_files(self) -> tuple[str, ...]:
-        """The catalogue files of the study, as a task names them that may lie anywhere."""
+        """Return the absolute paths of the catalogue files of the study."""
         return tuple(str((self.loaded.source.parent / file).resolve()) for file in self.loaded.study.catalogue)
 
 
 def _merged(task: Task, chosen: dict[str, Any], name: str, catalogue: tuple[str, ...]) -> Task:
-    """The task with what a combination puts in place of its own.
+    """Return the task with the values of a combination.
 
     Raises:
         ValidationError: the result is no task.
@@ -130,13 +130,13 @@ def _with_period(motion: dict[str, Any], period: float | str) -> dict[str, Any]:
         raise TaskError(f"periods_s: {period}: a motion of mode 'stop_and_go' has no period")
     if motion["mode"] == "sweep":
         if period == "shortest":
-            raise TaskError("periods_s: 'shortest' is found for motion.mode = 'spin' only, this task sweeps")
+            raise TaskError("periods_s: 'shortest' requires motion.mode = 'spin', this task sweeps")
         return motion | {"period_s": period}
     return {"mode": "shortest"} if period == "shortest" else {"mode": "spin", "period_s": period}
 
 
 def _trimmed(loaded: LoadedTask) -> LoadedTask:
-    """With no products but its own, the bearings and the belts: it goes over the wire."""
+    """Return the task with its own products, bearings and belts only, to be sent to a worker."""
     task = loaded.task
     names = [task.sensor, task.servo, task.slip_ring, task.printer]
     names += [product.name for product in (*loaded.products.bearings(), *loaded.products.belts())]
@@ -154,7 +154,7 @@ def _word(value: Any) -> str:
 
 
 def _named(words: list[str]) -> str:
-    """A name for files: the words, their end replaced by a digest where they get too long."""
+    """Return a file name of the words; a digest replaces its end if it is too long."""
     name = re.sub(r"[^A-Za-z0-9_-]+", "-", "-".join(filter(None, words)))
     if len(name) <= LONGEST_NAME:
         return name

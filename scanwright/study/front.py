@@ -1,4 +1,4 @@
-"""What candidates are judged by, and which of them nothing beats."""
+"""Columns of candidates, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scanwright.design.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One number of a row. `better` tells which end wins."""
+    """One number of a row; `better` is the end that wins."""
 
     name: str
     better: Literal["low", "high"]
@@ -44,12 +44,12 @@ COLUMNS = {
 
 
 def six_digits(value: float | None) -> float | None:
-    """The last bits depend on the machine and are no measurement."""
+    """Round to six digits: the last bits depend on the machine."""
     return None if value is None else float(f"{value:.6g}") + 0.0
 
 
 def costs(values: dict[str, float | None], names: Iterable[str]) -> Array:
-    """Values of columns turned so that lower is better; what is not known is worst, shape (columns,)."""
+    """Return values of columns, negated if higher is better; unknown ones are infinite, shape (columns,)."""
     return np.array([_cost(values.get(name), name) for name in names])
 
 
@@ -61,7 +61,7 @@ def _cost(value: float | None, name: str) -> float:
 
 @dataclass(slots=True)
 class Front:
-    """Rows that nothing beats, of those shown so far; the same ones whatever the order they come in.
+    """Rows that no other row beats, independent of their order.
 
     Attributes:
         costs: lower is better, shape (rows, columns).
@@ -76,7 +76,7 @@ class Front:
         self.costs, self.numbers = np.empty((0, self.columns)), np.empty(0, np.intp)
 
     def add(self, number: int, cost: Array) -> bool:
-        """Show a row; whether it is on the front. Equal rows stand side by side, the same row but once."""
+        """Add a row, and return whether it is on the front. Equal rows are kept, the same row once."""
         if number in self.numbers or self.beater(cost) is not None:
             return False
         stays = ~dominators(-self.costs, -cost)
@@ -85,6 +85,6 @@ class Front:
         return True
 
     def beater(self, cost: Array) -> int | None:
-        """The lowest number of a row that beats a cost, or the bound of one; None where none does."""
+        """Return the lowest number of a row that beats a cost; None if none does."""
         beats = dominators(self.costs, cost)
         return int(self.numbers[beats].min()) if beats.any() else None

@@ -1,4 +1,4 @@
-"""`front.png`: what is traded for what, a row of panels for each task."""
+"""`front.png`: trade-offs between columns, a row of panels for each task."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 from scanwright.study.front import COLUMNS
 
-DPI = 110
+DPI = 110  # readable at its own size on a screen
 MOST = 20_000  # rows that a picture shows; more are a blot
 NAMED = 12  # members of a front that get their name
 
 
 def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -> int:
-    """Draw the first column of the front against each other one, from `study.csv`; how many rows were left out.
+    """Draw the first column of the front against each other one; returns the number of rows not drawn.
 
     Args:
         path: PNG to write; an SVG comes beside it.
@@ -53,7 +53,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
 
 
 def _panel(ax: Any, rows: list[dict[str, str]], across: str, up: str) -> None:
-    """One panel; rows without one of the two values are counted in its corner."""
+    """Draw one panel; its corner shows the number of rows without a value."""
     known = [row for row in rows if row[across] and row[up]]
     for status, colour, size, label in (("built", "#9aa5b1", 22, "built"), ("front", "#c8102e", 46, "front")):
         chosen = [row for row in known if row["status"] == status]
@@ -77,7 +77,7 @@ def _panel(ax: Any, rows: list[dict[str, str]], across: str, up: str) -> None:
 
 
 def _by_place(rows: Iterable[dict[str, str]], across: str, up: str) -> dict[tuple[float, float], str]:
-    """Names of the front's members, those at one place together."""
+    """Return the names of the rows on the front by position."""
     places: dict[tuple[float, float], list[str]] = {}
     for row in rows:
         if row["status"] == "front":

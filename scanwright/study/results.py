@@ -1,4 +1,4 @@
-"""The results folder: one file for each result, under the digest of its record and of the program that made it.
+"""The results folder: one file per result, named by the digest of its record and of the program.
 
 So none is ever computed twice. It may be shared: then workers read and write it themselves, and what they finish stays
 even if everybody else dies.
@@ -26,32 +26,32 @@ Result = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """A results folder, and the mark that tells whether a worker sees the same one."""
+    """A results folder, and the mark by which a worker recognises it."""
 
     folder: Path
     mark: str
 
     def get(self, address: str) -> Result | None:
-        """A result; None where there is none."""
+        """Return a result; None if there is none."""
         try:
-            found: Result = json.loads(self._path(address).read_text(encoding="utf-8"))
+            result: Result = json.loads(self._path(address).read_text(encoding="utf-8"))
         except (FileNotFoundError, json.JSONDecodeError):  # a file system may have lost its end
             return None
-        return found
+        return result
 
     def has(self, address: str) -> bool:
-        """Whether there is a result."""
+        """Return whether there is a result."""
         return self._path(address).exists()
 
     def put(self, address: str, result: Result) -> None:
-        """Keep a result: whole or not at all, whatever ends the program."""
+        """Store a result atomically."""
         path = place_in(self.folder, f"{address[:2]}/{address}.json", BuildError)
         path.parent.mkdir(exist_ok=True)
         with atomic_write(path, BuildError) as part:
             part.write_text(json.dumps(result), encoding="utf-8")
 
     def is_here(self) -> bool:
-        """Whether this process sees the folder of the client: another computer may have one of that name."""
+        """Return whether this process sees the client's folder, not another one of the same name."""
         try:
             return bool(json.loads((self.folder / MARK).read_text())["mark"] == self.mark)
         except (OSError, ValueError, KeyError):
@@ -62,7 +62,7 @@ class Results:
 
 
 def open_results(folder: Path) -> Results:
-    """The results folder, made if need be.
+    """Open the results folder, and create it if it does not exist.
 
     Raises:
         BuildError: it cannot be written.
@@ -76,16 +76,16 @@ def open_results(folder: Path) -> Results:
     except OSError as error:
         raise BuildError(f"{folder}: cannot write the results folder: {error.strerror}") from error
     except (ValueError, KeyError) as error:
-        raise BuildError(f"{path}: not the mark of a results folder: remove it, or take another folder") from error
+        raise BuildError(f"{path}: not the mark of a results folder: remove it, or choose another folder") from error
 
 
 @cache
 def program() -> dict[str, str]:
-    """Versions of everything that a result comes from, and a digest of our own code: a checkout may be ahead of it."""
+    """Return the versions that results depend on, and the digest of our own code."""
     return {"python": platform.python_version(), **versions(), "code": code_digest()}
 
 
 def address(kind: str, digest: str) -> str:
-    """Where the result of a record is kept: a digest of the record and of the program, 64 hex digits."""
+    """Return the address of a result: digest of its record and of the program, 64 hex digits."""
     made_by = "\n".join(f"{name} {value}" for name, value in sorted(program().items()))
     return hashlib.sha256(f"{kind}\n{digest}\n{made_by}".encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""A study from first to last: search, bound, judge what no bound rules out, and tell every candidate's fate.
+"""A run of a study: search, bound, make the candidates that no bound excludes, and report each one's status.
 
 The answer does not depend on who finished first. A candidate is left out where its bound is beaten by a finished one;
 what beats it is itself on the final front, or beaten by one that is. So a candidate counts as `dominated` where the
@@ -7,6 +7,7 @@ final front beats its bound, also if it happened to be made before that was know
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -14,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from scanwright.cad.checks.check import failure_lines
+from scanwright.cad.checks.checks_json import failure_lines
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 from scanwright.design.files.atomic_file import place_in
+from scanwright.design.progress import Progress
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.build import build_task
@@ -32,7 +34,7 @@ from scanwright.study.table import Row, write_answer
 from scanwright.study.units import Crew, Finished, Unit, finished
 from scanwright.study.workers import crew_of
 
-Say = Callable[[str], None]
+_REPORTED_S = 1.0  # a person reads no faster
 
 
 def run_study(
@@ -41,9 +43,9 @@ def run_study(
     results: Path | None,
     scheduler: str | None,
     processes: int | None,
-    say: Say,
+    progress: Progress,
 ) -> Iterator[str]:
-    """Do what is not yet done of a study, write its tables, and build its winners; yields what it came to, in lines.
+    """Run the rest of a study, write its tables, and build its winners; yields the results as lines.
 
     Args:
         study: file, or name of a shipped study.
@@ -51,7 +53,7 @@ def run_study(
         results: folder of results, shared with the workers or not; OUT/results if not told.
         scheduler: address of a running Dask scheduler; None for processes of this computer.
         processes: of this computer; one for each core if not told.
-        say: takes progress.
+        progress: progress callback.
 
     Raises:
         InstallError: the CAD kernel, or Dask for a scheduler, is not there.
@@ -63,13 +65,13 @@ def run_study(
     folder = out or Path("out") / crossing.loaded.study.name
     run = StudyRun(crossing, open_results(results or place_in(folder, "results", BuildError)))
     with crew_of(scheduler, processes) as crew:
-        run.work(crew, say)
+        run.work(crew, progress)
     yield from write_answer(crossing.loaded.study, run.rows(), folder)
     yield run.tally.line()
     for combination, loaded in run.winners():
         target = place_in(folder, combination.name, BuildError)
-        built = build_task(loaded, target, say)
-        yield f"built {target}" if built.made else f"{target}: nothing has changed, no work to do"
+        built = build_task(loaded, target, progress)
+        yield f"built {target}" if built.made else f"{target} is up to date"
         yield from (f"{target}: {line}" for line in failure_lines(built.checks))
     if (folder / "study.parquet").exists():
         yield f"wrote study.csv, study.parquet and front.png to {folder}"
@@ -79,7 +81,7 @@ def run_study(
 
 @dataclass(slots=True)
 class Tally:
-    """What was done in one run, and what it was worth."""
+    """The work of one run, and its cost."""
 
     searches: int = 0
     judged: int = 0
@@ -89,7 +91,7 @@ class Tally:
     memory_mb: float = 0.0
 
     def line(self) -> str:
-        """For a person."""
+        """Return the tally as one line."""
         worked = f", {self.seconds:,.0f} s of work, {self.memory_mb:,.0f} MB the most of a worker"
         return (
             f"this run: {self.searches:,} searches, {self.judged:,} candidates made, {self.looked_up:,} looked up, "
@@ -99,7 +101,7 @@ class Tally:
 
 @dataclass(slots=True)
 class StudyRun:
-    """A study at work.
+    """A running study.
 
     Attributes:
         crossing: its candidates.
@@ -125,15 +127,15 @@ class StudyRun:
         self.fronts = [Front(columns) for _ in self.crossing.loaded.tasks]
         self._bounds = np.full((len(self.crossing), columns), np.nan)
 
-    def work(self, crew: Crew, say: Say) -> None:
-        """Do what is not yet done."""
+    def work(self, crew: Crew, progress: Progress) -> None:
+        """Do the remaining work."""
         limit_s = self.crossing.loaded.study.time_limit_s
-        watch = _Watch("searches", len(self.crossing), say)
-        for ended in finished(crew, self._searches(watch), self.results, limit_s, watch.tell):
+        watch = _Watch("searches", len(self.crossing), progress)
+        for ended in finished(crew, self._searches(watch), self.results, limit_s, watch.report):
             self.tally.searches += self._end(ended, watch)
         self._bound()
-        watch = _Watch("candidates", int((~np.isnan(self._bounds[:, 0])).sum()), say)
-        for ended in finished(crew, self._candidates(watch), self.results, limit_s, watch.tell):
+        watch = _Watch("candidates", int((~np.isnan(self._bounds[:, 0])).sum()), progress)
+        for ended in finished(crew, self._candidates(watch), self.results, limit_s, watch.report):
             numbers = self._at_work[ended.unit.address]
             worked = self._end(ended, watch)
             self.tally.judged += worked
@@ -141,24 +143,24 @@ class StudyRun:
                 self.tally.looked_up += len(numbers) - worked
                 for number in numbers:
                     self._enter(number, ended.done.result)
-        watch.tell()
+        watch.report()
 
     def rows(self) -> Iterator[Row]:
-        """The fate of every candidate, in the order of the study."""
+        """Yield the row of every candidate in the order of the study."""
         for combination in self.crossing:
             yield self._row(combination)
 
     def winners(self) -> list[tuple[Combination, LoadedTask]]:
-        """What is to be built: of each task the first of its front, by its columns, as tasks of one setting."""
+        """Return the winners of each task, by the columns of its front, as tasks with one mount."""
         winners = []
         for front in self.fronts:
             order = np.lexsort((front.numbers, *front.costs.T[::-1]))
             for number in map(int, front.numbers[order][: self.crossing.loaded.study.winners]):
                 combination = self.crossing[number]
                 assert combination.loaded is not None
-                found, built = (self.results.get(at) for at in addresses(combination.loaded))
-                assert found is not None and built is not None
-                winners.append((combination, winner_task(combination.loaded, found, built)))
+                searched, built = (self.results.get(at) for at in addresses(combination.loaded))
+                assert searched is not None and built is not None
+                winners.append((combination, winner_task(combination.loaded, searched, built)))
         return winners
 
     def _searches(self, watch: _Watch) -> Iterator[Unit]:
@@ -172,7 +174,7 @@ class StudyRun:
             watch.count()
 
     def _candidates(self, watch: _Watch) -> Iterator[Unit]:
-        """Those first that are likely to beat others; those that what is finished beats are left out."""
+        """Yield candidates, the most promising first; skips those that a finished one beats."""
         todo = np.flatnonzero(~np.isnan(self._bounds[:, 0]))
         for number in map(int, todo[np.argsort(_mean_rank(self._bounds[todo]), kind="stable")]):
             combination = self.crossing[number]
@@ -189,15 +191,15 @@ class StudyRun:
             watch.count()
 
     def _bound(self) -> None:
-        """What no candidate can be better than, NaN where there is nothing to make; enters what was made before."""
+        """Compute the bounds of all candidates, NaN if there is nothing to make; enters earlier results."""
         names = self.crossing.loaded.study.front
         for combination in self.crossing:
             if combination.loaded is None:
                 continue
             search, at = addresses(combination.loaded)
-            found = self.results.get(search)
-            if found is not None and found["status"] == "found":
-                self._bounds[combination.number] = costs(bounds_of(combination.loaded, found), names)
+            searched = self.results.get(search)
+            if searched is not None and searched["status"] == "found":
+                self._bounds[combination.number] = costs(bounds_of(combination.loaded, searched), names)
                 self._enter(combination.number, self.results.get(at))
 
     def _enter(self, number: int, result: Result | None) -> None:
@@ -205,11 +207,11 @@ class StudyRun:
             self.fronts[self.crossing[number].group].add(number, self._cost(number, result))
 
     def _cost(self, number: int, result: Result) -> Array:
-        """Of a finished candidate; never below its bound, not even within the error of its numbers."""
+        """Return the cost of a finished candidate, at least its bound."""
         return np.maximum(costs(result["values"], self.crossing.loaded.study.front), self._bounds[number])
 
     def _end(self, ended: Finished, watch: _Watch) -> bool:
-        """Count a unit that is over; whether a worker has done it in this run."""
+        """Count a finished unit, and return whether a worker computed it in this run."""
         del self._at_work[ended.unit.address]
         seconds = None
         if ended.done is None:
@@ -218,7 +220,7 @@ class StudyRun:
             seconds = ended.done.seconds
             self.tally.seconds += seconds or 0.0
             self.tally.memory_mb = max(self.tally.memory_mb, ended.done.memory_mb)
-        watch.count(timed=seconds is not None)
+        watch.count()
         return seconds is not None
 
     def _row(self, combination: Combination) -> Row:
@@ -229,11 +231,11 @@ class StudyRun:
         row |= {"sensor": loaded.task.sensor, "servo": loaded.task.servo, "printer": loaded.task.printer}
         row |= {"slip_ring": loaded.task.slip_ring or ""}
         search, at = addresses(loaded)
-        found = self.results.get(search)
-        if found is None:
+        searched = self.results.get(search)
+        if searched is None:
             return row | {"status": "failed", "reason": self._failures.get(search, "not searched")}
-        if found["status"] != "found":
-            return row | {"status": "refused", "reason": found["reason"]}
+        if searched["status"] != "found":
+            return row | {"status": "refused", "reason": searched["reason"]}
         front = self.fronts[combination.group]
         beater = front.beater(self._bounds[combination.number])
         if beater is not None:
@@ -248,11 +250,11 @@ class StudyRun:
         beater = front.beater(self._cost(combination.number, result))
         if beater is None:
             return row | {"status": "front", "reason": ""}
-        return row | {"status": "built", "reason": f"{self.crossing[beater].name} is as good or better in every way"}
+        return row | {"status": "built", "reason": f"{self.crossing[beater].name} is as good or better in every column"}
 
 
 def _mean_rank(bounds: Array) -> Array:
-    """Mean over the columns of the share of candidates that are better there, shape (candidates,)."""
+    """Return the mean rank over the columns, 0 to 1, shape (candidates,)."""
     shares = np.zeros(len(bounds))
     for column in bounds.T:
         _, ranks = np.unique(column, return_inverse=True)
@@ -262,34 +264,22 @@ def _mean_rank(bounds: Array) -> Array:
 
 @dataclass(slots=True)
 class _Watch:
-    """Progress of one stage, told at most once a second, with an estimate of what is left."""
+    """Progress of one stage, reported at most once a second."""
 
     what: str
     total: int
-    say: Say
+    progress: Progress
     over: int = 0
-    timed: int = 0
-    start: float = field(default_factory=time.monotonic)
-    told: float = 0.0
+    reported_s: float = -math.inf
 
-    def count(self, timed: bool = False) -> None:
+    def count(self) -> None:
         self.over += 1
-        self.timed += timed
-        if time.monotonic() - self.told > 1.0:
-            self.tell()
+        if time.monotonic() - self.reported_s > _REPORTED_S:
+            self.report()
 
-    def tell(self, width: int | None = None) -> None:
-        """Say where the study stands; where it is told how many can be at work and that is none, that too."""
-        self.told = time.monotonic()
+    def report(self, width: int | None = None) -> None:
+        """Report how many are over; also that no worker is there, if the width of the crew is known to be 0."""
+        self.reported_s = time.monotonic()
+        waiting = "; waiting for a worker: none is there" if width == 0 else ""
         share = self.over / self.total if self.total else 1.0
-        line = f"{self.what}: {self.over:,} of {self.total:,} over ({share:.0%})"
-        if self.over < self.total:
-            left_s = (self.total - self.over) * (self.told - self.start) / self.timed if self.timed else None
-            line += "; the first ones are at work" if left_s is None else f"; {_about(left_s)} left"
-        self.say(line + ("; no worker is there, waiting for one" if width == 0 else ""))
-
-
-def _about(seconds: float) -> str:
-    if seconds < 90:
-        return f"about {seconds:.0f} s"
-    return f"about {seconds / 60:.0f} min" if seconds < 5400 else f"about {seconds / 3600:.1f} h"
+        self.progress(f"{self.what}: {self.over:,} of {self.total:,} done{waiting}", share)

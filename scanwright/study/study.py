@@ -1,4 +1,4 @@
-"""The study file: what is crossed with what, and what the trade-off is between.
+"""The study file: tasks and products to combine, and columns to trade off.
 
 Every list multiplies the candidates; one that is left out leaves each task as it is.
 """
@@ -30,7 +30,7 @@ Period = Annotated[float, Field(strict=True, ge=SHORTEST_S, le=LONGEST_S)] | Lit
 
 
 class Mounting(Record):
-    """How the scanner may be mounted: keys of `[angles]` and `[limits]` that take the place of those of a task."""
+    """A way to mount the scanner: keys of `[angles]` and `[limits]` that replace those of a task."""
 
     name: str = Field(pattern=NAME)
     angles: AngleRanges = AngleRanges()
@@ -41,7 +41,7 @@ class Study(Record):
     """One study file with every default written out."""
 
     name: str = Field(pattern=NAME)
-    tasks: tuple[str, ...] = Field(min_length=1, description="task files beside the study, or shipped tasks")
+    tasks: tuple[str, ...] = Field(min_length=1, description="task files next to the study, or shipped tasks")
     sensors: tuple[str, ...] = ()
     servos: tuple[str, ...] = ()
     slip_rings: tuple[str, ...] = Field(default=(), description="'none' for a scanner that needs none")
@@ -53,7 +53,7 @@ class Study(Record):
     winners: int = Field(
         default=1, ge=0, description="built of each task: the first of its front, by its columns in their order"
     )
-    time_limit_s: float = Field(default=900.0, gt=0, description="that one candidate may take on a worker")
+    time_limit_s: float = Field(default=900.0, gt=0, description="limit for one candidate on a worker")
 
     @field_validator("tasks", "sensors", "servos", "slip_rings", "printers", "periods_s", "front")
     @classmethod
@@ -126,8 +126,8 @@ def load_study(path: Path) -> LoadedStudy:
 
 
 def _task(source: Path, name: str) -> LoadedTask:
-    beside = source.parent / name
+    in_folder = source.parent / name
     try:
-        return load_task(beside if beside.is_file() or beside.suffix == ".toml" else Path(name))
+        return load_task(in_folder if in_folder.is_file() or in_folder.suffix == ".toml" else Path(name))
     except TaskError as error:
         raise TaskError(f"{source}: tasks: {error}") from error

@@ -1,4 +1,4 @@
-"""What a study came to: `study.csv` and `study.parquet` with a row for every candidate, and the lines for a person."""
+"""The results of a study: `study.csv`, `study.parquet` and a summary."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ STATUSES = {
     "failed": "could not be finished",
 }
 GROUP = 10_000  # rows of a Parquet group, which is what is held in memory
-MOST_REASONS = 5
+MOST_REASONS = 5  # lines that a person reads; the table has all
 
 
 def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
-    """Write the tables and `front.png`; what they say in short.
+    """Write the tables and `front.png`, and return a summary as lines.
 
     Raises:
         BuildError: they cannot be written.
@@ -60,17 +60,17 @@ def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
     title = f"{study.name}: {statuses['front']:,} of {candidates} on the front of their task"
     left = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
     shares = [f"{statuses[status]:,} {status} ({means})" for status, means in STATUSES.items() if statuses[status]]
-    told = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
-    told += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
+    lines = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
+    lines += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:
-        told.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
+        lines.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
     if left:
-        told.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
-    return told
+        lines.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
+    return lines
 
 
 def write_tables(folder: Path, rows: Iterable[Row]) -> Counter[str]:
-    """Write both tables, whole or not at all; how many rows have each status. No Parquet without pyarrow.
+    """Write both tables atomically, and return the number of rows of each status. No Parquet without pyarrow.
 
     Raises:
         BuildError: they cannot be written.
@@ -91,7 +91,7 @@ def write_tables(folder: Path, rows: Iterable[Row]) -> Counter[str]:
 
 @contextmanager
 def _parquet(path: Path) -> Iterator[Callable[[list[Row]], None]]:
-    """What adds rows to a table; it adds nothing, and an older table goes, where pyarrow is not installed."""
+    """Yield a function that adds rows to a table; without pyarrow it adds none, and an older table is removed."""
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -113,7 +113,7 @@ def _groups(rows: Iterable[Row]) -> Iterator[list[Row]]:
 
 
 def _front_lines(rows: list[Row], columns: tuple[str, ...]) -> list[str]:
-    """The front as a table for a terminal, the best of each task by the first column first."""
+    """Return the front as lines of a table, sorted by task and first column."""
     if not rows:
         return ["no candidate could be built"]
     shown = list(dict.fromkeys([*columns, "period_s", "hidden_fraction", "load_margin"]))

@@ -1,7 +1,7 @@
-"""Units of work over an executor, a window of them at a time: the client stays small however many there are.
+"""Units of work over an executor, a window at a time, so that the client's memory stays small.
 
-A unit is looked up, else computed under a time limit, and kept at once by the worker that has it. One that fails or
-whose worker dies is asked for again, `TRIES` times in all; what fails then is told as a failure.
+A unit is looked up, else computed under a time limit, and stored at once by the worker that has it. One that fails or
+whose worker dies is tried again, `TRIES` times in all, and then reported as failed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-TRIES = 3
+TRIES = 3  # one for a worker killed by chance, one more for a second one
 TICK_S = 5.0  # between two words on a long silence
 DEATHS = ("BrokenProcessPool", "KilledWorker")  # by name: Dask need not be there
 
@@ -40,24 +40,24 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What a worker hands back.
+    """The answer of a worker.
 
     Attributes:
         result: of the unit.
         seconds: it took, None where the result was there.
         memory_mb: the most that the worker has ever had; 0 if the system does not tell.
-        kept: whether the result is in the results folder.
+        stored: whether the result is in the results folder.
     """
 
     result: Result
     seconds: float | None
     memory_mb: float
-    kept: bool
+    stored: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A unit that is over: what it came to, or why there is nothing."""
+    """A finished unit: its result, or the reason why there is none."""
 
     unit: Unit
     done: Done | None
@@ -66,7 +66,7 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Crew:
-    """Who does the work.
+    """An executor and its width.
 
     Attributes:
         executor: takes the units.
@@ -84,14 +84,14 @@ def finished(
     limit_s: float,
     tick: Callable[[int], None] = lambda _: None,
 ) -> Iterator[Finished]:
-    """Do units; they come back in the order they end.
+    """Do units, and yield them in the order in which they finish.
 
-    `units` is asked for the next one only when there is room, so it may look at what has come back so far.
+    The next unit is taken from `units` only when a worker is free, so it can depend on finished results.
 
     Args:
         crew: who does them.
         units: what to do; those in the results folder are looked up and not sent.
-        results: where results are kept.
+        results: where results are stored.
         limit_s: that a unit may take.
         tick: called in a long silence with the width of the crew.
 
@@ -104,15 +104,15 @@ def finished(
     more = True
     while more or again or at_work:
         while (more or again) and len(at_work) < max(1, crew.width()):
-            asked = again.pop() if again else next(waiting, None)
-            if asked is None:
+            tried = again.pop() if again else next(waiting, None)
+            if tried is None:
                 more = False
                 continue
-            known = results.get(asked[0].address)
+            known = results.get(tried[0].address)
             if known is None:
-                at_work[crew.executor.submit(do, asked[0], results, program(), limit_s)] = asked
+                at_work[crew.executor.submit(do, tried[0], results, program(), limit_s)] = tried
             else:
-                yield Finished(asked[0], Done(known, None, 0.0, True))
+                yield Finished(tried[0], Done(known, None, 0.0, True))
         ended, _ = wait(at_work, TICK_S, FIRST_COMPLETED)
         if at_work and not ended:
             tick(crew.width())
@@ -123,38 +123,38 @@ def finished(
             except (ScanwrightError, CancelledError):  # not the unit's fault: what it refuses is a result
                 raise
             except ImportError as error:
-                raise BuildError(f"a worker cannot take part ({error}): install the same scanwright there") from error
+                raise BuildError(f"a worker lacks a package ({error}): install the same scanwright there") from error
             except Exception as error:
                 if tries < TRIES:
                     again.append((unit, tries + 1))
                 else:
                     yield Finished(unit, None, _reason(error, limit_s))
                 continue
-            if not done.kept:
+            if not done.stored:
                 results.put(unit.address, done.result)
             yield Finished(unit, done)
 
 
-def do(unit: Unit, results: Results, asked_by: dict[str, str], limit_s: float) -> Done:
+def do(unit: Unit, results: Results, client: dict[str, str], limit_s: float) -> Done:
     """Do a unit, as a worker.
 
     Args:
         unit: what to do.
         results: folder of the client; used if this worker sees it.
-        asked_by: `program` of the client.
+        client: `program` of the client.
         limit_s: after which the worker ends itself.
 
     Raises:
         BuildError: this worker's program is another one.
     """
     own = program()
-    differs = sorted(name for name in own.keys() | asked_by.keys() if own.get(name) != asked_by.get(name))
+    differs = sorted(name for name in own.keys() | client.keys() if own.get(name) != client.get(name))
     if differs:
         name = differs[0]
         more = f" (and {len(differs) - 1} more)" if len(differs) > 1 else ""
         raise BuildError(
-            f"a worker has {name} {own.get(name, 'missing')}, this computer {asked_by.get(name, 'missing')}{more}: "
-            "results would differ; install the same versions, and run the study again: it goes on"
+            f"a worker has {name} {own.get(name, 'missing')}, this computer {client.get(name, 'missing')}{more}: "
+            "results would differ; install the same versions and run the study again: it continues"
         )
     here = results.is_here()
     known = results.get(unit.address) if here else None
@@ -174,7 +174,7 @@ _lock = threading.Lock()
 
 @contextmanager
 def _limited(limit_s: float) -> Iterator[None]:
-    """End the process when the block takes longer: by an alarm of the system, which no held lock can stop.
+    """End the process if the block takes longer, by an alarm of the system.
 
     A process that no other one has made is the client itself, or a worker that nobody would start again: none there.
     """
@@ -204,8 +204,8 @@ def _memory_mb() -> float:
 
 
 def _reason(error: Exception, limit_s: float) -> str:
-    """Why a unit has no result, the same words whichever worker it was."""
+    """Return why a unit has no result, in words that do not depend on the worker."""
     if type(error).__name__ in DEATHS:
         return f"every worker that tried died: killed, out of memory, or longer than time_limit_s = {limit_s:g}"
-    said = str(error).splitlines()
-    return f"{type(error).__name__}: {said[0] if said else 'no message'}"
+    lines = str(error).splitlines()
+    return f"{type(error).__name__}: {lines[0] if lines else 'no message'}"

@@ -1,4 +1,4 @@
-"""Who does the work of a study: processes of this computer, or the workers of a Dask scheduler that its user runs."""
+"""The workers of a study: processes of this computer, or of a running Dask scheduler."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 ADDRESS = re.compile(r"(tcp|tls|wss?)://[^\s/]+:\d{1,5}")
-CONNECT_S = 10.0
+CONNECT_S = 10.0  # for a scheduler of the network to answer
 ALONE_S = 60.0  # without any worker: a nanny whose worker dies while it starts gives up
 LOOK_S = 5.0  # between two looks at who is there
 
 
 def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractContextManager[Crew]:
-    """The crew of a running scheduler, or processes of this computer that end with the block.
+    """Return the crew of a running scheduler, or of processes that end with the block.
 
     Args:
         scheduler: address such as tcp://HOST:PORT; None for this computer.
@@ -43,7 +43,7 @@ def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractCont
 
 
 class SingleProcesses(Executor):
-    """Processes, each a pool of its own: one that dies breaks its pool, and takes nobody else's work with it.
+    """Processes, each in a pool of its own, so that one that dies breaks no other one's work.
 
     In one pool the death of a worker ends all the others, and nobody can tell whose unit it was that killed it.
     """
@@ -55,7 +55,7 @@ class SingleProcesses(Executor):
             self._idle.put(number)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """See `Executor`; waits for a process that has nothing to do. A dead one is replaced."""
+        """See `Executor`; waits for an idle process, and replaces a dead one."""
         number = self._idle.get()
         with sigint_deferred():
             try:
@@ -80,19 +80,19 @@ def _here(processes: int) -> Iterator[Crew]:
 
 @contextmanager
 def _at_scheduler(address: str) -> Iterator[Crew]:
-    require("cluster", "--scheduler needs Dask", "dask", "distributed")
+    require("cluster", "a scheduler needs Dask", "dask", "distributed")
     from distributed import Client
 
     if not ADDRESS.fullmatch(address):
-        raise TaskError(f"--scheduler = '{address}': an address is tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
+        raise TaskError(f"scheduler = '{address}': must be tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
     for name in ("distributed", "distributed.client"):  # deaths are told in the table, or in one line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        said = str(error).splitlines()[0] if str(error) else type(error).__name__
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise TaskError(
-            f"--scheduler = '{address}': no scheduler answers there ({said}): start one with `dask scheduler`, "
+            f"scheduler = '{address}': no scheduler answers there ({reason}): start one with `dask scheduler`, "
             "and give the tcp:// address that it prints"
         ) from error
     with client:
@@ -102,13 +102,11 @@ def _at_scheduler(address: str) -> Iterator[Crew]:
         except Exception as error:  # whatever the transport raises, and futures that it has cancelled
             if client.status == "running":
                 raise
-            raise BuildError(
-                f"the scheduler at {address} is gone: run the study again, it goes on where it was"
-            ) from error
+            raise BuildError(f"the scheduler at {address} has stopped: run the study again, it continues") from error
 
 
 class _Threads:
-    """How many threads of workers a scheduler has, looked up now and then."""
+    """The number of worker threads of a scheduler, updated at intervals."""
 
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
@@ -121,7 +119,7 @@ class _Threads:
         if self._seen < self._looked - ALONE_S:
             raise BuildError(
                 f"no worker has been there for {ALONE_S:g} s: start `dask worker {self._address} --nthreads 1`, "
-                "and run the study again: it goes on"
+                "and run the study again: it continues"
             )
         return self._number
 

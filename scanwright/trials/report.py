@@ -1,11 +1,11 @@
-"""Error against run time of every numerical choice that is not J: measured, written and told."""
+"""Error against run time of numerical choices other than J."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from scanwright.design.accuracy.trials import report_trials
+from scanwright.design.progress import Progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import LoadedTask
 from scanwright.firmware_io.emulators.servo_plant import plant_of
@@ -13,8 +13,8 @@ from scanwright.trials.axis import axis_trials
 from scanwright.trials.solver import solver_trials
 
 
-def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None]) -> list[str]:
-    """Measure them at the optimum of a task, write `choices.csv` and `choices.png`; in words.
+def report_choices(loaded: LoadedTask, folder: Path, progress: Progress) -> list[str]:
+    """Measure all choices at the optimum of a task, write `choices.csv` and `choices.png`, and return lines.
 
     Raises:
         TaskError: no direction has a weight, or no setting keeps the limits.
@@ -23,7 +23,11 @@ def report_choices(loaded: LoadedTask, folder: Path, say: Callable[[str], None])
     from scanwright.cad.assembly.make import make_parts
     from scanwright.cad.geometry.mesh_trials import mesh_trials
 
-    optimum = find_optimum(loaded, say)
+    optimum = find_optimum(loaded, progress)
     solids = make_parts(loaded.scanner(optimum.angle_set())).made
-    trials = [*mesh_trials(solids, say), *solver_trials(plant_of(loaded.task.servo), say), *axis_trials(say)]
+    trials = [
+        *mesh_trials(solids, progress),
+        *solver_trials(plant_of(loaded.task.servo), progress),
+        *axis_trials(progress),
+    ]
     return report_trials(trials, folder, "choices")

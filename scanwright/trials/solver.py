@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Literal
 
@@ -11,25 +11,26 @@ import numpy as np
 
 from scanwright.design.accuracy.trials import Trial, timed
 from scanwright.design.arrays import Floats
+from scanwright.design.progress import Progress
 from scanwright.firmware_io.emulators.dynamics import HornMotion, Solver
 from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, Plant
 
 METHODS: tuple[Literal["LSODA", "Radau", "BDF"], ...] = ("LSODA", "Radau", "BDF")
-TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8
-REFERENCE = Solver("Radau", 1e-11)
+TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8  # relative, of the integrator
+REFERENCE = Solver("Radau", 1e-11)  # three digits better than the best one tried, by another method than the default
 SECONDS = 2.0  # of motion: spun up from rest with a head that hangs to one side, through the backlash
 RATE_RAD_S = math.pi
 HEAD = Load(gravity_nm=0.2)  # of a lidar on a tilted axis
 
 
-def solver_trials(plant: Plant, progress: Callable[[str], None]) -> Iterator[Trial]:
-    """Each method at each tolerance; the error is the farthest that the horn is from where the reference has it."""
-    asked_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
+def solver_trials(plant: Plant, progress: Progress) -> Iterator[Trial]:
+    """Measure each method at each tolerance; the error is the maximum deviation of the horn from the reference."""
+    at_ns = np.arange(0, int(SECONDS * 1e9), 10_000_000)
 
     def run(solver: Solver) -> Floats:
         axis = HornMotion(plant, HEAD, 0, solver=solver)
         axis.drive(0, Actuation("velocity", RATE_RAD_S))
-        return axis.angle_rad(asked_ns)
+        return axis.angle_rad(at_ns)
 
     progress("motion of the servo, reference")
     true = run(REFERENCE)

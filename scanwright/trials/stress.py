@@ -1,4 +1,4 @@
-"""Stiff and extreme cases of the emulated servo, and of the way from a range to a point: their answers are known.
+"""Stiff and extreme cases of the emulated servo and of de-skewing, whose results are known.
 
 The servo: whatever it carries, however its teeth and loops are, it ends at the speed at which its torque is that of
 friction, or at the one that its loop holds; what is stalled is held where the two springs balance. Ranges: a point is
@@ -24,24 +24,24 @@ from scanwright.firmware_io.emulators.world import furnished_room
 from scanwright.firmware_io.samples import JointLog, Scan
 
 SETTLED = 25.0  # time constants of rotor and load
-GOAL_RAD_S = 1.0
-RINGS_S, RK_STEPS = 0.05, 25_000
+GOAL_RAD_S = 1.0  # a turn in 6.3 s
+RINGS_S, RK_STEPS = 0.05, 25_000  # time of the reference, in steps of 2 us
 BRAKE = 50.0  # stall torques a radian: the spring that holds a blocked horn
-SIZES = 1e-3, 1.0, 1e3, 1e4
+SIZES = 1e-3, 1.0, 1e3, 1e4  # metres of a beam, and scales of a room
 ROTORS_KG_M2 = {"next to nothing": 1e-8, "a screw": 1e-6, "a lidar": 5e-4, "a machine": 0.5, "a car": 50.0}
 
 
 def servo_rows(plant: Plant) -> Iterator[StressRow]:
-    """A plant with light and heavy rotors, stiff and soft teeth, no play and much, loops slow and tight, stalled."""
+    """Yield cases of the servo: rotors, stiffness, backlash, loop gains, stalls."""
     full = Actuation("share", 1.0)
     for name, inertia in ROTORS_KG_M2.items():
         yield _speed(f"servo at full duty, it turns {name} ({inertia:g} kg m2)", plant, Load(inertia), full)
     for factor in (1e-2, 1e2):
         teeth = replace(plant, stiffness_nm_rad=factor * plant.stiffness_nm_rad)
         yield _speed(f"servo at full duty, teeth {factor:g} times as stiff", teeth, Load(), full)
-    for play_deg in (0.0, 5.0):
-        loose = replace(plant, backlash_rad=math.radians(play_deg))
-        yield _speed(f"servo at full duty, {play_deg:g} deg of play", loose, Load(), full)
+    for backlash_deg in (0.0, 5.0):
+        loose = replace(plant, backlash_rad=math.radians(backlash_deg))
+        yield _speed(f"servo at full duty, {backlash_deg:g} deg of play", loose, Load(), full)
     for factor in (0.1, 1.0):
         loop = replace(plant, velocity_p=factor * plant.velocity_p, velocity_i=factor * plant.velocity_i)
         end = _end(loop, Load(), Actuation("velocity", GOAL_RAD_S))
@@ -53,7 +53,7 @@ def servo_rows(plant: Plant) -> Iterator[StressRow]:
 
 
 def range_rows() -> Iterator[StressRow]:
-    """Rooms and beams from a millimetre to ten kilometres."""
+    """Yield cases of ranges and beams from a millimetre to ten kilometres."""
     directions = np.random.default_rng(0).normal(size=(2000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     walls_m = furnished_room()
@@ -89,14 +89,14 @@ def range_rows() -> Iterator[StressRow]:
 
 
 def _speed(case: str, plant: Plant, load: Load, drive: Actuation) -> StressRow:
-    """What is left of the no-load speed when friction takes its share of the torque."""
+    """Compare the end speed with the no-load speed minus friction."""
     friction = (plant.friction_nm + load.bearing_nm) / plant.stall_torque_nm
     expected = plant.no_load_rad_s * (drive.goal - friction)
     return row(case, "end speed", expected, _end(plant, load, drive).rate_rad_s, 1e-4)
 
 
 def _ringing(case: str, plant: Plant, factor: float) -> StressRow:
-    """Where the horn is after a while, beside the classical Runge-Kutta rule in steps of 2 us."""
+    """Compare the angle of the horn with the classical Runge-Kutta rule in steps of 2 us."""
     loop = replace(plant, velocity_p=factor * plant.velocity_p, velocity_i=factor * plant.velocity_i)
     drive = Actuation("velocity", GOAL_RAD_S)
     axis = HornMotion(loop, Load(), 0)
@@ -113,13 +113,13 @@ def _ringing(case: str, plant: Plant, factor: float) -> StressRow:
 
 
 def _stalled(case: str, plant: Plant, load: Load) -> StressRow:
-    """A blocked horn gives way until the brake's spring balances the motor, or less by what friction may carry."""
+    """Compare the angle of a blocked horn with the balance of the brake's spring and the motor."""
     end = _end(plant, load, Actuation("share", 1.0, blocked=True))
     return row(case, "way it gives", 1 / BRAKE, end.angle_rad, plant.friction_nm / plant.stall_torque_nm)
 
 
 def _end(plant: Plant, load: Load, drive: Actuation) -> Motion:
-    """The horn when all has settled; NaN where the solver gave up."""
+    """Return the settled motion of the horn; NaN if the solver failed."""
     constant_s = (plant.inertia_kg_m2 + load.inertia_kg_m2) * plant.no_load_rad_s / plant.stall_torque_nm
     axis = HornMotion(plant, load, 0)
     axis.drive(0, drive)

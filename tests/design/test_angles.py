@@ -79,7 +79,7 @@ def test_a_folder_for_the_file_and_a_file_for_the_folder_are_told_what_to_name(t
     path = written(tmp_path, full_table())
     with pytest.raises(TaskError, match=f"^{re.escape(f'{tmp_path}: this is a folder: name {path}')}$"):
         load_angles(tmp_path)
-    says = re.escape(f"{path}: this is a file; name the folder of a build, which contains ")
+    says = re.escape(f"{path}: this is a file; name the build folder that contains ")
     with pytest.raises(TaskError, match=f"^{says}angles.json$"):
         load_angles(path / "angles.json")
     with pytest.raises(TaskError, match=f"^{says}task.toml$"):

@@ -71,7 +71,7 @@ def test_all_that_the_functions_take_and_return_is_public():
                 hints = [one.annotation for one in (*node.args.args, *node.args.kwonlyargs)] + [node.returns]
                 used = {one.id for hint in hints for one in ast.walk(hint) if isinstance(one, ast.Name)}
                 private |= used & ours - set(sw.__all__)
-    assert private <= {"AnglesLike", "Say", "TaskLike", "Trajectory"}, private
+    assert private <= {"AnglesLike", "Progress", "TaskLike", "Trajectory"}, private
 
 
 def test_every_error_is_public():
@@ -177,7 +177,7 @@ def test_a_calibration_does_not_overwrite_the_angles_that_it_began_with(tmp_path
     angles = tmp_path / "angles.json"
     angles.write_text(Path("design/angle_sets/tilting_urg.json").read_text())
     before = angles.read_bytes()
-    with pytest.raises(RecordingError, match=r"angles\.json: holds the angles that are to be calibrated"):
+    with pytest.raises(RecordingError, match=r"angles\.json: contains the angles to calibrate"):
         sw.calibrate([tmp_path / "a.mcap"], angles, tmp_path / "." / "angles.json")
     assert angles.read_bytes() == before
 
@@ -186,3 +186,33 @@ def test_clouds_go_out_and_in(tmp_path):
     points = np.arange(12.0).reshape(4, 3)
     assert sw.write_cloud(tmp_path / "cloud.ply", points) == []
     np.testing.assert_array_equal(sw.read_cloud(tmp_path / "cloud.ply").points_m, points)
+
+
+def test_arguments_of_version_0_1_still_work(monkeypatch):
+    """`say=` gets the steps alone; a pole as text is the pole of its numbers."""
+    from scanwright.design.evaluation import evaluation
+    from scanwright.design.search import optimum
+
+    steps, calls = [], []
+    monkeypatch.setattr(optimum, "find_optimum", lambda _, progress: progress("searching", 0.5))
+    with pytest.warns(DeprecationWarning, match="say= is now progress="):
+        sw.optimise(TASK, say=steps.append)
+    assert steps == ["searching"]
+    monkeypatch.setattr(evaluation, "evaluate", lambda *arguments: calls.append(arguments))
+    with pytest.warns(DeprecationWarning, match=r"pass scanwright\.Pole") as warned:
+        sw.evaluate(TASK, (0, 0, 0, -60), pole="20,1000,5")
+    assert calls[0][2] == sw.Pole(0.02, 1.0, 5.0)
+    assert warned[0].filename == __file__
+
+
+def test_options_of_assemble_can_be_a_record_or_keywords(monkeypatch):
+    from scanwright.firmware_io.assembly import finish
+
+    given = []
+    monkeypatch.setattr(finish, "Finish", lambda *arguments: given.append(arguments) or 1 / 0)
+    for arguments in ((sw.AssembleOptions(voxel_m=0.1), {}), (sw.AssembleOptions(), {"voxel_m": 0.1})):
+        with pytest.raises(ZeroDivisionError):
+            sw.assemble("r.mcap", "design/angle_sets/tilting_urg.json", "c.ply", arguments[0], **arguments[1])
+    assert given == [(None, 0.1, False)] * 2
+    with pytest.raises(TypeError, match="voxel"):
+        sw.assemble("r.mcap", "design/angle_sets/tilting_urg.json", "c.ply", voxel=0.1)

@@ -34,7 +34,7 @@ def test_a_missing_extra_is_one_line_and_the_first(monkeypatch, tmp_path, comman
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, package, None)  # as if it were not installed
     monkeypatch.setattr("platform.machine", lambda: "x86_64")
-    assert command(*words) == (2, "", [f"scanwright: {line}"])
+    assert command(*words) == (2, "", [f"error: {line}"])
     assert not list(tmp_path.iterdir())
 
 
@@ -55,7 +55,7 @@ def test_a_missing_library_of_the_system_is_named_before_anything_is_searched(mo
     monkeypatch.setattr(ctypes, "CDLL", load)
     code, out, (line,) = command(*words)
     assert (code, out) == (2, "")
-    assert re.fullmatch(rf"scanwright: {words[0]} needs .*libGL\.so\.1.*apt-get install .*libgl1", line)
+    assert re.fullmatch(rf"error: {words[0]} needs .*libGL\.so\.1.*apt-get install .*libgl1", line)
 
 
 def test_the_package_is_imported_without_what_is_heavy():

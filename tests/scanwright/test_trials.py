@@ -8,6 +8,7 @@ import pytest
 
 from scanwright.cad.geometry import mesh_trials as meshes
 from scanwright.design.accuracy.trials import Trial, best_trials
+from scanwright.design.progress import no_progress
 from scanwright.firmware_io.emulators.servo_plant import plant_of
 from scanwright.trials import axis
 from scanwright.trials import solver as solvers
@@ -27,7 +28,7 @@ def test_the_front_is_what_nothing_beats_within_one_choice():
 def test_the_error_of_a_mesh_is_the_sagitta_of_its_chords(radius, monkeypatch):
     monkeypatch.setattr(meshes, "CHORDS", (0.1,))
     rod = cq.Workplane().circle(radius).extrude(5).val()
-    for found in meshes.mesh_trials({"rod": rod}, lambda _: None):
+    for found in meshes.mesh_trials({"rod": rod}, no_progress):
         sides = (int(found.size.split()[0].replace(",", "")) + 4) // 4  # two triangles a side, and two fans of n - 2
         assert found.error == pytest.approx(radius * (1 - cos(pi / sides)), rel=1e-3)
 
@@ -35,7 +36,7 @@ def test_the_error_of_a_mesh_is_the_sagitta_of_its_chords(radius, monkeypatch):
 def test_a_tighter_tolerance_of_the_integrator_is_nearer(monkeypatch):
     monkeypatch.setattr(solvers, "TOLERANCES", (1e-3, 1e-6, 1e-8))
     monkeypatch.setattr(solvers, "METHODS", ("LSODA", "Radau"))
-    found = list(solvers.solver_trials(plant_of("MX-64R"), lambda _: None))
+    found = list(solvers.solver_trials(plant_of("MX-64R"), no_progress))
     for method in ("LSODA", "Radau"):
         errors = [t.error for t in found if t.method == method]
         assert errors == sorted(errors, reverse=True) and errors[-1] < 1e-5
@@ -44,7 +45,7 @@ def test_a_tighter_tolerance_of_the_integrator_is_nearer(monkeypatch):
 
 def test_the_orders_between_samples_are_ordered(monkeypatch):
     monkeypatch.setattr(axis, "BEAMS", 20_000)
-    held, line, cubic, smoothed = (trial.error for trial in axis.axis_trials(lambda _: None))
+    held, line, cubic, smoothed = (trial.error for trial in axis.axis_trials(no_progress))
     assert smoothed < line / 3 and line < held / 3
     assert cubic > line  # through the samples means through their steps
 

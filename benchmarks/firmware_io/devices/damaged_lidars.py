@@ -10,8 +10,8 @@ import numpy as np
 
 from scanwright.design.errors import ProtocolError
 from scanwright.firmware_io.emulators import ldrobot as ldrobot_emulators
-from scanwright.firmware_io.emulators import slamtec as slamtec_emulators
 from scanwright.firmware_io.emulators.sick import lms_emulator as lms_emulators
+from scanwright.firmware_io.emulators.slamtec import packets as slamtec_emulators
 from scanwright.firmware_io.lidar.ldrobot import protocol as ldrobot
 from scanwright.firmware_io.lidar.lms2xx import protocol as lms
 from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol

@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study, spin
+from scanwright.design.progress import no_progress
 from scanwright.study.crossing import Crossing
 from scanwright.study.results import open_results
 from scanwright.study.run import StudyRun
@@ -39,7 +40,7 @@ def _of_a_study(folder: Path, units: int, seconds: float, workers: int) -> float
             judge = partial(invented_judge, seconds=work)
             run = StudyRun(Crossing(invented_study(size)), results, judge, invented_search)
             start = time.monotonic()
-            run.work(crew, lambda _: None)
+            run.work(crew, no_progress)
         return time.monotonic() - start
 
 

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from scanwright.design.progress import no_progress
 from scanwright.design.task.task import Limits, LoadedTask, load_task
 from scanwright.study.candidate import record_digest
 from scanwright.study.crossing import Crossing
@@ -88,7 +89,7 @@ def run_invented(
     run = StudyRun(crossing, open_results(folder / "results"), judge, invented_search)
     with crew_of(scheduler, processes) as crew:
         start = time.monotonic()
-        run.work(crew, lambda _: None)
+        run.work(crew, no_progress)
         took = time.monotonic() - start
     write_answer(crossing.loaded.study, run.rows(), folder)
     return took

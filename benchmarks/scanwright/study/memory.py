@@ -28,13 +28,13 @@ def memory(units: int) -> None:
         start = time.monotonic()
         told: list[tuple[float, float]] = []
 
-        def say(line: str) -> None:
+        def progress(line: str, _fraction: float | None = None, /) -> None:
             told.append((time.monotonic() - start, _now_mb()))
             if len(told) % 15 == 1:
                 print(f"  {told[-1][0]:6.0f} s {told[-1][1]:7.1f} MB  {line}", flush=True)
 
         with crew_of(None, 2) as crew:
-            run.work(crew, say)
+            run.work(crew, progress)
         took = time.monotonic() - start
         before = _now_mb()
         write_answer(crossing.loaded.study, run.rows(), folder)

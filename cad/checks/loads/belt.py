@@ -1,27 +1,28 @@
-"""Bearings, belt and horn of the belt layout against what they are rated for, and what the belt does to the angle."""
+"""Loads on bearings, belt and servo horn of the belt drive against their ratings, and the angle error of the belt."""
 
 from __future__ import annotations
 
 import math
 
-from scanwright.cad.checks.check import Check, at_most, horn_check, note, tidy
+from scanwright.cad.checks.limits import at_most, horn_check, note, tidy
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg
 from scanwright.cad.layout.names import BEARING, BELT
+from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
 
-def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weight, torque: float) -> list[Check]:
-    """What bearings, belt and horn carry, and how far the belt turns the axis away from the servo.
+def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weight, torque: float) -> list[Finding]:
+    """Check bearings, belt, horn, and the angle between servo and axis.
 
     Args:
         scanner: angles and products.
         stack: its layout.
         rotor: all that turns.
         weight: of it.
-        torque: the largest of the servo's work [N m].
+        torque: largest torque of the servo in operation [N m].
     """
     pull = belt_pull(stack, torque)
     upper, lower = carrier_forces(stack, weight, 1000 * float(rotor.centre_m[2]), pull.shaft_n)
@@ -32,15 +33,15 @@ def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weig
     tension = at_most("belt_tension", strand, stack.belt.working_tension_n, "N", BELT, what)
     return [
         at_most("bearing_load", max(upper, lower), limit, "N", BEARING, f"load across {name}, weight and belt"),
-        note("bearing_axial", weight.along_n, "N", BEARING, f"load along {name}, which one of the two carries"),
+        note("bearing_axial", weight.along_n, "N", BEARING, f"load along {name}, carried by one of the two"),
         tension,
-        horn_check(scanner, pull.horn_nm, on_horn),
+        horn_check(scanner, pull.horn_nm, on_horn, "choose a servo with a higher radial load"),
         _angle(scanner, stack, torque),
     ]
 
 
-def _angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Check:
-    """How far the axis is from where the servo's encoder says: pulleys off their axes, and the belt's stretch."""
+def _angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Finding:
+    """Check the angle between axis and servo encoder: pulleys off their axes, and the belt's stretch."""
     run_out = run_out_rad(stack, scanner.printer.fit_clearance_mm)
     stretch = torque_nm / belt_nm_per_rad(stack)
     error = math.degrees(run_out + stretch)
@@ -48,7 +49,9 @@ def _angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Check:
     off = math.radians(error) * FAR_MM
     message = (
         f"{BELT}: the axis is off the servo's angle by up to {error:.2g} deg, once per turn ({off:.0f} mm at 10 m): "
-        f"{math.degrees(run_out):.2g} if both printed pulleys stand off their axes by half of their play, and "
-        f"{math.degrees(stretch):.2g} of stretch: calibrate reports it with the encoder's harmonics"
+        f"{math.degrees(run_out):.2g} if both printed pulleys are off their axes by half of their play, and "
+        f"{math.degrees(stretch):.2g} of stretch"
     )
-    return Check("belt_angle", "pass" if error <= limit else "warning", tidy(error), tidy(limit), "deg", BELT, message)
+    severity: Severity = "ok" if error <= limit else "warning"
+    hint = "calibrate reports it with the encoder's harmonics"
+    return Finding("belt_angle", severity, BELT, message, tidy(error), tidy(limit), "deg", hint)

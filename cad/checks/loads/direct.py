@@ -1,30 +1,31 @@
-"""Horn and bearing of a servo on the axis against what they are rated for, and how far the shaft bends. SI units.
+"""Loads on horn and bearing of a direct drive against their ratings, and the bend of the shaft. SI units.
 
-The bend of the shaft is that of a beam, the cage a spring known within a factor of two (`stiffness_n_per_m`). How far
-the linkage bends is `deflection.py`.
+The shaft bends as a beam; the cage is a spring whose stiffness is known within a factor of two (`stiffness_n_per_m`).
+The bend of the linkage is in `deflection.py`.
 """
 
 from __future__ import annotations
 
 import math
 
-from scanwright.cad.checks.check import Check, at_most, horn_check, rated
+from scanwright.cad.checks.limits import at_most, horn_check, rated
 from scanwright.cad.layout.direct.cage import share_weight
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
 from scanwright.cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg, rated_moment_nm
 from scanwright.cad.layout.names import BEARING, SERVO, SERVO_SHAFT
+from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
 
 
-def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[Check]:
-    """What horn and bearing carry of the weight of all that turns."""
+def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[Finding]:
+    """Check horn, bearing and shaft under the weight of all that turns."""
     shared = share_weight(scanner, stack, weight)
     return [*_forces(scanner, stack, weight, shared), *_yields(scanner, stack), _slope(scanner, stack, shared)]
 
 
-def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> list[Check]:
+def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> list[Finding]:
     servo, axial = scanner.servo, f"load along the axis of {scanner.servo.name}"
     checks = [
         _horn(scanner, stack, weight, shared),
@@ -37,11 +38,12 @@ def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Suppor
     return checks
 
 
-def _horn(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> Check:
-    """Weight alone without a bearing; with one, all that may be out of line too, in the metal that is worse."""
+def _horn(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> Finding:
+    """Check the horn: without a bearing under the weight alone, with one also under every misalignment."""
     servo, rating = scanner.servo, rated_moment_nm(scanner)
     if stack.bearing is None:
-        return horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}")
+        hint = "support the shaft with a bearing near the hub; none of the catalogue fits it"
+        return horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}", hint)
     sums = worst_moment_nm(scanner, stack, weight)
     parts = ", ".join(
         f"{each.what} {'' if each.off_mm is None else f'({each.off_mm:.3f} mm) '}{each.moment_nm:.3f}"
@@ -49,33 +51,25 @@ def _horn(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supporte
     )
     both = ", ".join(f"{total:.3g} in {name}" for name, total in sums.items())
     what = f"worst tilt moment on the horn of {servo.name}, {both}; in aluminium {parts}"
-    by = "" if rating is None else f"; half of its rating of {rating:g} N m allowed"
-    return rated("tilt_moment", max(sums.values()), None if rating is None else SHARE * rating, "N m", SERVO, what, by)
+    by, limit = ("", None) if rating is None else (f"; half of its rating of {rating:g} N m allowed", SHARE * rating)
+    hint = "lighten what turns, or raise the axis"
+    return rated("tilt_moment", max(sums.values()), limit, "N m", SERVO, what, by, hint)
 
 
-def _yields(scanner: Scanner, stack: DirectStack) -> list[Check]:
-    """The waist must outlast a servo that is stopped by force."""
+def _yields(scanner: Scanner, stack: DirectStack) -> list[Finding]:
+    """Check that the waist does not yield if the rotor is blocked."""
     stall, what = (
         scanner.servo.stall_torque_nm,
         f"stall torque of {scanner.servo.name} against the yield of the waist in",
     )
-    if stack.bearing is None:
-        return []
+    limits = {metal.name: metal.twisted_off_nm(stack.waist_diameter) for metal in (ALUMINIUM, STEEL) if stack.bearing}
     return [
-        at_most(
-            "waist_torque",
-            stall,
-            metal.twisted_off_nm(stack.waist_diameter),
-            "N m",
-            SERVO_SHAFT,
-            f"{what} {metal.name}",
-        )
-        for metal in (ALUMINIUM, STEEL)
+        at_most("waist_torque", stall, limit, "N m", SERVO_SHAFT, f"{what} {name}") for name, limit in limits.items()
     ]
 
 
-def _slope(scanner: Scanner, stack: DirectStack, shared: Supported) -> Check:
-    """Gravity tilts the turning axis by this much, the same way in every position: a constant error of the mount."""
+def _slope(scanner: Scanner, stack: DirectStack, shared: Supported) -> Finding:
+    """Check the tilt of the axis by gravity: a constant error of the mount, the same in every position."""
     at_10_m = math.tan(shared.slope_rad) * FAR_MM
     what = f"bend of the shaft at the hub ({at_10_m:.1f} mm at 10 m)"
     return at_most("shaft_slope", math.degrees(shared.slope_rad), noise_deg(scanner), "deg", stack.shaft, what)

@@ -1,4 +1,4 @@
-"""`assembly.md`: how to put one scanner together, with the screws that its own parts ask for, and a picture a step."""
+"""`assembly.md`: how to assemble one scanner, with the screws of its own parts and a picture of each step."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import print_words
-from scanwright.cad.checks.remarks import products_of
-from scanwright.cad.checks.retention import material_of
+from scanwright.cad.checks.loads.retention import material_of
+from scanwright.cad.checks.products import products_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.files.manual.scenes import StepScene, scenes_of
 from scanwright.cad.geometry.mesh import TriMesh
@@ -22,21 +22,20 @@ from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
 
 NUTS = (
-    "Put the nuts into their traps before anything else: those of a plate or an arm from below; those of a boss from "
-    "above into the slots; those of a foot from its corners. Pull each home with a screw. What has no trap is a plain "
-    "thread."
+    "Put the nuts into their pockets first: those of a plate or an arm from below; those of a boss from above into the "
+    "slots; those of a foot from its corners. Pull each in with a screw. A hole without a pocket has a plain thread."
 )
 LOCKED = (
-    "Where a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread, none on plastic, "
-    "which it makes crack. Tighten to the torque that stands behind each screw, and once more after a day, since "
-    "plastic under a head gives way. `checks.json` tells under `retention` and `screw` what each joint holds, and why."
+    "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
+    "which then cracks. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
+    "creeps. `checks.json` lists under `retention` and `screw` the margin of each joint."
 )
 LOOK = "Look, then wire"
 HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
-LAST = "Turn the linkage by hand through its whole range: nothing touches, no cable pulls tight. "
+LAST = "Turn the linkage by hand through its range: nothing touches, no cable pulls tight. "
 TO_COMPUTER = "Then join the leads of the ring's stator to USB and power."
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
-IN_A_LOOP = "Leave the lidar's cables a loose loop for the whole sweep, then join them to USB and power."
+IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to USB and power."
 
 
 def instructions_text(
@@ -46,7 +45,7 @@ def instructions_text(
     plates: Sequence[Sequence[str]],
     config_hash: str,
 ) -> str:
-    """The Markdown file.
+    """Return the Markdown file.
 
     Args:
         scanner: angles and products.
@@ -62,14 +61,14 @@ def instructions_text(
         "",
         f"Configuration {config_hash}: {scanner.lidar.name} on {scanner.servo.name}, alpha_rot {angles.alpha_rot:g}, "
         f"beta_rot {angles.beta_rot:g}, alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
-        "In the pictures grey stands already and colour comes, made parts orange, bought ones blue; the rotation axis "
-        "stands upright, or the lidar's where it is put in. `exploded.glb` turns under the mouse; `bom.csv` lists what "
-        "you need.",
+        "In the pictures present bodies are grey, new made parts orange, new bought ones blue; the rotation axis is "
+        "upright, or the lidar's axis if the step is on the bench. `exploded.glb` shows the scanner in 3D; `bom.csv` "
+        "lists what you need.",
         "",
         *_misfits(products_of(scanner, assembly.layout.drive)),
         f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
-        f"everything {print_words(scanner.printer)}: the files tell PrusaSlicer so, other slicers have to be told.",
+        f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
         "",
         *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
         f"Lengths of screws with nuts assume {CASE_EAR_MM:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
@@ -101,7 +100,7 @@ def instructions_text(
 
 
 def _joined(assembly: Assembly) -> str:
-    """What is left to be joined when all parts are together: the leads with a way are joined in their own step."""
+    """Return what to connect when all parts are together: leads with a path are connected in their own step."""
     if assembly.layout.scanner.slip_ring is None:
         return IN_A_LOOP
     laid = assembly.leads and all(lead.path is not None for lead in assembly.leads)
@@ -109,25 +108,25 @@ def _joined(assembly: Assembly) -> str:
 
 
 def _misfits(products: Sequence[Product]) -> Iterator[str]:
-    """Lines about products that the parts do not fit."""
+    """Yield lines about products that the parts do not fit."""
     for product in products:
         if reasons := product.misfit():
             yield from (f"**Caution: {reasons[0]}**", "", *(f"- {reason.strip()}" for reason in reasons[1:]), "")
 
 
 def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:
-    """The lines of one print plate."""
+    """Return the lines of one print plate."""
     name = f"print/plate_{number}"
     return f"Plate {number}, `{name}.3mf`: {', '.join(parts)}.", "", f"![Plate {number} on the bed]({name}.png)", ""
 
 
 def picture_name(number: int) -> str:
-    """The file of a step's picture, relative to the build folder."""
+    """Return the file of a step's picture, relative to the build folder."""
     return f"assembly/step_{number:02d}.png"
 
 
 def screws_in_words(assembly: Assembly, joint: Joint) -> str:
-    """One joint as a sentence, with the torque of its screws."""
+    """Return one joint as a sentence, with the torque of its screws."""
     what = f"{joint.count} x {joint.number}"
     nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
     where = {
@@ -137,11 +136,11 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
         "deck": f"through the foot into the deck, with {nuts}",
         "grub": f"in {joint.part}, against {joint.onto}",
     }[joint.fixing]
-    held = ", in heat-set inserts" if joint.inserts else ""
+    inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
-        held = f", through {nuts} in its bore"
+        inserts = f", through {nuts} in its bore"
     first = _measure_first(assembly.layout.scanner, joint)
-    return f"{what} {where}{held}, {torque_in_words(assembly, joint)}.{first and f' {first}'}"
+    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}.{first and f' {first}'}"
 
 
 def _measure_first(scanner: Scanner, joint: Joint) -> str:
@@ -153,7 +152,7 @@ def _measure_first(scanner: Scanner, joint: Joint) -> str:
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:
-    """How tight the screws of a joint are."""
+    """Return the torque of the screws of a joint."""
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     return "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
 
@@ -166,7 +165,7 @@ def step_files(
     plates: Sequence[Sequence[str]],
     config_hash: str,
 ) -> dict[str, bytes]:
-    """`assembly.md` and the picture of each step.
+    """Return `assembly.md` and the picture of each step.
 
     Args:
         scanner: angles and products.
@@ -186,9 +185,9 @@ def step_files(
 
 
 def _words(assembly: Assembly, scene: StepScene) -> str:
-    """The words of a step with its screws in their places."""
+    """Return the text of a step with its screws in their places."""
     text = scene.step.words
     for joint, mark in scene.joints:
-        said = f"**{screws_in_words(assembly, joint)}**"
-        text = text.replace(mark, f"{said} {mark}", 1) if mark else f"{text} {said}"
+        screws = f"**{screws_in_words(assembly, joint)}**"
+        text = text.replace(mark, f"{screws} {mark}", 1) if mark else f"{text} {screws}"
     return " ".join(re.sub(r"\{.*?\}", "", text).split())

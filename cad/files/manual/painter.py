@@ -1,6 +1,6 @@
 """Bodies painted by their distances, each with a dark edge: the pictures of steps and plates.
 
-`design/scene/parallel_view.py` says what a pixel shows; the pictures of the checks in the report are made of the same.
+`design/scene/parallel_view.py` casts the pixels, as for the pictures of the checks in the report.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scanwright.design.arrays import Array, Vector
 from scanwright.design.scene.parallel_view import ParallelView
 from scanwright.design.scene.ray_caster import Scene
 
-EDGE = 0.45  # of a body's colour, where it ends before something else
+EDGE = 0.45  # of a body's colour, at its outline
 STEP_M = 0.0015  # between two distances that are an edge
 COLOURS = 48
 
@@ -38,7 +38,7 @@ class Piece:
 
 
 def painted(view: ParallelView, pieces: Sequence[Piece]) -> Image.Image:
-    """The bodies by their distances, each with a dark edge."""
+    """Draw the bodies by their distances, each with a dark edge."""
     columns, rows = view.size
     away = np.full(columns * rows, np.inf)
     which = np.full(columns * rows, -1)
@@ -54,7 +54,7 @@ def painted(view: ParallelView, pieces: Sequence[Piece]) -> Image.Image:
 
 
 def _edges(away: Array, which: Array) -> Array:
-    """Pixels of a nearer body at the border to another one, or to a farther piece of its own."""
+    """Return the pixels of a nearer body at the border to another one, or to a farther piece of its own."""
     edge = np.zeros(away.shape, bool)
     for axis in (0, 1):
         for turn in (1, -1):
@@ -65,7 +65,7 @@ def _edges(away: Array, which: Array) -> Array:
 
 
 def rod(start: Vector, along: Vector, radius: float, length: float, sides: int) -> Array:
-    """A prism about an axis, its ends closed: triangles, shape (4 sides, 3, 3), in the unit of `start`."""
+    """Return a closed prism about an axis: triangles, shape (4 sides, 3, 3), in the unit of `start`."""
     helper = np.eye(3)[int(np.argmin(np.abs(along)))]
     x = np.cross(helper, along)
     x /= np.linalg.norm(x)
@@ -78,7 +78,7 @@ def rod(start: Vector, along: Vector, radius: float, length: float, sides: int) 
 
 
 def png_bytes(image: Image.Image) -> bytes:
-    """The file of a picture, in few colours."""
+    """Return the file of a picture, in few colours."""
     file = io.BytesIO()
     image.quantize(COLOURS).save(file, "PNG")
     return file.getvalue()

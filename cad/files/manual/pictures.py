@@ -1,8 +1,8 @@
-"""The picture of each step: what stands already in grey, what comes in colour above its place, its screws called out.
+"""The picture of each step: present bodies in grey, new ones in colour before they are moved into place, screws named.
 
-The rotation axis stands upright, on the bench the lidar's. Of eight sides, from above and below, the one is taken that
-looks onto the heads of the screws; without screws the first. What comes is drawn where nothing hides it, off its place
-along the way that it takes, its screws and nuts off theirs. The bytes are the same for the same scanner.
+The rotation axis is upright, on the bench the lidar's axis. The view shows the heads of the screws: the best of eight
+sides, from above and below; without screws the first. New bodies are drawn where nothing hides them, away from their
+place along the path of their motion, with their screws and nuts. The same scanner gives the same bytes.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from scanwright.design.arrays import Array, Vector
 from scanwright.design.scene.parallel_view import ParallelView, view_of
 from scanwright.design.scene.ray_caster import Scene, build_scene
 
-SIZE = 720, 480  # pixels, wide and high
-WORDS = 210  # of them at the right, for the screws
-TEXT, LINE = 15, 20
+SIZE_PX = 720, 480  # pixels, wide and high
+WORDS_PX = 210  # of them at the right, for the screws
+TEXT_PX, LINE_PX = 15, 20
 MARGIN = 1.06
 YAWS_RAD = tuple(math.radians(40.0 + 45.0 * i) for i in range(8))  # the first as in the report
 PITCHES_RAD = math.radians(22.0), math.radians(-22.0)
-BELOW = 0.15  # by which a look from below must be the better one
-GAP_MM = 12.0  # between what comes and what stands
-OUT_MM = 8.0  # of screws and nuts, from where they end
+BELOW = 0.15  # by which a view from below must be better
+GAP_MM = 12.0  # between new and present bodies
+OUT_MM = 8.0  # of screws and nuts, from their final place
 SIDES = 24
 GREY, MADE, BOUGHT, METAL = (
     np.array(c, float) for c in ((222, 222, 219), (226, 112, 30), (44, 110, 168), (70, 70, 74))
 )
-INK, WAY, LIGHT = (20, 20, 20), (170, 20, 20), (255, 255, 255)
+INK, ARROW, LIGHT = (20, 20, 20), (170, 20, 20), (255, 255, 255)
 
 
 class StepPictures:
     """Pictures of the steps of one scanner; a body is prepared once for all of them."""
 
     def __init__(self, meshes: dict[str, TriMesh], made: frozenset[str]) -> None:
-        """Keep what is drawn.
+        """Keep the bodies.
 
         Args:
             meshes: of all bodies, rotation frame [mm].
@@ -53,25 +53,25 @@ class StepPictures:
         self._scenes: dict[str, Scene] = {}
 
     def picture(self, scene: StepScene, torques: Sequence[str]) -> bytes:
-        """PNG of one step; `torques` stand behind its screws, joint by joint."""
-        ways = {way: [name for name in scene.comes if (name in scene.against) == (way < 0)] for way in (1.0, -1.0)}
-        shifts = {way: self._lift(scene, names, way * scene.along) for way, names in ways.items() if names}
+        """Return the PNG of one step; `torques` belong to its screws, joint by joint."""
+        groups = {sign: [name for name in scene.comes if (name in scene.against) == (sign < 0)] for sign in (1.0, -1.0)}
+        shifts = {sign: self._lift(scene, names, sign * scene.along) for sign, names in groups.items() if names}
         pieces = [self._piece(name, np.zeros(3), GREY) for name in scene.there]
-        for way, shift in shifts.items():
-            pieces += [self._piece(name, shift, MADE if name in self._made else BOUGHT) for name in ways[way]]
-        held = [(joint, shifts[1.0] if joint.part in scene.comes else np.zeros(3)) for joint, _ in scene.joints]
-        pieces += [Piece(build_scene(body), moved, METAL) for joint, moved in held for body in _fasteners(joint)]
+        for sign, shift in shifts.items():
+            pieces += [self._piece(name, shift, MADE if name in self._made else BOUGHT) for name in groups[sign]]
+        placed = [(joint, shifts[1.0] if joint.part in scene.comes else np.zeros(3)) for joint, _ in scene.joints]
+        pieces += [Piece(build_scene(body), moved, METAL) for joint, moved in placed for body in _fasteners(joint)]
         corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) + piece.moved_m for piece in pieces])
         yaw, pitch = _side(scene)
-        width, height = SIZE
-        view = view_of(corners, (width - WORDS, height), yaw, pitch, MARGIN, scene.R_rot_picture)
-        image = Image.new("RGB", SIZE, LIGHT)
+        width, height = SIZE_PX
+        view = view_of(corners, (width - WORDS_PX, height), yaw, pitch, MARGIN, scene.R_rot_picture)
+        image = Image.new("RGB", SIZE_PX, LIGHT)
         image.paste(painted(view, pieces), (0, 0))
         pen = ImageDraw.Draw(image)
-        for way, shift in shifts.items():
+        for sign, shift in shifts.items():
             if np.any(shift):
-                self._way(pen, view, ways[way], shift)
-        _call_out(pen, view, held, torques)
+                self._move_arrow(pen, view, groups[sign], shift)
+        _call_out(pen, view, placed, torques)
         return png_bytes(image)
 
     def _piece(self, name: str, moved_m: Vector, colour: Array) -> Piece:
@@ -81,15 +81,15 @@ class StepPictures:
         return Piece(self._scenes[name], moved_m, colour)
 
     def _lift(self, scene: StepScene, comes: Sequence[str], along: Vector) -> Vector:
-        """How far what comes is off its place [m]: until it is clear of all that stands."""
+        """Return the displacement of new bodies [m] that clears all present ones."""
         if not scene.there:
             return np.zeros(3)
         top = max(float((self._meshes[name].vertices @ along).max()) for name in scene.there)
         low = min(float((self._meshes[name].vertices @ along).min()) for name in comes)
         return (max(0.0, top - low) + GAP_MM) / 1000 * along
 
-    def _way(self, pen: ImageDraw.ImageDraw, view: ParallelView, comes: Sequence[str], shift: Vector) -> None:
-        """An arrow beside what comes, from its middle down to where this will be."""
+    def _move_arrow(self, pen: ImageDraw.ImageDraw, view: ParallelView, comes: Sequence[str], shift: Vector) -> None:
+        """Draw an arrow next to new bodies, from their middle to its final place."""
         points = np.concatenate([self._meshes[name].vertices for name in comes]) / 1000
         flat = view.at(points + shift)
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -101,7 +101,7 @@ class StepPictures:
 
 
 def _side(scene: StepScene) -> tuple[float, float]:
-    """From where one sees most of the heads; rather from above."""
+    """Return yaw and pitch [rad] of the view that shows most of the heads, preferably from above."""
     heads = [-np.array(axis.along) @ scene.R_rot_picture for joint, _ in scene.joints for axis in joint.axes]
 
     def seen(yaw: float, pitch: float) -> float:
@@ -114,7 +114,7 @@ def _side(scene: StepScene) -> tuple[float, float]:
 
 
 def _fasteners(joint: Joint) -> list[Array]:
-    """Triangles of screws, and of nuts that one puts in with them, off their places [m], each of shape (t, 3, 3)."""
+    """Return triangles of screws and of their loose nuts, before they are put in [m], each of shape (t, 3, 3)."""
     bodies = []
     for axis in joint.axes:
         start, along = np.array(axis.start), np.array(axis.along)
@@ -138,23 +138,23 @@ def _screw(joint: Joint, under_head: Vector, along: Vector) -> Array:
 
 
 def _arrow(pen: ImageDraw.ImageDraw, start: Array, end: Array) -> None:
-    way = end - start
-    length = float(np.hypot(*way))
+    arrow = end - start
+    length = float(np.hypot(*arrow))
     if length < 12:
         return
-    along = way / length
+    along = arrow / length
     across = np.array([-along[1], along[0]])
-    for wide, colour in ((7, LIGHT), (3, WAY)):
+    for wide, colour in ((7, LIGHT), (3, ARROW)):
         pen.line([*start, *(end - 8 * along)], fill=colour, width=wide)
-    pen.polygon([tuple(p) for p in (end, end - 14 * along + 6 * across, end - 14 * along - 6 * across)], fill=WAY)
+    pen.polygon([tuple(p) for p in (end, end - 14 * along + 6 * across, end - 14 * along - 6 * across)], fill=ARROW)
 
 
 def _call_out(
-    pen: ImageDraw.ImageDraw, view: ParallelView, held: Sequence[tuple[Joint, Vector]], torques: Sequence[str]
+    pen: ImageDraw.ImageDraw, view: ParallelView, placed: Sequence[tuple[Joint, Vector]], torques: Sequence[str]
 ) -> None:
-    """A thin line from each screw along its way, and the words at the right with a leader to the nearest screw."""
-    font, told = ImageFont.load_default(TEXT), []
-    for (joint, moved), torque in zip(held, torques, strict=True):
+    """Draw a thin line from each screw along its path, and the text at the right with a leader to the nearest screw."""
+    font, callouts = ImageFont.load_default(TEXT_PX), []
+    for (joint, moved), torque in zip(placed, torques, strict=True):
         heads = []
         for axis in joint.axes:
             start, along = np.array(axis.start) / 1000, np.array(axis.along)
@@ -162,20 +162,20 @@ def _call_out(
             end = start + (0 if straight else moved)
             heads.append(view.at(start - _out(joint) / 1000 * along + moved))
             pen.line([*view.at(start - OUT_MM / 1000 * along + moved), *view.at(end)], fill=INK, width=1)
-        told.append((max(heads, key=lambda head: round(float(head[0]), 3)), _said(joint, torque)))
-    told.sort(key=lambda item: (float(item[0][1]), item[1]))
-    places = spread([float(head[1]) for head, _ in told], 4.5 * LINE)
-    over = max(0.0, max(places, default=0.0) + 4 * LINE - view.size[1])
+        callouts.append((max(heads, key=lambda head: round(float(head[0]), 3)), _lines_of(joint, torque)))
+    callouts.sort(key=lambda item: (float(item[0][1]), item[1]))
+    places = spread([float(head[1]) for head, _ in callouts], 4.5 * LINE_PX)
+    over = max(0.0, max(places, default=0.0) + 4 * LINE_PX - view.size[1])
     left = view.size[0]
-    for (head, words), place in zip(told, places, strict=True):
-        y = max(place - over, LINE)
+    for (head, words), place in zip(callouts, places, strict=True):
+        y = max(place - over, LINE_PX)
         pen.line([*head, left + 6, y, left + 12, y], fill=INK, width=1)
         for i, word in enumerate(words):
-            pen.text((left + 16, y + i * LINE), word, fill=INK, font=font, anchor="lm")
+            pen.text((left + 16, y + i * LINE_PX), word, fill=INK, font=font, anchor="lm")
 
 
-def _said(joint: Joint, torque: str) -> tuple[str, ...]:
-    """A joint in a few short lines."""
+def _lines_of(joint: Joint, torque: str) -> tuple[str, ...]:
+    """Return a joint in a few short lines."""
     nuts = (f"{joint.count} nuts {joint.screw.name}",) if joint.fixing in ("nut", "deck") else ()
     where = "against" if joint.fixing == "grub" else "into"
     return f"{joint.count} x {joint.number}", torque, f"{where} {joint.onto}", *nuts

@@ -1,6 +1,6 @@
-"""What each step of the assembly shows: what is there already, what comes, which way, and by which screws it is held.
+"""The scene of each assembly step: present bodies, new bodies, their direction, and their screws.
 
-A step works on the scanner as far as it stands, or on the bench, where it puts together what later comes as one.
+A step works on the scanner, or on the bench, where it assembles what is later put in as one piece.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ class StepScene:
 
     Attributes:
         thing: part or product that it puts in.
-        step: its words.
-        joints: that it closes, each with the mark in its words where it stands, none where the words have no place.
-        there: bodies that stand already, in alphabetical order.
-        comes: bodies that it brings.
-        against: those of them that come the other way.
+        step: its text.
+        joints: that it closes, each with its mark in the text; an empty mark if the text has none.
+        there: present bodies, in alphabetical order.
+        comes: new bodies.
+        against: those of them that come from the opposite side.
         along: unit vector, rotation frame, from which they come; 0 for leads, which are shown where they are laid.
-        R_rot_picture: the frame that stands upright on the bench: the lidar's own, or the rotation frame.
+        R_rot_picture: the frame that is upright on the bench: the lidar's own, or the rotation frame.
     """
 
     thing: str
@@ -46,38 +46,38 @@ class StepScene:
 
 
 def scenes_of(assembly: Assembly, joints: Sequence[Joint]) -> list[StepScene]:
-    """All steps in their order; every joint is in one of them, a last one has what no words name."""
+    """Return all steps in order; every joint is in one of them, and the last one has those that no text names."""
     steps = steps_of(assembly)
-    stands: set[str] = set()
+    present: set[str] = set()
     benches: list[set[str]] = []
     scenes = []
     for (thing, step), own in zip(steps, _closed(steps, joints), strict=True):
         ready = _bench_of({thing}, benches)
         comes = {thing, *step.brings} | ready
-        held = {assembly.thing(body) for joint, _ in own for body in (joint.part, joint.onto)} - {DECK}
-        beside = held - comes
-        if beside & stands:
-            comes |= _bench_of(beside, benches)
-            beside -= comes
-        alone = bool(own and stands and not beside and not ready)
-        on_bench = alone or bool(beside - stands)
-        there = (beside | _bench_of(beside, benches)) if on_bench else stands
+        joined = {assembly.thing(body) for joint, _ in own for body in (joint.part, joint.onto)} - {DECK}
+        neighbours = joined - comes
+        if neighbours & present:
+            comes |= _bench_of(neighbours, benches)
+            neighbours -= comes
+        alone = bool(own and present and not neighbours and not ready)
+        on_bench = alone or bool(neighbours - present)
+        there = (neighbours | _bench_of(neighbours, benches)) if on_bench else present
         scenes.append(_scene(assembly, thing, step, own, there, comes))
         benches = [bench for bench in benches if not bench & (there | comes)]
         if on_bench:
             benches.append(there | comes)
         else:
-            stands = stands | comes
+            present = present | comes
     return scenes
 
 
 def _bench_of(things: set[str], benches: Sequence[set[str]]) -> set[str]:
-    """What hangs together with some things that are on the bench."""
+    """Return everything on the bench that is joined to some things."""
     return {other for bench in benches if bench & things for other in bench}
 
 
 def _closed(steps: Sequence[tuple[str, Step]], joints: Sequence[Joint]) -> list[tuple[tuple[Joint, str], ...]]:
-    """Of each step the joints whose screws its words name, and the marks."""
+    """Return for each step the joints whose screws its text names, and the marks."""
     seat = next((joint.part for joint in joints if joint.onto == LIDAR_BODY), "")
     left = list(joints)
     closed = []
@@ -107,7 +107,7 @@ def _scene(
 ) -> StepScene:
     if not there and comes - {thing}:  # what is brought to the first of all
         there, comes = {thing}, comes - {thing}
-    along, R = _way(assembly, thing, there, comes)
+    along, R = _from(assembly, thing, there, comes)
     stand, come = (tuple(sorted(_bodies(things, assembly))) for things in (there, comes))
     against = tuple(name for name in come if name in assembly.bodies and assembly.bodies[name].from_below)
     return StepScene(thing, step, own, stand, come, against if thing not in comes else (), along, R)
@@ -119,8 +119,8 @@ def _bodies(things: set[str], assembly: Assembly) -> Iterator[str]:
             yield name
 
 
-def _way(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tuple[Vector, Rotation]:
-    """From where it comes: as the exploded view lifts it, from below where all that stands is above it."""
+def _from(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tuple[Vector, Rotation]:
+    """Return the direction it comes from: as in the exploded view, from below if all present bodies are above it."""
     lifted = "lidar" if thing == LIDAR else assembly.parts[thing].lifted if thing in assembly.parts else "axis"
     R = assembly.layout.stack.R()
     if thing in (ROTOR_LEADS, STANDING_LEADS):

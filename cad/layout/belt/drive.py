@@ -15,7 +15,7 @@ from scanwright.cad.layout.belt.stack import (
     case_corners,
     drive_corners,
 )
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Need, Rod
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
@@ -86,7 +86,7 @@ def belt_drive(scanner: Scanner) -> DriveLayout:
         stacked=STACKED,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
         borne=((names.SHAFT_RING, names.BEARING_TOWER),),
-        needs=((SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
+        needs=(Need("wiring", "soft tube", SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER),),
     )
 
 

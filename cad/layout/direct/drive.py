@@ -10,7 +10,7 @@ from scanwright.cad.layout import names
 from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, frame_of, needs_frame, no_rear_holes
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Rod
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Need, Rod
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.left_out import LeftOut
@@ -87,13 +87,15 @@ def direct_drive(scanner: Scanner) -> DriveLayout:
     )
 
 
-def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[tuple[str, str]]:
+def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[Need]:
     if scanner.slip_ring is not None:
-        yield "cable tie around the ring's stator", "groove of the adapter"
+        yield Need("wiring", "cable tie", "cable tie around the ring's stator", "groove of the adapter")
     if stack.bearing is not None:
-        yield f"retaining ring DIN 471 - {stack.retaining_ring}", "groove of the shaft, under the bearing's sleeve"
-        yield "retaining compound for metal, medium strength", "sleeve on the shaft"
-        yield "two-component epoxy, slow", "bearing in its printed seat"
+        ring = f"retaining ring DIN 471 - {stack.retaining_ring}"
+        compound = "retaining compound for metal, medium strength"
+        yield Need("consumable", "retaining ring", ring, "groove of the shaft, under the bearing's sleeve")
+        yield Need("consumable", "retaining compound", compound, "sleeve on the shaft")
+        yield Need("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat")
 
 
 def _mounted(scanner: Scanner, stack: DirectStack) -> Mounted:

@@ -176,7 +176,7 @@ class SlamtecLidar:
         """Stop what it does, and hear who it is; the line is closed where no one answers."""
         wanted = [series for series in SERIES.values() if model in (None, series.model)]
         with self._line.closed_on_error():
-            bauds = list(dict.fromkeys(series.baud for series in wanted))
+            bauds = list(dict.fromkeys(baud for series in wanted for baud in series.bauds))
             bauds = bauds if self._line.serial is not None else bauds[:1]  # a server has set its own line
             for baud in bauds:
                 if self._line.serial is not None:

@@ -1,8 +1,9 @@
-"""Points of an RPLIDAR's packets, with angles and times: they follow evenly, and their count is the clock."""
+"""Points of an RPLIDAR's packets, with angles and times: they are evenly spaced, and their count is the clock."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 
@@ -12,19 +13,21 @@ from scanwright.firmware_io.lidar.turn import Points
 
 _RATE_MAX = 0.05  # of points per second beside what it states: A1s measure 4 to 8 thousand
 _JUMP_DEG = 20.0  # from node to node: some were lost; angles that are triangulated go to and fro by less
-_UNEVEN = 0.1  # of a capsule's span, which no motor changes so fast: something was lost between two
+_UNEVEN = 0.1  # of a capsule's span, which a motor at speed does not change so fast: something was lost between two
+_BEYOND = 1.5  # times the span at full speed: between one capsule and two
+_EVEN = 5  # capsules with even spans that show a motor at speed: 60 ms of an A1, 6 ms of an S2
 
 
 class PointCount:
     """What was measured since the stream began.
 
     Attributes:
-        arrivals: the sensor's time, told by the count, on the host's clock.
-        broken: so much was lost that nobody can tell how many points; what comes next needs a new count.
+        arrivals: the sensor's time, by the count, on the host's clock.
+        broken: an unknown number of points was lost; what comes next needs a new count.
     """
 
     def __init__(self, kind: int, point_ns: float, baud: int) -> None:
-        """Nothing was measured yet.
+        """Begin before the first point.
 
         Args:
             kind: type of the packets.
@@ -37,7 +40,8 @@ class PointCount:
         self.broken = False
         self._before: protocol.SlamtecPacket | None = None
         self._points = 0
-        self._span_deg = 0.0  # of a capsule; 0 before one was whole
+        self._spans_deg: deque[float] = deque(maxlen=_EVEN)  # of the last capsules
+        self._fastest_deg = 0.0  # span at the highest even speed
 
     def placed(self, packets: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> list[Points]:
         """The points that are known now, up to where the count breaks.
@@ -78,31 +82,47 @@ class PointCount:
         return [Points(angle_deg, range_m, quality, sensor_ns)]
 
     def _capsule(self, packet: protocol.SlamtecPacket, after_garbage: bool, arrival_ns: int) -> Points | None:
-        """Its start ends the capsule before it, whose points are placed now; lost ones are told by the angle.
-
-        It tells them but for whole turns. What comes half a turn late behind lost ones has more of them before it, and
-        what comes before the lost ones could have been measured has none: the motor is changing its speed.
-        """
+        """Place the points of the capsule before this one, which ends at this one's start."""
         many = protocol.POINTS[self._kind]
         before, self._before = self._before, packet
         points = None
         if before is not None:
             span_deg = (packet.start_deg - before.start_deg) % 360
-            capsules = span_deg / self._span_deg if self._span_deg else 1.0
-            lost = max(round(capsules) - 1, 0)
-            if lost or after_garbage or abs(capsules - 1) > _UNEVEN:
-                late_ns = arrival_ns - self.arrivals.arrives_ns((self._points + many * (lost + 1) - 1) * self._point_ns)
-                if self._span_deg and late_ns > 180 / self._span_deg * many * self._point_ns:
-                    self.broken = True
-                    return None
-                if late_ns < -lost * many * self._point_ns / 2:
-                    lost = 0
+            lost = self._lost(span_deg, after_garbage, arrival_ns)
+            if self.broken:
+                return None
             if lost == 0 and not after_garbage:
-                self._span_deg = span_deg
+                self._spans_deg.append(span_deg)
+                whole = before.before(packet)
                 number = self._points + np.arange(-many, 0)
-                angle_deg = (before.start_deg + np.arange(many) * (span_deg / many) - before.offset_deg) % 360
-                points = Points(angle_deg, before.range_m, before.quality, number * self._point_ns)
+                angle_deg = (before.start_deg + np.arange(many) * (span_deg / many) - whole.offset_deg) % 360
+                points = Points(angle_deg, whole.range_m, whole.quality, number * self._point_ns)
             self._points += many * lost
         self._points += many
         self.arrivals.add((self._points - 1) * self._point_ns, arrival_ns)
         return points
+
+    def _lost(self, span_deg: float, after_garbage: bool, arrival_ns: int) -> int:
+        """How many capsules were lost between two starts; `broken` is set if that is unknown.
+
+        At full speed the span shows it, but for whole turns. A capsule that is half a turn late has more lost ones
+        before it; one that is too early for lost ones has none: the motor changes its speed. While it spins up, or is
+        braked, capsules whose bytes follow each other have lost none between them.
+        """
+        if len(self._spans_deg) < _EVEN or max(self._spans_deg) > (1 + _UNEVEN) * min(self._spans_deg):
+            self.broken = after_garbage
+            return 0
+        usual_deg = sum(self._spans_deg) / _EVEN
+        self._fastest_deg = max(self._fastest_deg, usual_deg)
+        if not usual_deg:  # the motor stands
+            return 0
+        many_ns = protocol.POINTS[self._kind] * self._point_ns
+        capsules = span_deg / usual_deg
+        lost = max(round(capsules) - 1, 0)
+        if lost or after_garbage or abs(capsules - 1) > _UNEVEN:
+            last_ns = self._points * self._point_ns + (lost + 1) * many_ns - self._point_ns
+            late_ns = arrival_ns - self.arrivals.arrives_ns(last_ns)
+            self.broken = late_ns > 180 / usual_deg * many_ns
+            if late_ns < -lost * many_ns / 2 or (not after_garbage and span_deg < _BEYOND * self._fastest_deg):
+                return 0
+        return lost

@@ -1,8 +1,8 @@
-"""What Slamtec lidars are told and say: pure functions of bytes. Numbers are little-endian, angles grow clockwise.
+"""Protocol of Slamtec lidars: pure functions of bytes. Numbers are little-endian, angles grow clockwise.
 
-A request is A5 and a command; with a payload its length and the exclusive or of all before it follow. A reply begins
-with a descriptor: A5 5A, length (30 bits) with the mode in its two highest bits, and a type. Streams have no descriptor
-but the first: nodes of 5 bytes, or capsules of 84.
+A request is A5 and a command; a payload is preceded by its length and followed by the exclusive or of all. A reply
+begins with a descriptor: A5 5A, length (30 bits) with the mode in its two highest bits, and a type. After its first
+descriptor a stream has none: nodes of 5 bytes, capsules of 84, or ultra capsules of 132.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from operator import xor
 from typing import Final
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 from numpy import ndarray
 
 from scanwright.design.arrays import Float32s
@@ -33,6 +33,7 @@ MOTOR_RPM: Final = 0xA8
 
 NODES: Final = 0x81
 CAPSULES: Final = 0x82
+ULTRA: Final = 0x84
 DENSE: Final = 0x85
 
 CONF_SAMPLE_US: Final = 0x71
@@ -42,10 +43,13 @@ CONF_TYPICAL: Final = 0x7C
 _MARK = b"\xa5\x5a"
 _DESCRIPTOR_SIZE = 7
 _LONGEST_REPLY = 512
-_CAPSULE_SIZE = 84
+_CAPSULE_SIZE, _ULTRA_SIZE = 84, 132
 _NODE_SIZE = 5
-SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, DENSE: _CAPSULE_SIZE}
-POINTS: Final = {NODES: 1, CAPSULES: 32, DENSE: 40}
+SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, ULTRA: _ULTRA_SIZE, DENSE: _CAPSULE_SIZE}
+POINTS: Final = {NODES: 1, CAPSULES: 32, ULTRA: 96, DENSE: 40}
+_SCALE_COUNT = np.array([0, 512, 1280, 1792, 3328])  # of an ultra capsule: where each part of its scale begins,
+_SCALE_MM = np.array([0, 512, 2048, 4096, 16_384])  # at which range, in steps of 1, 2, 4, 8 and 16 mm
+_NO_RETURN = (-512, 511)  # of a predicted range
 _CABINS = np.dtype([("distance", "<u2", 2), ("offsets", "u1")])
 
 
@@ -69,14 +73,15 @@ class Info:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamtecPacket:
-    """What one packet of a stream tells.
+    """One packet of a stream.
 
     Attributes:
         start_deg: clockwise from the front.
         first: whether the stream begins, or of a node, whether a turn does.
-        range_m: shape (n,), NaN where nothing came back.
-        quality: shape (n,), 0 in capsules, which tell none.
+        range_m: shape (n,), NaN without a return.
+        quality: shape (n,), 0 in capsules, which have none.
         offset_deg: by how much each point lies before its place between this start and the next, shape (n,).
+        words: of an ultra capsule, shape (32,); None for the others.
     """
 
     start_deg: float
@@ -84,6 +89,13 @@ class SlamtecPacket:
     range_m: Float32s
     quality: Float32s
     offset_deg: Float64[ndarray, " n"]
+    words: Int64[ndarray, " cabins"] | None = None
+
+    def before(self, after: SlamtecPacket) -> SlamtecPacket:
+        """Return this packet as the next one completes it: an ultra capsule's last range refers to the next first."""
+        if self.words is None or after.words is None:
+            return self
+        return _ultra(self.start_deg, self.words, int(after.words[0]), first=self.first)
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
@@ -166,7 +178,7 @@ def capsule(data: bytes) -> SlamtecPacket:
     Raises:
         ProtocolError: it does not begin as one, or its sum is wrong.
     """
-    start_deg, first = _capsule_start(data)
+    start_deg, first = _capsule_start(data, _CAPSULE_SIZE)
     cabins = np.frombuffer(data, _CABINS, 16, 4)
     distance = cabins["distance"].astype(np.int64)
     low = np.stack([cabins["offsets"] & 0xF, cabins["offsets"] >> 4], axis=1).astype(np.int64)
@@ -177,18 +189,28 @@ def capsule(data: bytes) -> SlamtecPacket:
     )
 
 
+def ultra(data: bytes) -> SlamtecPacket:
+    """An ultra capsule: 96 points between its start and the next one's; see `SlamtecPacket.before`.
+
+    Raises:
+        ProtocolError: it does not begin as one, or its sum is wrong.
+    """
+    start_deg, first = _capsule_start(data, _ULTRA_SIZE)
+    return _ultra(start_deg, np.frombuffer(data, "<u4", 32, 4).astype(np.int64), 0, first=first)
+
+
 def dense(data: bytes) -> SlamtecPacket:
     """A dense capsule: 40 points, evenly between its start and the next one's.
 
     Raises:
         ProtocolError: it does not begin as one, or its sum is wrong.
     """
-    start_deg, first = _capsule_start(data)
+    start_deg, first = _capsule_start(data, _CAPSULE_SIZE)
     range_mm = np.frombuffer(data, "<u2", 40, 4)
     return SlamtecPacket(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))
 
 
-_READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: capsule, DENSE: dense}
+_READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: capsule, ULTRA: ultra, DENSE: dense}
 
 
 class ReplySplitter:
@@ -259,8 +281,28 @@ class SlamtecSplitter:
         return packets
 
 
-def _capsule_start(data: bytes) -> tuple[float, bool]:
-    if len(data) != _CAPSULE_SIZE or data[0] >> 4 != 0xA or data[1] >> 4 != 0x5:
+def _ultra(start_deg: float, words: Int64[ndarray, " cabins"], next_word: int, *, first: bool) -> SlamtecPacket:
+    """Decode the words of an ultra capsule: a major range of 12 bits, and two of 10 bits that are predicted.
+
+    The first refers to the major range of its word, the second to that of the next; the angle is corrected for the
+    parallax of triangulation (facts of rplidar_sdk 2.1, handler_capsules.cpp).
+    """
+    major = np.append(words, next_word) & 0xFFF
+    bits = np.searchsorted(_SCALE_COUNT, major, side="right") - 1
+    range_mm = _SCALE_MM[bits] + (major - _SCALE_COUNT[bits] << bits)
+    known = np.where((range_mm[:-1] == 0) & (range_mm[1:] > 0), 1, 0) + np.arange(32)
+    steps = np.stack([words >> 12 & 0x3FF, words >> 22 & 0x3FF])
+    steps -= (steps & 0x200) << 1
+    bases = np.stack([known, np.arange(1, 33)])
+    predicted_mm = np.where(np.isin(steps, _NO_RETURN), 0, range_mm[bases] + (steps << bits[bases]))
+    all_mm = np.stack([range_mm[:-1], *predicted_mm], axis=1).ravel()
+    ratio = 98_361 // np.maximum(4 * all_mm, 1)
+    offset_deg = np.where(all_mm >= 50, 8.0 - np.degrees((64 * ratio + ratio**3 / 98_304) / 65_536), 7.5)
+    return SlamtecPacket(start_deg, first, _ranges_m(all_mm), np.zeros(96, np.float32), offset_deg, words)
+
+
+def _capsule_start(data: bytes, size: int) -> tuple[float, bool]:
+    if len(data) != size or data[0] >> 4 != 0xA or data[1] >> 4 != 0x5:
         raise ProtocolError(f"RPLIDAR: {len(data)} bytes that begin with {data[:2].hex()}: no capsule")
     if reduce(xor, data[2:]) != (data[0] & 0xF | (data[1] & 0xF) << 4):
         raise ProtocolError("RPLIDAR: the sum of a capsule is wrong")

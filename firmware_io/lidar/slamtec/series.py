@@ -1,4 +1,4 @@
-"""Which RPLIDAR it is by the model it tells, the speed of its line, and what starts its motor."""
+"""Series of RPLIDARs by the byte of their model: speeds of the line, and what starts the motor."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """What tells one series from another: the catalogue's name, the line's speed, and what starts the motor."""
+    """A series: name in the catalogue, speeds of the line (A2M8: 115,200), and what starts the motor."""
 
     model: str
-    baud: int
+    bauds: tuple[int, ...]
     motor: Literal["dtr", "pwm", "rpm", "scan"]
 
 
-# by the higher half of the model's byte; that of the C1 is one user's word
+# by the upper half of the model's byte, as rplidar_sdk 2.1 lists them
 SERIES = {
-    1: Series("RPLIDAR A1", 115_200, "dtr"),
-    2: Series("RPLIDAR A2", 256_000, "pwm"),
-    3: Series("RPLIDAR A3", 256_000, "pwm"),
-    4: Series("RPLIDAR C1", 460_800, "scan"),
-    6: Series("RPLIDAR S1", 256_000, "rpm"),
-    7: Series("RPLIDAR S2", 1_000_000, "rpm"),
+    1: Series("RPLIDAR A1", (115_200,), "dtr"),
+    2: Series("RPLIDAR A2", (256_000, 115_200), "pwm"),
+    3: Series("RPLIDAR A3", (256_000,), "pwm"),
+    4: Series("RPLIDAR C1", (460_800,), "scan"),
+    6: Series("RPLIDAR S1", (256_000,), "rpm"),
+    7: Series("RPLIDAR S2", (1_000_000,), "rpm"),
 }

@@ -1,4 +1,4 @@
-"""The scanner's frames from `/joint_states` by `robot_state_publisher`, where the node runs with `--no-tf`.
+"""The scanner's frames from `/joint_states` by `robot_state_publisher`, if the node runs with `--no-tf`.
 
     ros2 launch THIS_PACKAGE description_launch.py [laser_mount_xyz:='X Y Z'] [laser_mount_rpy:='R P Y'] ...
 
@@ -17,7 +17,7 @@ FRAMES = tuple(f"{joint}_{part}" for joint in ("servo_mount", "laser_mount") for
 
 
 def with_frames(urdf: str, value_of: Callable[[str], str]) -> str:
-    """A URDF with the frames that the launch parameters name in the place of its own; "" leaves one as it is."""
+    """Replace frames of a URDF by those of the launch parameters; "" keeps a frame."""
     robot = ElementTree.fromstring(urdf)
     for name in FRAMES:
         joint, part = name.rsplit("_", 1)
@@ -28,7 +28,7 @@ def with_frames(urdf: str, value_of: Callable[[str], str]) -> str:
 
 
 def generate_launch_description() -> Any:
-    """What `ros2 launch` asks for."""
+    """Return the launch description, as `ros2 launch` requires."""
     from ament_index_python.packages import get_package_share_directory
     from launch import LaunchDescription
     from launch.actions import DeclareLaunchArgument, OpaqueFunction

@@ -1,10 +1,10 @@
-"""What RViz and Foxglove show of a scanner: its description, its points over one turn, its frames."""
+"""Layouts for RViz and Foxglove: description, points of one turn, frames."""
 
 from __future__ import annotations
 
 import json
 
-_LEAST_DECAY_S = 1.0
+_LEAST_DECAY_S = 1.0  # points of a sweep or a stop stay visible
 _RVIZ = """Panels:
   - Class: rviz_common/Displays
     Name: Displays
@@ -66,12 +66,12 @@ Visualization Manager:
 
 
 def rviz_layout(period_s: float) -> str:
-    """A configuration of RViz; points stay for one turn of `period_s` (0 where the axis does not spin)."""
+    """Return a configuration of RViz; points stay for one turn of `period_s` (0 if the axis does not spin)."""
     return _RVIZ.format(decay_s=max(period_s, _LEAST_DECAY_S))
 
 
 def foxglove_layout(period_s: float) -> str:
-    """A layout of Foxglove, to be imported there; points stay as in RViz."""
+    """Return a layout to import in Foxglove; points stay as in RViz."""
     points = {
         "visible": True,
         "colorField": "z",

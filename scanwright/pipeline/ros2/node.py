@@ -11,7 +11,7 @@ import sys
 
 
 def command(words: list[str], share: str) -> list[str]:
-    """The words after `python -m scanwright`.
+    """Return the arguments after `python -m scanwright`.
 
     Args:
         words: as given to this program.
@@ -23,7 +23,7 @@ def command(words: list[str], share: str) -> list[str]:
 
 
 def main() -> None:
-    """Become the node."""
+    """Replace this process by the node."""
     from ament_index_python.packages import get_package_share_directory
 
     words = command(sys.argv[1:], get_package_share_directory("THIS_PACKAGE"))

@@ -76,7 +76,7 @@ install_scripts=$base/lib/{name}
 
 
 def package_name(task: str) -> str:
-    """Name of a task's package, as REP 144 wants names: lower case, digits, single underscores, a letter first."""
+    """Return a package name by REP 144: lower case, digits, single underscores, a letter first."""
     name = re.sub(r"[^a-z0-9]+", "_", f"{task.lower()}_scanner").strip("_")
     return name if name[0].isalpha() else f"task_{name}"
 
@@ -107,8 +107,8 @@ def write_package(build: Path) -> None:
     for launch in _LAUNCH:
         _write_script(root / "launch" / launch, name)
     _write_script(root / name / "node.py", name)
-    for beside in ("angles.json", "own_body.npz"):
-        shutil.copyfile(build / beside, root / beside)
+    for name_of_file in ("angles.json", "own_body.npz"):
+        shutil.copyfile(build / name_of_file, root / name_of_file)
 
 
 def _depends() -> str:
@@ -116,12 +116,12 @@ def _depends() -> str:
 
 
 def _write_script(target: Path, name: str) -> None:
-    """A file of this folder, for the package of that name."""
+    """Write a file of this folder for the package of that name."""
     target.write_text((_HERE / target.name).read_text(encoding="utf-8").replace("THIS_PACKAGE", name), encoding="utf-8")
 
 
 def _urdf(build: Path, root: Path, name: str) -> str:
-    """The description, its meshes where every program of ROS finds them; they are copied there."""
+    """Return the description with `package://` meshes, and copy the meshes."""
     robot = ElementTree.fromstring((build / "scanner.urdf").read_text(encoding="utf-8"))
     for mesh in robot.iter("mesh"):
         source = build / mesh.get("filename", "")

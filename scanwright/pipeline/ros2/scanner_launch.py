@@ -9,7 +9,7 @@ from typing import Any
 
 
 def generate_launch_description() -> Any:
-    """What `ros2 launch` asks for."""
+    """Return the launch description, as `ros2 launch` requires."""
     from launch import LaunchDescription
     from launch.actions import DeclareLaunchArgument, OpaqueFunction
     from launch.conditions import IfCondition

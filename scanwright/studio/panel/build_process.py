@@ -15,9 +15,9 @@ class BuildProcess:
     """One build that runs; `told` gets the share done and the last line, `done` the exit code and the last line."""
 
     def __init__(
-        self, task_file: Path, out: Path, told: Callable[[float, str], None], done: Callable[[int, str], None]
+        self, task_file: Path, out: Path, progress: Callable[[float, str], None], done: Callable[[int, str], None]
     ) -> None:
-        self._told, self._done = told, done
+        self._progress, self._done = progress, done
         # what a person would type, with this very interpreter; -P: no module of the folder it runs in
         command = [sys.executable, "-P", "-m", "scanwright", "build", str(task_file), "--out", str(out)]
         self._process = subprocess.Popen(
@@ -42,6 +42,6 @@ class BuildProcess:
         last = ""
         for number, line in enumerate(self._process.stdout):
             last = line.strip().removeprefix(".. ") or last
-            self._told(min(number / STEPS, 0.98), last)
+            self._progress(min(number / STEPS, 0.98), last)
         self._process.stdout.close()
         self._done(self._process.wait(), last)

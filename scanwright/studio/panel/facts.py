@@ -19,9 +19,9 @@ from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.task.task import LoadedTask
 from scanwright.studio.state import Setting
 
-DRAG_NODES = 2187
-DRAG_PERIOD_NODES = 243
-WALL_M = 10.0
+DRAG_NODES = 2187  # 3^7, fewer than `NODES`, to follow the hand; the panel shows the larger error
+DRAG_PERIOD_NODES = 243  # 3^5: the search for a period computes J many times
+WALL_M = 10.0  # range at which gaps are given in millimetres
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,18 +92,18 @@ class Judge:
         planes = on_planes(self.loaded, self.problem, facts.setting.angles_rad)
         return replace(facts, period_s=period_s, planes=tuple((figures.region, figures) for figures in planes))
 
-    def _facts(self, setting: Setting, found: Score, *, exact: bool) -> Facts:
+    def _facts(self, setting: Setting, result: Score, *, exact: bool) -> Facts:
         plane = setting.angles_rad[None, 2:]
         turns = self.loaded.task.motion.mode in ("spin", "shortest")
-        within_reach = found.blind_weight == 0 and turns
+        within_reach = result.blind_weight == 0 and turns
         return Facts(
             setting=setting,
-            J=found.J,
-            J_error=found.J_error,
+            J=result.J,
+            J_error=result.J_error,
             exact=exact,
             blind_cone_deg=float(blind_cones_deg(self.problem, plane)[0]),
             gap_deg=float(line_gaps_deg(self.problem, plane)[0]),
-            blind_weight=found.blind_weight,
+            blind_weight=result.blind_weight,
             period_s=self._period_s(setting, DRAG_PERIOD_NODES) if within_reach else math.nan,
             density=self._least,
             mounts=self.mounts,

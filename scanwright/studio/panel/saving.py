@@ -48,7 +48,7 @@ class Saving:
         put(c.building, 0.0)
         c.building.visible = True
 
-        def told(share: float, line: str) -> None:
+        def progress(share: float, line: str) -> None:
             put(c.building, 100 * share)
             c.built.content = note_html(line)
 
@@ -57,7 +57,7 @@ class Saving:
             end = f"built {self._out / path.stem}: open its report.html" if code == 0 else f"build ended: {line}"
             c.built.content = note_html(end, bad=code != 0)
 
-        self._building = BuildProcess(path, self._out, told, done)
+        self._building = BuildProcess(path, self._out, progress, done)
 
     def close(self) -> None:
         """End a build that runs."""

@@ -16,11 +16,11 @@ from scanwright.design.sphere.regions import Field
 from scanwright.serving.style import Colours, ramp
 
 TILES = 5_000  # 2.9 deg each; of more, a browser without a graphics card draws less than ten pictures a second
-RADIUS_M = 0.5
+RADIUS_M = 0.5  # of the sphere of densities about the scanner
 OVERLAP = 1.25  # of the hexagons, so that no seam shows
-BLIND = (236, 236, 240)
+BLIND = (236, 236, 240)  # directions that no beam enters: a grey that is not in the scale
 LEAST_OF_HIGHEST = 300  # the scale of `density.png`
-EDGE_STEP_DEG = 1.0
+EDGE_STEP_DEG = 1.0  # between the corners of a drawn outline
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,13 +83,13 @@ def edges(field: Field) -> tuple[Array, Array]:
 def _segments(table: Array, theta: Array, phi: Array) -> Array:
     levels = np.unique(table)
     generator = contourpy.contour_generator(phi, theta, table, line_type=contourpy.LineType.Separate)
-    found = [np.empty((0, 2, 3))]
+    hit = [np.empty((0, 2, 3))]
     for level in (levels[:-1] + levels[1:])[:8] / 2:  # a map has many: a few tell its shape
         for line in generator.lines(float(level)):
             p, t = np.asarray(line).T
             points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=1)
-            found.append(np.stack([points[:-1], points[1:]], axis=1))
-    return np.concatenate(found)
+            hit.append(np.stack([points[:-1], points[1:]], axis=1))
+    return np.concatenate(hit)
 
 
 def direction_hit(origin_m: Array, direction: Array, *, inside: bool) -> Array | None:

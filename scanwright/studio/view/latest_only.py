@@ -1,4 +1,4 @@
-"""Work that follows a hand: of all wishes only the newest is worth doing."""
+"""A worker thread that does the newest request only."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
-REST_S = 0.25  # without a wish: the hand has let go
+REST_S = 0.25  # without a request: the hand has let go
 
 
 class LatestOnly(Generic[T]):
-    """A thread that does the newest wish, and once no other has come for a while, what belongs to the rest.
+    """A thread that does the newest request, and other work once no request has come for a while.
 
-    A wish that comes while another is being done waits; one that waits is replaced by the next.
+    A request waits while another one is being done; the next one replaces a request that waits.
     """
 
     def __init__(
@@ -23,23 +23,23 @@ class LatestOnly(Generic[T]):
     ) -> None:
         self._work, self._rest, self._rest_s = work, rest, rest_s
         self._changed = Condition()
-        self._wishes: list[T] = []
+        self._waiting: list[T] = []
         self._open, self._idle = True, True
         self.replaced = 0
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def wish(self, wish: T) -> None:
-        """Ask for this and for nothing that was asked before."""
+    def request(self, request: T) -> None:
+        """Do this next, in place of a request that waits."""
         with self._changed:
-            self.replaced += len(self._wishes)
-            self._wishes = [wish]
+            self.replaced += len(self._waiting)
+            self._waiting = [request]
             self._changed.notify_all()
 
     def settled(self, timeout_s: float) -> bool:
         """Wait until all is done; False where that takes longer."""
         with self._changed:
-            return self._changed.wait_for(lambda: self._idle and not self._wishes, timeout_s)
+            return self._changed.wait_for(lambda: self._idle and not self._waiting, timeout_s)
 
     def close(self) -> None:
         """Finish what is being done, and end."""
@@ -51,26 +51,26 @@ class LatestOnly(Generic[T]):
     def _run(self) -> None:
         while True:
             with self._changed:
-                if not self._wishes:
+                if not self._waiting:
                     self._idle = True
                     self._changed.notify_all()
-                self._changed.wait_for(lambda: self._wishes or not self._open)
+                self._changed.wait_for(lambda: self._waiting or not self._open)
                 if not self._open:
                     return
                 self._idle = False
-                wish = self._wishes.pop()
-            _guarded(self._work, wish)
+                request = self._waiting.pop()
+            _guarded(self._work, request)
             if self._rest is None:
                 continue
             with self._changed:
-                if self._changed.wait_for(lambda: self._wishes or not self._open, self._rest_s):
+                if self._changed.wait_for(lambda: self._waiting or not self._open, self._rest_s):
                     continue
-            _guarded(self._rest, wish)
+            _guarded(self._rest, request)
 
 
-def _guarded(work: Callable[[T], None], wish: T) -> None:
-    """A fault of one wish is told, and is not the end of the thread."""
+def _guarded(work: Callable[[T], None], request: T) -> None:
+    """Print the fault of a request; the thread goes on."""
     try:
-        work(wish)
+        work(request)
     except Exception:
         traceback.print_exc()

@@ -27,11 +27,11 @@ SIDES: dict[Look, Literal["front", "back"]] = {
     "hidden": "back",
 }
 AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body has its own colour at pi
-SPHERE_EYE_M = (-0.75, 0.95, 0.65)
+SPHERE_EYE_M = (-0.75, 0.95, 0.65)  # behind, left and above: ahead points away from the viewer
 MARK = 1.12  # of the radius: words are drawn there
 LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
 WEIGHT_EDGE, MASK_EDGE, FAN = (255, 255, 255), (224, 49, 49), (43, 138, 62)
-POINT_M = 0.012
+POINT_M = 0.012  # as in the page of a scan, `live.cloud_view`
 GHOST = 0.25  # opacity of parts that belong to an earlier setting
 
 
@@ -42,7 +42,7 @@ class View3D:
         self._server, self._scene = server, server.scene
         self._looked: Look = "in its room"
         self._room: viser.BatchedMeshHandle | None = None
-        self._stands_in: Room | None = None
+        self._placeholder: Room | None = None
         self._room_eye_m = SPHERE_EYE_M
         self._bodies: dict[bool, list[viser.MeshHandle]] = {True: [], False: []}
         self._edges: tuple[Array, ...] = ()
@@ -96,10 +96,10 @@ class View3D:
     def stand_in(self, task: Task) -> None:
         """Put up the room of a task, in the colour of what has none yet."""
         room, _ = room_about(task)
-        before = self._stands_in
+        before = self._placeholder
         if before is not None and np.array_equal([before.low, before.high], [room.low, room.high]):
             return  # paint changes what counts, and no wall
-        self._stands_in, self.room = room, room_tiles(room)
+        self._placeholder, self.room = room, room_tiles(room)
         x, y, z = room.high - room.low
         self._room_eye_m = (float(-0.8 * x), float(0.8 * y), float(0.5 * (x + z)))
         self._server.initial_camera.position = self._room_eye_m
@@ -165,8 +165,8 @@ class View3D:
 
     def _shown_at(self, directions: Array) -> Array:
         """Where directions are drawn: just before the walls of the room or the tiles of the sphere, shape (..., 3)."""
-        if self._looked == "in its room" and self._stands_in is not None:
-            return (1 - LIFT) * self._stands_in.walls_along(directions)
+        if self._looked == "in its room" and self._placeholder is not None:
+            return (1 - LIFT) * self._placeholder.walls_along(directions)
         return RADIUS_M * (1 - LIFT if self.inside else 1 + LIFT) * directions
 
     def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:

@@ -56,22 +56,22 @@ class Order:
 
 
 class Workers:
-    """Orders in, bodies and points into the view; `say` gets what is being made and whether it was refused."""
+    """Orders in, bodies and points into the view; `show` gets what is being made and whether it was refused."""
 
-    def __init__(self, view: View3D, say: Callable[[str, bool], None]) -> None:
+    def __init__(self, view: View3D, show: Callable[[str, bool], None]) -> None:
         self._view = view
         self._shown: dict[bool, Scanner] = {}
-        said = _Said(say)
+        status = _StatusLine(show)
         self._workers = (
-            _Worker("what turns", lambda worker, order: self._half(worker, order, turning=True), said),
-            _Worker("what stands", lambda worker, order: self._half(worker, order, turning=False), said),
-            _Worker("scan", self._scan, said),
+            _Worker("what turns", lambda worker, order: self._half(worker, order, turning=True), status),
+            _Worker("what stands", lambda worker, order: self._half(worker, order, turning=False), status),
+            _Worker("scan", self._scan, status),
         )
 
     def order(self, order: Order) -> None:
         """Make this, and nothing that was ordered before and has not begun."""
         for worker in self._workers:
-            worker.orders.wish(order)
+            worker.orders.request(order)
 
     def settled(self, timeout_s: float) -> bool:
         """Wait until all is made; False where that takes longer."""
@@ -111,14 +111,14 @@ class Workers:
 class _Worker:
     """A process that stays, and the thread that hands it the newest order."""
 
-    def __init__(self, name: str, work: Callable[[_Worker, Order], None], said: _Said) -> None:
-        self._name, self._work, self._said = name, work, said
+    def __init__(self, name: str, work: Callable[[_Worker, Order], None], status: _StatusLine) -> None:
+        self._name, self._work, self._status = name, work, status
         self._pool, self._open = spawn_pool(), True
         self.orders: LatestOnly[Order] = LatestOnly(name, self._follow)
 
     def ask(self, word: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Have the process call a function, and say so meanwhile."""
-        self._said.say(self._name, word)
+        self._status.show(self._name, word)
         return self._pool.submit(function, *args, **kwargs).result()
 
     def close(self) -> None:
@@ -132,30 +132,30 @@ class _Worker:
             return
         try:
             self._work(self, order)
-            self._said.say(self._name, "")
+            self._status.show(self._name, "")
         except ScanwrightError as error:
-            self._said.say(self._name, str(error), bad=True)
+            self._status.show(self._name, str(error), bad=True)
         except BrokenExecutor:
             if self._open:
-                self._said.say(self._name, f"{self._name}: its process ended; the next one begins", bad=True)
+                self._status.show(self._name, f"{self._name}: its process ended; the next one begins", bad=True)
                 self._pool = spawn_pool()
         except Exception:
-            self._said.say(self._name, f"{self._name}: a fault of the program: see the terminal", bad=True)
+            self._status.show(self._name, f"{self._name}: a fault of the program: see the terminal", bad=True)
             raise
 
 
 @dataclass(slots=True)
-class _Said:
-    """What the workers say, as one line: refusals before what is being done, the same words once."""
+class _StatusLine:
+    """The messages of the workers as one line: errors before work, the same text once."""
 
-    tell: Callable[[str, bool], None]
+    print: Callable[[str, bool], None]
     _lines: dict[str, tuple[str, bool]] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
 
-    def say(self, worker: str, text: str, *, bad: bool = False) -> None:
-        """What one worker has to say now in place of what it said; nothing where that is empty."""
+    def show(self, worker: str, text: str, *, bad: bool = False) -> None:
+        """Replace the message of one worker; an empty one removes it."""
         with self._lock:
             self._lines[worker] = (text, bad)
-            said = [text for text, bad in self._lines.values() if bad]
-            said = said or [text for text, _ in self._lines.values() if text]
-            self.tell("; ".join(dict.fromkeys(said)), any(bad for _, bad in self._lines.values()))
+            texts = [text for text, bad in self._lines.values() if bad]
+            texts = texts or [text for text, _ in self._lines.values() if text]
+            self.print("; ".join(dict.fromkeys(texts)), any(bad for _, bad in self._lines.values()))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanwright.cad.checks.deflection import sag_of, split
+from scanwright.cad.checks.loads.deflection import sag_of, split
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.direct.loads import hanging, shaft_modulus_pa

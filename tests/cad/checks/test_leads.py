@@ -9,8 +9,8 @@ from scanners import scanner_at
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
 from scanwright.cad.assembly.steps import steps_of
 from scanwright.cad.assembly.tube import lead_solid
+from scanwright.cad.checks.cables import rotor_cable_checks
 from scanwright.cad.checks.clearance import clearance_checks
-from scanwright.cad.checks.rotor_leads import lead_checks
 from scanwright.cad.layout.cables import joint
 from scanwright.cad.layout.cables.path import Path
 
@@ -21,9 +21,9 @@ def lying(parts_of):
 
 
 def test_leads_touch_nothing_and_bend_no_further_than_they_may(lying):
-    checks = [*lead_checks(lying), *clearance_checks(lying)]
-    assert [check.message for check in checks if check.severity not in ("pass", "note")] == []
-    assert [check.kind for check in checks].count("lead_bend") == 2
+    checks = [*rotor_cable_checks(lying), *clearance_checks(lying)]
+    assert [check.message for check in checks if check.severity not in ("ok", "note")] == []
+    assert [check.code for check in checks].count("lead_bend") == 2
 
 
 def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
@@ -39,8 +39,8 @@ def test_a_lead_straight_through_the_linkage_is_seen(lying):
     first = lying.leads[0]
     short = Path((first.path.corners[0], first.path.corners[-1]), first.radius)
     bad = replace(lying, bought=lying.bought | {"rotor_lead_1": lead_solid(replace(first, path=short, joint=None))})
-    (found,) = [check for check in clearance_checks(bad) if check.kind == "interference"]
-    assert found.severity == "error" and "rotor_lead_1" in found.where and found.value > 10
+    (found,) = [check for check in clearance_checks(bad) if check.code == "interference"]
+    assert found.severity == "error" and "rotor_lead_1" in found.subject and found.value > 10
 
 
 def test_no_beam_meets_a_lead_that_was_not_hidden_before(lying):
@@ -54,7 +54,7 @@ def test_no_beam_meets_a_lead_that_was_not_hidden_before(lying):
 
 def test_no_way_is_told_with_its_numbers(lying):
     blocked = replace(lying, leads=(replace(lying.leads[0], path=None, radius=32.0),))
-    (check,) = lead_checks(blocked)
+    (check,) = rotor_cable_checks(blocked)
     assert check.severity == "warning" and check.limit == 32.0 and "y = -15 mm" in check.message
 
 

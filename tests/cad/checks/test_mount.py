@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scanwright.cad.assembly.masses import link_bodies
-from scanwright.cad.checks.mount import carried, mount_checks
+from scanwright.cad.checks.loads.mount import carried, mount_checks
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.screws import SCREWS

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, scanner_at
 
-import scanwright.cad.checks.retention as room
+import scanwright.cad.checks.loads.retention as room
 from scanwright.cad import solids
-from scanwright.cad.checks.retention import hanging_on, retention_checks, worst_shares
+from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import ScrewAxis
 from scanwright.cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
@@ -58,19 +58,19 @@ def test_what_hangs_on_a_joint_is_what_falls_with_it(scanner_and_assembly):
 def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_assembly):
     scanner, assembly = scanner_and_assembly
     checks = retention_checks(scanner, assembly)
-    assert {check.severity for check in checks if "shaft_pulley" not in check.where} == {"pass"}
+    assert {check.severity for check in checks if "shaft_pulley" not in check.subject} == {"ok"}
     (friction,) = [check for check in checks if "friction: they" in check.message] or [None]
     assert (friction is None) == (assembly.layout.drive.shaft == "servo_shaft")  # the pulley, which is set by turning
     joints = [joint for joint in joints_of(assembly.layout) if joint.fixing != "grub"]
     assert [
-        sum(check.kind == kind and check.value is not None for check in checks) for kind in ("retention", "screw")
+        sum(check.code == kind and check.value is not None for check in checks) for kind in ("retention", "screw")
     ] == [len(joints)] * 2
 
 
 def test_what_gives_way_fails_and_what_has_little_to_spare_warns(scanner_and_assembly, monkeypatch):
     scanner, assembly = scanner_and_assembly
     margin = min(c.value for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None)
-    for over, severity in ((0.4 * margin, "pass"), (0.7 * margin, "warning"), (1.3 * margin, "error")):
+    for over, severity in ((0.4 * margin, "ok"), (0.7 * margin, "warning"), (1.3 * margin, "error")):
         with monkeypatch.context() as shaken:
             shaken.setattr(room, "SHOCK_G", 5.0 * over)
             checks = [c for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None]
@@ -83,7 +83,7 @@ def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly, m
     joints = joints_of(assembly.layout)
     hub = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
     _instead(monkeypatch, joints, hub, replace(hub, fixing="grub"))
-    assert [check.where for check in retention_checks(scanner, assembly) if check.severity == "error"] == [
+    assert [check.subject for check in retention_checks(scanner, assembly) if check.severity == "error"] == [
         f"{hub.part} and {hub.onto}"
     ]
     for nuts in (joint for joint in joints if joint.onto == "bearing_tower" and joint.part == "base_mount"):

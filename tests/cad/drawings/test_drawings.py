@@ -23,7 +23,7 @@ from svglib.svglib import svg2rlg
 from scanwright.cad.drawings.dimensions import angle_between, spread
 from scanwright.cad.drawings.part import part_of
 from scanwright.cad.drawings.patterns import number, patterns_of
-from scanwright.cad.drawings.pen import CAPITAL, DIAMETER, TURN, Pen, document_at
+from scanwright.cad.drawings.pen import CAPITAL, DIAMETER, TURN_RAD, Pen, document_at
 from scanwright.cad.drawings.project import Arc, project
 from scanwright.cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
@@ -378,7 +378,7 @@ def measured_box():
     """Of the same, drawn on nothing."""
     pen = Pen(None, 0.5)
     pen.stroke("HIDDEN", ((0, 0), (10, 0), (10, 20)))
-    pen.arc("VISIBLE", (40, 40), 10, 0.0, TURN)
+    pen.arc("VISIBLE", (40, 40), 10, 0.0, TURN_RAD)
     pen.arc("CENTRE", (40, 40), 20, 0.5, 4.0)
     own = pen.dimension(DIAMETER, "<>", (20, 20))
     own.text((20, 20), "2x Ø40 <90°>", anchor="middle", angle=90.0)

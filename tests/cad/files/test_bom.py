@@ -8,12 +8,13 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scanners import TILTED, scanner_at
+from scanners import CAPSULE, RING, ROLLING, TILTED, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.files.bom import _wiring, bom_text, items_of
+from scanwright.cad.files.bom import WIRING, _wiring, bom_text, items_of
 from scanwright.cad.files.manual.instructions import instructions_text, screws_in_words
 from scanwright.cad.files.manual.scenes import scenes_of
+from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
@@ -75,6 +76,13 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
     assert sum(row["kind"] == "tool" for row in rows) >= 4
     assert "EN AW-7075-T6" in next(row["note"] for row in rows if row["part"] == "servo_shaft")
     assert all(row["number"] or row["supplier"] for row in rows if row["kind"] in ("bought", "screw", "nut"))
+
+
+@pytest.mark.parametrize("slip_ring", [RING, CAPSULE])
+def test_every_small_thing_of_a_drive_has_an_estimate(slip_ring):
+    needs = layout_of(scanner_at(ROLLING, slip_ring=slip_ring)).drive.needs
+    assert needs and {need.estimate for need in needs} <= EACH_USD.keys()
+    assert {row.estimate for rows in WIRING.values() for row in rows} <= EACH_USD.keys()
 
 
 def test_the_steps_begin_with_what_does_not_fit_and_warn_before_the_first_wire(steps):

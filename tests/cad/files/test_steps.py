@@ -9,7 +9,7 @@ from PIL import Image
 from scipy.spatial import ConvexHull
 
 from scanwright.cad.files.manual.instructions import picture_name, step_files
-from scanwright.cad.files.manual.pictures import SIZE, WORDS, StepPictures
+from scanwright.cad.files.manual.pictures import SIZE_PX, WORDS_PX, StepPictures
 from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.plates import EDGE_MM, GAP_MM, plates_of
 from scanwright.cad.geometry.mesh import TriMesh
@@ -29,7 +29,7 @@ def pixels(png):
 
 def coloured(picture):
     """Pixels of the colours of what comes, without the words and the red of its way."""
-    seen = picture[:, : SIZE[0] - WORDS]
+    seen = picture[:, : SIZE_PX[0] - WORDS_PX]
     orange = (seen[..., 0] > 1.5 * seen[..., 2]) & (seen[..., 1] > 1.5 * seen[..., 2])
     return orange | (seen[..., 2] > 1.5 * seen[..., 0])
 
@@ -60,12 +60,12 @@ def test_what_comes_is_coloured_and_stands_where_it_comes_from(scenes, made):
     pictures = StepPictures(assembly.meshes(), frozenset(assembly.made))
     scene = next(scene for scene in scenes if scene.thing == "ring")
     picture = pixels(pictures.picture(scene, []))
-    assert picture.shape == (SIZE[1], SIZE[0], 3)
+    assert picture.shape == (SIZE_PX[1], SIZE_PX[0], 3)
     rows, _ = np.nonzero(coloured(picture))
-    seen = picture[:, : SIZE[0] - WORDS]
+    seen = picture[:, : SIZE_PX[0] - WORDS_PX]
     grey = (np.ptp(seen, axis=2) < 12) & (seen.max(axis=2) < 240)
     assert rows.mean() < np.nonzero(grey)[0].mean() - 50  # the ring above the shaft, which is not hidden by it
-    assert np.ptp(rows) < SIZE[1] / 2 and len(rows) > 1000
+    assert np.ptp(rows) < SIZE_PX[1] / 2 and len(rows) > 1000
 
 
 def test_every_step_has_its_picture_in_the_folder_and_the_same_bytes_again(scenes, made):

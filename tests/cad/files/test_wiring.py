@@ -81,8 +81,8 @@ def test_the_words_tell_power_circuits_and_wires():
     files = wiring_files(scanner_for(*SCANNERS["a through bore"]), "0" * 12)
     assert files == wiring_files(scanner_for(*SCANNERS["a through bore"]), "0" * 12)
     text = files["wiring.md"].decode()
-    assert "- F2, MX-64R: 0.92 A lasting, 4.1 A at most, fuse 5 A, wires 0.5 mm²" in text
-    assert "- 1: +, 1 A of 10, 10 times" in text and "- 8: D-, signal" in text
+    assert "- F2, MX-64R: 0.92 A continuous, 4.1 A at most, fuse 5 A, wires 0.5 mm²" in text
+    assert "- 1: +, 1 A of 10, factor 10" in text and "- 8: D-, signal" in text
     assert len(re.findall(r"^- .* to .*: ", text, re.M)) > 20 and "Do not build" not in text
     assert text.index("## Caution") < text.index("## Power") < text.index("## Wires")
     unsure = wiring_files(scanner_for(*SCANNERS["no ring"]), "0" * 12)["wiring.md"].decode()

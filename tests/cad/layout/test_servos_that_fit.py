@@ -10,7 +10,7 @@ from quick_tests import samples
 from benchmarks.cad.combinations import screws_without_a_hole
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.clearance import clearance_checks
-from scanwright.cad.checks.retention import retention_checks, worst_shares
+from scanwright.cad.checks.loads.retention import retention_checks, worst_shares
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.joints import held_in
@@ -102,7 +102,7 @@ def test_without_a_ring_every_horn_gets_a_printed_cup_around_the_heads_of_its_sc
     assembly = make_parts(scanner)
     assert {part.process for part in assembly.parts.values()} == {"printed"} and "horn_cup" in assembly.parts
     checks = [*retention_checks(scanner, assembly), *clearance_checks(assembly)]
-    assert {check.severity for check in checks} == {"pass"}
+    assert {check.severity for check in checks} == {"ok"}
 
 
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.4-insert"])
@@ -130,7 +130,7 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
         assert solid(axis, 4.0, 0.6 * joint.thread.hole) == (not joint.traps)
         tip_mm = float(np.linalg.norm(axis.start[:2])) - joint.length_mm
         assert tip_mm > stack.cup_bore / 2 - 1.0  # above the heads of the horn's screws nothing is in the way
-    assert {check.severity for check in retention_checks(scanner, assembly)} == {"pass"}
+    assert {check.severity for check in retention_checks(scanner, assembly)} == {"ok"}
 
 
 def test_a_ring_still_asks_for_a_turned_shaft():

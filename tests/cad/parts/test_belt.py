@@ -60,7 +60,7 @@ def made(parts_of):
     assembly = parts_of(scanner)
     meshes = {n: trimesh.Trimesh(m.vertices, m.faces, process=False) for n, m in assembly.meshes().items()}
     checks, shadow = run_checks(scanner, assembly, lambda _: None)
-    found = {(check.kind, check.where): check for check in checks}
+    found = {(check.code, check.subject): check for check in checks}
     return SimpleNamespace(
         scanner=scanner, assembly=assembly, stack=assembly.layout.stack, meshes=meshes, checks=found, shadow=shadow
     )
@@ -255,7 +255,7 @@ def test_leads_pass_from_the_capsule_to_below_the_hub(made):
 
 def test_checks_tell_what_bearings_belt_and_horn_bear_and_what_the_belt_costs(made):
     for key in (("bearing_load", "bearing"), ("belt_tension", "belt"), ("tilt_moment", "servo")):
-        assert made.checks[key].severity == "pass"
+        assert made.checks[key].severity == "ok"
     pulls = made.checks["tilt_moment", "servo"]
     lever = made.stack.belt_middle - made.stack.horn
     assert pulls.value == pytest.approx(20 * lever / 1000, rel=1e-3)  # N m: two strands of 10 N

@@ -10,9 +10,9 @@ from scanners import GROUND_AHEAD, RING, UPRIGHT, scanner_at
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.shadow import PartsWorkshop
 from scanwright.cad.assembly.steps import steps_of
+from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
+from scanwright.cad.checks.products import module_checks
 from scanwright.cad.checks.remarks import left_out_of
-from scanwright.cad.checks.retention import hanging_on, retention_checks, worst_shares
-from scanwright.cad.checks.run import module_checks
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS
@@ -81,8 +81,8 @@ def test_the_lidar_hangs_on_a_nut_of_the_tripod_and_no_screw_ends_in_plastic(on_
     assert LIDAR in hanging_on(on_tripod, of_tripod) and "base_mount" in hanging_on(on_tripod, of_tripod)
     assert of_mount.length_mm <= FOOT_THICKNESS + on_tripod.layout.deck.tripod.thickness  # nothing stands out below
     said = [check for check in retention_checks(on_tripod.layout.scanner, on_tripod) if "tripod" in check.message]
-    assert {check.kind for check in said} == {"retention", "screw"}
-    assert {check.severity for check in said} == {"pass"}
+    assert {check.code for check in said} == {"retention", "screw"}
+    assert {check.severity for check in said} == {"ok"}
 
 
 def test_a_lone_screw_keeps_the_foot_from_tipping_over_its_edge(on_tripod):
@@ -142,6 +142,6 @@ def test_a_module_that_the_task_requires_and_that_has_no_place_is_an_error():
     asked, plain = (scanner_for(GROUND_AHEAD, modules) for modules in (Modules(tripod_foot=True), NO_MODULES))
     left = (LeftOut("tripod_foot", "no tripod holds it", 1, "parts"),)
     (failed,) = module_checks(asked, left)
-    assert (failed.severity, failed.kind, failed.where) == ("error", "module", "tripod_foot")
+    assert (failed.severity, failed.code, failed.subject) == ("error", "module", "tripod_foot")
     assert "no tripod holds it" in failed.message
     assert module_checks(plain, left) == [] and module_checks(asked, ()) == []

@@ -13,6 +13,7 @@ import trimesh
 from quick_tests import samples
 from scanners import GROUND_AHEAD, UPRIGHT, scanner_at
 
+from scanwright.cad.checks.products import products_of, unverified
 from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.layout import mount_offset_mm
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
@@ -230,14 +231,15 @@ def test_the_shaft_fits_the_horn_and_passes_the_ring(built):
 
 def test_findings_name_what_to_do(built):
     found = {finding.code: finding for finding in built.result.findings}
-    assert "aluminium or steel" in found["turn_from_metal"].message
-    unverified = [finding.message for finding in built.result.findings if finding.code == "unverified"]
-    assert any("UH1256-02-0610-06S: length_mm = 45.0" in message and "measure" in message for message in unverified)
+    assert "aluminium or steel" in found["turn_from_metal"].hint
+    assembly = built.result.assembly
+    notes = unverified(products_of(assembly.layout.scanner, assembly.layout.drive), assembly)
+    assert any("UH1256-02-0610-06S: length_mm = 45.0" in f.message and "measure" in f.hint for f in notes)
     assert "tilt_moment" not in found
     left_out = [out.what for out in built.result.left_out if out.unit == "parts"]
     if built.name == "upright":
         assert left_out == ["bearing_cage", "counterweight", *MODULES, "base_mount"]
-        assert "M2.5" in found["servo_on_deck"].message
+        assert "M2.5" in found["servo_on_deck"].hint
     else:
         bearing = [] if built.name in BEARING else ["bearing_cage"]
         assert left_out == bearing + ([] if built.name in BALANCED else ["counterweight"]) + MODULES

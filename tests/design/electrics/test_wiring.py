@@ -11,6 +11,7 @@ from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
 from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_a, wire_drop_v, wire_for
 from scanwright.design.electrics.wiring import network_of
+from scanwright.design.findings import sentence
 from scanwright.design.scanner import scanner_of
 
 CATALOGUE = load_catalogue()
@@ -90,9 +91,7 @@ def test_a_supply_that_no_converter_gives_is_refused():
     scanner = scanner_of(angle_set(), "fdm-0.4", CATALOGUE)
     odd = scanner.servo.model_copy(update={"supply_v": (6.0, 8.4)})
     made = network_of(replace(scanner, servo=odd))
-    assert "MX-64R: gets 11.71 V, wants 6 to 8.4" in [
-        f"{fault.subject}: {fault.message}" for fault in check_network(made)
-    ]
+    assert "MX-64R: gets 11.71 V, requires 6 to 8.4" in [sentence(fault) for fault in check_network(made)]
     assert "Do not connect MX-64R: it accepts 6 to 8.4 V" in " ".join(made.cautions)
 
 
@@ -126,7 +125,7 @@ def test_a_pin_that_must_be_tied_is_a_wire_and_a_one_way_line_has_no_rx(lidar, r
     assert [wire.end for wire in ties] == [("lidar", "GND")]
     assert check_network(made) == []
     loose = replace(made, wires=tuple(wire for wire in made.wires if wire not in ties))
-    assert "pin PWM is not connected" in [fault.message for fault in check_network(loose)]
+    assert "lidar: pin PWM is not connected" in [fault.message for fault in check_network(loose)]
     assert ("lidar", "RX") not in {wire.end for wire in made.wires}
     (sent,) = (wire for wire in made.wires if wire.start[0] == "plug" and wire.net == "TX")
     assert sent.start == ("plug", "RX")  # what the lidar sends the computer receives
@@ -163,7 +162,7 @@ def test_each_rule_sees_what_it_is_there_for():
     assert check_network(made) == []
 
     def said(**change):
-        return [f"{fault.subject}: {fault.message}" for fault in check_network(replace(made, **change))]
+        return [sentence(fault) for fault in check_network(replace(made, **change))]
 
     assert "servo: pin V is not connected" in said(wires=tuple(w for w in made.wires if w.end != ("servo", "V")))
     astray = (*made.wires, replace(made.wires[0], end=("servo", "VCC")))
@@ -178,9 +177,9 @@ def test_each_rule_sees_what_it_is_there_for():
     assert "F2: 4 A blows at the 4.1 A of MX-64R" in said(branches=small)
     assert "supply: gives 5 A, all together draw 6.6" in said(supply_a=5.0)
     low = tuple(replace(drop, volts=9.0) for drop in made.drops)
-    assert "UTM-30LX: gets 9.00 V, wants 10.8 to 13.2" in said(drops=low)
+    assert "UTM-30LX: gets 9.00 V, requires 10.8 to 13.2" in said(drops=low)
     high = tuple(replace(drop, idle_v=13.5) for drop in made.drops)
-    assert "UTM-30LX: gets 13.50 V, wants 10.8 to 13.2" in said(drops=high)
+    assert "UTM-30LX: gets 13.50 V, requires 10.8 to 13.2" in said(drops=high)
     red = (*made.wires[1:], replace(made.wires[0], colour="red", source=""))
     assert "switch: the colour red of + in has no source" in said(wires=red)
 

@@ -8,7 +8,7 @@ import pytest
 
 from scanwright.design.density.beams import ScanLines, scan_lines
 from scanwright.design.errors import TaskError
-from scanwright.design.evaluation.poles import Pole, parse_pole, pole_chances
+from scanwright.design.evaluation.poles import Pole, pole_chances, require_in_range
 from scanwright.design.frames import R_rot_laser, R_world_rot, Rz
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.sphere.painting import COLUMNS, VALUE
@@ -119,24 +119,26 @@ def test_a_pole_outside_the_region_stands_anywhere_that_is_not_hidden():
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("sizes", "complaint"),
     [
-        ("20,1000", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
-        ("20,x,5", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
-        ("20,-1,5", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
-        ("nan,1000,5", "WIDTH_MM,HEIGHT_MM,RANGE_M"),
-        ("20,1000,50", "sees from 0.1 to 15 m"),
-        ("9000,1000,5", None),
-        ("10000,1000,5", "in the pole"),
+        ((0.02, -1.0, 5.0), "height_m = -1: must be above 0"),
+        ((np.nan, 1.0, 5.0), "width_m = nan"),
+        ((0.02, 1.0, 50.0), "measures from 0.1 to 15 m"),
+        ((10.0, 1.0, 5.0), "inside the pole"),
     ],
 )
-def test_the_words_of_a_pole(text, complaint):
+def test_a_pole_that_cannot_be_measured_is_refused(sizes, complaint):
     lidar = load_task(Path("uniform")).lidar
-    if complaint is None:
-        assert parse_pole(text, lidar) == Pole(9.0, 1.0, 5.0)
-        return
+    require_in_range(Pole(9.0, 1.0, 5.0), lidar)
     with pytest.raises(TaskError, match=complaint):
-        parse_pole(text, lidar)
+        require_in_range(Pole(*sizes), lidar)
+
+
+@pytest.mark.parametrize("text", ["20,1000", "20,x,5", ""])
+def test_the_text_of_a_pole_is_three_numbers(command, text):
+    code, _, complaints = command("evaluate", "ceiling", "--angles=0,0,0,-90", f"--pole={text}")
+    assert (code, len(complaints)) == (2, 1)
+    assert f"--pole = '{text}': must be WIDTH_MM,HEIGHT_MM,RANGE_M, such as 20,1000,5" in complaints[0]
 
 
 def test_evaluate_tells_of_a_pole(command):

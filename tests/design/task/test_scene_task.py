@@ -114,7 +114,7 @@ def test_wrong_scenes_are_one_line(room, command, old, new, words):
 
 def test_a_box_without_a_scene_is_refused(room):
     (room / "task.toml").write_text(TASK.split("[scene]")[0] + "[[weight]]" + TASK.split("[[weight]]")[1])
-    with pytest.raises(TaskError, match="needs a \\[scene\\]"):
+    with pytest.raises(TaskError, match="requires a \\[scene\\]"):
         load_task(room / "task.toml")
 
 

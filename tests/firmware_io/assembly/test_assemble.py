@@ -17,6 +17,7 @@ from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
 from scanwright.firmware_io.assembly.deskew import deskew, place
+from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.ply import read_ply
 from scanwright.firmware_io.poses.trajectory import Trajectory
@@ -179,7 +180,7 @@ def test_organised_and_flat_clouds_hold_the_same_points(tmp_path):
     short = a_scan(1, 40, START + 10**8, intensity=np.arange(40, dtype=np.float32))
     scans = [a_scan(0, range_m=np.array([1, np.nan, 3] * 20, np.float32)), short, a_scan(2, 50, START + 3 * 10**9)]
     recording = write(tmp_path / "r.mcap", scans, a_log(0, 1))
-    organised = assemble_recording(recording, angle_set(), tmp_path / "o.ply", organised=True)
+    organised = assemble_recording(recording, angle_set(), tmp_path / "o.ply", AssembleOptions(organised=True))
     flat = assemble_recording(recording, angle_set(), tmp_path / "f.ply")
     assert (organised.rows, flat.rows) == (180, 80)
     assert organised.lines()[-1] == f"wrote 180 rows (80 points, 60 rows a scan) to {tmp_path / 'o.ply'}"
@@ -204,9 +205,11 @@ def test_each_turn_becomes_a_cloud_and_together_they_are_the_recording(tmp_path)
     log = a_log(1.0, 1.0 + 2.6 * 2 * np.pi, START, START + 2_600_000_000)
     recording = write(tmp_path / "r.mcap", scans, log)
     mount = angle_set(0, 90, 0, -90)
-    whole = assemble_recording(recording, mount, tmp_path / "w.ply", organised=True)
+    whole = assemble_recording(recording, mount, tmp_path / "w.ply", AssembleOptions(organised=True))
     for per, heights in (("turn", [20, 20, 12]), ("half", [10, 10, 10, 10, 10, 2])):
-        summary = assemble_recording(recording, mount, tmp_path / f"{per}.ply", per=per, organised=True)
+        summary = assemble_recording(
+            recording, mount, tmp_path / f"{per}.ply", AssembleOptions(per=per, organised=True)
+        )
         assert [path.name for path in summary.clouds] == [f"{per}_{k:03}.ply" for k in range(len(heights))]
         assert (summary.points, summary.height) == (whole.points, whole.height)
         rows = [read_ply(path) for path in summary.clouds]
@@ -222,7 +225,9 @@ def test_a_turn_without_a_point_is_no_cloud(tmp_path):
     ranges = [np.full(20, 5.0 if 10 <= k < 20 else np.nan, np.float32) for k in range(40)]
     scans = [a_scan(0, 20, START + k * 100_000_000, time_increment_s=1e-4, range_m=r) for k, r in enumerate(ranges)]
     log = a_log(0.0, 4 * 2 * np.pi, START, START + 4_000_000_000)
-    summary = assemble_recording(write(tmp_path / "r.mcap", scans, log), angle_set(), tmp_path / "c.ply", per="turn")
+    summary = assemble_recording(
+        write(tmp_path / "r.mcap", scans, log), angle_set(), tmp_path / "c.ply", AssembleOptions(per="turn")
+    )
     assert [path.name for path in summary.clouds] == ["c_001.ply"]
     assert summary.left_out == {"no_return": 600}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c_001.ply", "r.mcap"]
@@ -295,10 +300,11 @@ def test_a_mask_of_another_sensor_is_matched_by_bearing_and_says_what_it_does_no
     fine_rad = np.linspace(-1.95, 1.0, 400) + 2 * np.pi  # the same bearings, counted one turn further
     np.savez(tmp_path / "own_body.npz", beams=np.abs(fine_rad - 2 * np.pi) < 0.25, bearing_rad=fine_rad)
     words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
-    code, printed, _ = command(*words, "--organised")
+    code, _, complaints = command(*words, "--organised")
     bearing_rad = a_scan(0, 40).bearing_rad
     assert code == 0
-    assert f"warning: {np.sum((bearing_rad < -1.96) | (bearing_rad > 1.01))} of 40 beams have no bearing" in printed
+    unknown = np.sum((bearing_rad < -1.96) | (bearing_rad > 1.01))
+    assert complaints[0].startswith(f"warning: {unknown} of 40 beams have no bearing")
     np.testing.assert_array_equal(np.isnan(read_ply(tmp_path / "c.ply")["x"]), np.abs(bearing_rad) < 0.25)
 
 
@@ -341,8 +347,8 @@ def test_a_gyro_says_how_the_platform_turned_between_two_poses(tmp_path, command
     words = ["assemble", tmp_path / "r.mcap", "--angles", tmp_path / "angles.json", "-o", tmp_path / "c.ply"]
     words += ["--imu", tmp_path / "imu.csv"]
     posed = [*words, "--poses", tmp_path / "poses.tum"]
-    assert "name the --poses too" in command(*words)[2][0]
-    assert "pass its orientation on the platform as imu_rpy_deg" in command(*posed)[2][0]
+    assert "`--imu` requires `--poses`" in command(*words)[2][0]
+    assert "pass its orientation on the platform as --imu-rpy-deg" in command(*posed)[2][0]
     code, printed, complaints = command(*posed, "--imu-rpy-deg", 0, 0, 0)
     assert (code, complaints) == (0, [])
     assert "poses: 3, usually 1 s apart, going straight between them is off by 0 mm at most" in printed
@@ -357,7 +363,7 @@ def test_far_poses_and_gaps_between_them_are_told(tmp_path):
     recording = write(tmp_path / "r.mcap", [a_scan()], a_log(0.0, 1.0))
     time_ns = START + np.append(np.arange(-30, 0), [50, 51]) * 100_000_000
     poses = Trajectory(time_ns, np.full((32, 3), 5e5), np.tile([0, 0, 0, 1.0], (32, 1)))
-    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", poses=poses).notes
+    said = assemble_recording(recording, angle_set(), tmp_path / "c.ply", platform=poses).notes
     assert "going straight between them is off by 0 mm and 0 deg at most" in said[1]
     assert "between two poses lie up to 5.10 s" in said[2]
     assert "500 km from 0, where float32 steps by 1 mm or more" in said[3]
@@ -375,7 +381,9 @@ def test_the_steps_of_the_encoder_are_smoothed_unless_the_motor_stopped_or_one_a
                 writer.joint(*sample)
             for scan in scans:
                 writer.scan(scan)
-        summary = assemble_recording(tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply", **options)
+        summary = assemble_recording(
+            tmp_path / "r.mcap", angle_set(0, 90, 0, -90), tmp_path / "c.ply", AssembleOptions(**options)
+        )
         rows = read_ply(summary.out)
         off_m[name] = 20 * np.abs(rows["joint_rad"] - 0.35 * rows["time_s"]).max()
     assert off_m["smooth"] < 0.004
@@ -421,7 +429,7 @@ def test_a_recording_without_a_single_point_is_refused(tmp_path):
 def test_wrong_input_is_one_line_and_leaves_no_file(tmp_path, recording, out, lag_s, says):
     write(tmp_path / "r.mcap", [a_scan()], a_log(0, 1))
     with pytest.raises(RecordingError, match=says):
-        assemble_recording(tmp_path / recording, angle_set(), tmp_path / out, lag_s=lag_s)
+        assemble_recording(tmp_path / recording, angle_set(), tmp_path / out, AssembleOptions(lag_s=lag_s))
     assert [path.name for path in tmp_path.iterdir()] == ["r.mcap"]
 
 
@@ -464,7 +472,7 @@ def room(tmp_path_factory):
 
 def distance_m(room, angles, out, **more):
     recording, expected = room
-    assemble_recording(recording, angles, out, organised=True, **more)
+    assemble_recording(recording, angles, out, AssembleOptions(organised=True), **more)
     rows = read_ply(out)
     points = np.stack([rows[name] for name in "xyz"], axis=1)
     np.testing.assert_array_equal(np.isnan(points), np.isnan(expected))

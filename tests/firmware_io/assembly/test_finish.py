@@ -137,7 +137,7 @@ def test_a_moving_scanner_has_seen_each_point_from_where_it_was():
         ({"outliers": -1.0}, "outliers = -1"),
         ({"min_range_m": 3.0, "max_range_m": 2.0}, "min_range_m = 3.0, max_range_m = 2.0"),
         ({"edges_deg": 60.0}, "edges_deg = 60"),
-        ({"voxel_m": 0.1, "organised": True}, "every beam keeps its row"),
+        ({"voxel_m": 0.1, "organised": True}, "which drop beams"),
         ({"min_range_m": 25.0}, "none of the 9600 beams becomes a point"),
     ],
 )

@@ -12,7 +12,9 @@ from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
-from scanwright.firmware_io.emulators.slamtec import IDENTITIES, SlamtecEmulator
+from scanwright.firmware_io.emulators.slamtec import machine
+from scanwright.firmware_io.emulators.slamtec.machine import SlamtecEmulator
+from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
 
@@ -44,6 +46,7 @@ def patience(monkeypatch):
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
+    monkeypatch.setattr(machine, "_SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
 
 
 def lidar(model):
@@ -52,6 +55,11 @@ def lidar(model):
 
 def wall_m(bearing_rad):
     return 2.0 + np.sin(bearing_rad)
+
+
+def rounded_m(model):
+    """Ultra capsules have steps of 4 mm from 2 m on."""
+    return 5e-3 if " A" in model else 1.5e-3
 
 
 def ranging(time_ns, bearing_rad):
@@ -104,9 +112,9 @@ def test_a_cabin_is_read_by_its_bits():
     np.testing.assert_array_equal(packet.offset_deg[:4], [2.5, -1.0, 2.5, -1.0])
 
 
-def stream_of(model, turns=0.3):
+def stream_of(model, mode, turns=0.3):
     emulator = SlamtecEmulator(lidar(model), ranging)
-    start = protocol.request(protocol.SCAN if model == "RPLIDAR C1" else protocol.EXPRESS_SCAN, bytes(5))
+    start = protocol.request(protocol.EXPRESS_SCAN, bytes([mode, 0, 0, 0, 0]))
     emulator.machine.hear(start, emulator.machine.began_ns)
     data = b""
     while len(data) < 84 * 12 * turns:
@@ -114,14 +122,19 @@ def stream_of(model, turns=0.3):
     return data
 
 
-STREAMS = {model: stream_of(model) for model in ("RPLIDAR C1", "RPLIDAR A1", "RPLIDAR S2")}
+STREAMS = {  # nodes, capsules, ultra capsules and dense ones
+    ("RPLIDAR C1", 0): stream_of("RPLIDAR C1", 0),
+    ("RPLIDAR A1", 1): stream_of("RPLIDAR A1", 1),
+    ("RPLIDAR A1", 3): stream_of("RPLIDAR A1", 3),
+    ("RPLIDAR S2", 1): stream_of("RPLIDAR S2", 1),
+}
 
 
 @seed(19)
 @settings(max_examples=300, deadline=None)
 @given(st.sampled_from(sorted(STREAMS)), st.data())
 def test_damaged_streams_give_packets_or_nothing(model, data):
-    kind = IDENTITIES[model].stream
+    kind = IDENTITIES[model[0]].modes[model[1]].kind
     stream = bytearray(STREAMS[model])
     for _ in range(data.draw(st.integers(0, 12))):
         at = data.draw(st.integers(0, len(stream) - 1))
@@ -139,7 +152,15 @@ def test_damaged_streams_give_packets_or_nothing(model, data):
     assert len(splitter.feed(STREAMS[model])) >= len(STREAMS[model]) // protocol.SIZES[kind] - 30
 
 
-READERS = [protocol.descriptor, protocol.info, protocol.health, protocol.node, protocol.capsule, protocol.dense]
+READERS = [
+    protocol.descriptor,
+    protocol.info,
+    protocol.health,
+    protocol.node,
+    protocol.capsule,
+    protocol.ultra,
+    protocol.dense,
+]
 
 
 @seed(19)
@@ -164,14 +185,15 @@ def test_turns_come_as_they_were_seen(model):
             missing = np.rint(steps - 1).sum()  # on a busy computer the emulator leaves some out
             assert ours.bad_packets == 0 and abs(ours.dropped - missing) <= 1
         until(lambda: emulator.machine.scanning is None)  # `with` puts it out
-    usual = IDENTITIES[model].points_s / lidar(model).scan_rate_hz
+    usual = 1e6 / IDENTITIES[model].usual.point_us / lidar(model).scan_rate_hz
+    assert usual > 0.98 * lidar(model).steps_per_turn
     for one in timed:
         scan = one.scan
         assert 0.9 * usual < scan.range_m.size < 1.1 * usual
         lost = np.isnan(scan.range_m)
         assert 0.02 < lost.mean() < 0.07
-        # angles are told in sixty-fourths, and between two starts straight
-        np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=1.5e-3)
+        # angles are in sixty-fourths, and between two starts straight
+        np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=rounded_m(model))
         assert scan.time_ns[-1] < one.arrival_ns
 
 
@@ -193,7 +215,7 @@ def test_bad_capsules_are_counted_and_never_handed_out(model):
         for _ in range(4):
             scan = ours.read().scan
             seen = ~np.isnan(scan.range_m)
-            np.testing.assert_allclose(scan.range_m[seen], wall_m(scan.bearing_rad[seen]), atol=1.5e-3)
+            np.testing.assert_allclose(scan.range_m[seen], wall_m(scan.bearing_rad[seen]), atol=rounded_m(model))
         assert 4 <= ours.bad_packets <= 20
 
 

@@ -23,7 +23,7 @@ def test_beams_are_on_time_or_dropped_and_counted(model, buffer_bytes):
     assert missing.seen > 8
     assert np.diff([one.scan.stamp_ns for one in timed]).min() > 5e6
     for one in timed:
-        assert np.nanmax(np.abs(off_ms(one.scan))) < 3e-6 * one.uncertainty_ns + 2 * ROUNDED_MS
+        assert np.nanmax(np.abs(off_ms(one.scan))) < 3e-6 * one.uncertainty_ns + 2 * ROUNDED_MS[model]
 
 
 class EndlessPort:

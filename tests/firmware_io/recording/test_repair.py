@@ -218,7 +218,7 @@ def test_the_command_writes_beside_the_file_and_says_what_it_kept(tmp_path, jour
         ("r.mcap", "the damaged recording itself: it stays as it is, name another file"),
     ):
         code, _, complaints = command("repair", path, "-o", tmp_path / other)
-        assert (code, complaints) == (2, [f"scanwright: {tmp_path / other}: {says}"])
+        assert (code, complaints) == (2, [f"error: {tmp_path / other}: {says}"])
 
 
 def a_minute(path, lost_s):

@@ -17,6 +17,7 @@ from patience import BOUND_S, until
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.clouds.ply import read_ply
 
 ROS = os.environ.get("SCANWRIGHT_ROS")
@@ -74,7 +75,7 @@ def test_somebody_elses_program_rebuilds_the_cloud_of_a_recording(tmp_path, doma
     assert found["lines"] == 80
     assert np.isfinite(found["said"]).all()
     assert np.abs(found["said"] - found["rebuilt"]).max() < 1e-4
-    assemble_recording(recording, ANGLES, tmp_path / "r.ply", smooth=False)
+    assemble_recording(recording, ANGLES, tmp_path / "r.ply", AssembleOptions(smooth=False))
     rows = read_ply(tmp_path / "r.ply")
     np.testing.assert_array_equal(found["said"], np.stack([rows[axis] for axis in "xyz"], axis=1))
 
@@ -84,7 +85,9 @@ def test_turns_and_other_names_are_to_be_had(tmp_path, domain):
     setup = Setup(beams=100, sweeps=((90.0, 180.0), (-90.0, 180.0)), step_deg=360 / 4096)
     recording = write(tmp_path / "r.mcap", simulate(FURNISHED, setup, Truth()))
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
-    whole = assemble_recording(recording, ANGLES, tmp_path / "r.ply", smooth=False, organised=True, per="turn")
+    whole = assemble_recording(
+        recording, ANGLES, tmp_path / "r.ply", AssembleOptions(smooth=False, organised=True, per="turn")
+    )
     names = ("--ros-args", "-r", "points:=front/cloud", "-r", "__ns:=/robot")
     collecting = started(
         HERE / "collect_points.py", 2, tmp_path / "f.npz", *names, domain=domain, stdout=subprocess.PIPE

@@ -162,13 +162,13 @@ def test_a_fix_takes_nobodys_torque_and_guesses_no_port(command, tmp_path, monke
     before = bytes(emulator.memory.data[:36])
     code, _, complaints = command("doctor", "--fix", "--servo", emulator.port)
     assert bytes(emulator.memory.data[:36]) == before
-    assert code == 2 and "has its torque on, and holds or turns something" in complaints[0]
+    assert code == 3 and "has its torque on, and holds or turns something" in complaints[0]
     plugged = [SimpleNamespace(device=emulator.port, vid=0x0403, pid=0x6014)]
     monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
     emulator.memory[24] = 0
     code, _, complaints = command("doctor", "--fix")
     assert bytes(emulator.memory.data[:24]) == before[:24]
-    assert code == 2 and "a servo is set up only on a port that is named" in complaints[0]
+    assert code == 3 and "a servo is set up only on a port that is named" in complaints[0]
     assert not list(tmp_path.glob("servo-*"))
 
 
@@ -218,7 +218,11 @@ def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
 
     monkeypatch.setattr("serial.serialposix.fcntl.ioctl", listening)
     with ServoEmulator("MX-64R") as emulator:
-        serial_port.open_serial_port(emulator.port, 57600).close()
+        opened = serial_port.open_serial_port(emulator.port, 57600)
+        assert not termios.tcgetattr(opened.fileno())[2] & termios.HUPCL  # closing drops DTR no more
+        opened.baudrate = 115_200
+        assert not termios.tcgetattr(opened.fileno())[2] & termios.HUPCL
+        opened.close()
     assert not set(asked) & {termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET}
 
 

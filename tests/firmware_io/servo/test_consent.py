@@ -178,7 +178,7 @@ def test_who_declines_is_told_how_and_nothing_is_written(spoilt, person, tmp_pat
     emulator = spoilt("XM430-W350", "2.0")
     with pytest.raises(typer.Exit) as stop:
         asking_first(lambda: open_servo(emulator.port, spins=True), tmp_path, 1)
-    assert stop.value.exit_code == 2 and person.questions == ["Write these 3 registers to the servo?"]
+    assert stop.value.exit_code == 3 and person.questions == ["Write these 3 registers to the servo?"]
     hint = f"nothing was moved; `scanwright servo-setup {emulator.port} --scanner {tmp_path} --from-id 1` writes that"
     assert hint in capsys.readouterr().err
     assert kept_writes(emulator) == set() and not list(tmp_path.glob("servo-*"))
@@ -249,7 +249,7 @@ def test_a_setting_that_is_lost_at_once_is_asked_about_once(person, tmp_path, sp
 
     with pytest.raises(ServoSetupError) as caught:
         asking_first(work, tmp_path, None)
-    assert len(person.questions) == 1 and "did not last" in caught.value.__notes__[0]
+    assert len(person.questions) == 1 and "written and lost" in caught.value.__notes__[0]
 
 
 def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):

@@ -154,7 +154,7 @@ def test_ctrl_c_before_the_servo_is_opened_claims_nothing_of_it(tmp_path, comman
         monkeypatch.setattr(acquire, "acquire", nothing_known)
     code, _, complaints = command("scan", tmp_path, "--lidar", "L", "--servo", "S")
     assert code == 130
-    assert complaints == ["scanwright: stopped", f"scanwright: {says}"]
+    assert complaints == ["error: stopped", f"error: {says}"]
 
 
 def test_the_guard_that_was_dismissed_is_told_nothing_more():

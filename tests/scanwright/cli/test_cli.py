@@ -101,8 +101,11 @@ def test_a_wrong_task_is_one_line_exit_2_and_no_file(command, tmp_path, change, 
     [
         (["optimise", "no_such_task"], "ground_ahead"),
         (["optimise", "missing.toml"], "missing.toml"),
-        (["evaluate", "uniform", "--angles=0,90,0"], "four numbers"),
-        (["evaluate", "uniform", "--angles=0,90,0,x"], "four numbers"),
+        (
+            ["evaluate", "uniform", "--angles=0,90,0"],
+            "--angles = '0,90,0': must be A_ROT,B_ROT,A_LASER",
+        ),
+        (["evaluate", "uniform", "--angles=0,90,0,x"], "must be A_ROT,B_ROT"),
         (["evaluate", "uniform", "--angles=0,90,0,nan"], "beta_laser = nan deg: from -360 to 360"),
         (["evaluate", "uniform", "--angles=720,0,0,95"], "alpha_rot = 720 deg: from -360 to 360"),
         (
@@ -121,6 +124,17 @@ def test_wrong_words_are_one_line_and_exit_2(command, tmp_path, monkeypatch, wor
     assert (code, len(complaint)) == (2, 1)
     assert told in complaint[0]
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("nothing.toml", "nothing.toml: no such task file"), ("s_cne.toml", "did you mean 's_cone.toml'?")],
+)
+def test_a_task_file_is_suggested_by_its_name_without_the_ending(command, tmp_path, monkeypatch, name, told):
+    monkeypatch.chdir(tmp_path)
+    Path("s_cone.toml").write_text(GROUND, encoding="utf-8")
+    code, _, (complaint,) = command("optimise", name)
+    assert code == 2 and told in complaint and ("did you mean" in complaint) == ("did you mean" in told)
 
 
 def test_evaluate_prints_every_figure(command, tmp_path):
@@ -219,7 +233,7 @@ def test_results_that_cannot_be_written_are_told_of_standard_output(words, unbuf
             text=True,
             env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )
-    assert (done.returncode, done.stderr) == (2, "scanwright: standard output: No space left on device\n")
+    assert (done.returncode, done.stderr) == (2, "error: standard output: No space left on device\n")
 
 
 def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(command, tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from scanwright.design.errors import TaskError
 from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.new_task import ANGLES, Answers, task_text, write_task_file
-from scanwright.pipeline.wishes import SEEN
+from scanwright.pipeline.seen_regions import SEEN
 
 PATIENCE_S = 60.0  # ten times what it takes on a computer that has much else to do
 PRODUCTS = load_catalogue()
@@ -61,9 +61,7 @@ def test_every_line_of_the_drawn_angles_passes_through_its_lidar():
 def test_what_was_asked_for_stands_in_the_file(command, here):
     code, out, complaints = command("new", "dog", *DOG, "-o", "FILE.toml")
     assert (code, out) == (0, "wrote FILE.toml\n")
-    assert complaints == [
-        "next: `scanwright build FILE.toml` makes it; `scanwright optimise FILE.toml` only finds its angles"
-    ]
+    assert complaints == ["next: `scanwright build FILE.toml` (or `scanwright optimise FILE.toml` for the angles only)"]
     text = (here / "FILE.toml").read_text()
     assert ANGLES in text
     task = load_task(here / "FILE.toml").task
@@ -97,17 +95,17 @@ def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
     ("change", "told"),
     [
         (["--see", "grund"], "did you mean 'ground'?"),
-        (["--see", "ground:a"], "--see ground:a: numbers after the colons"),
-        (["--see", "ceiling:1:2"], "1 numbers at most"),
-        (["--see", "ceiling:0.2"], "ceiling_m = 0.2 is not above height_m = 0.4"),
-        (["--see", "thing:0:3"], "a size and a distance above 0"),
-        (["--see", "thing:0.001:100"], "scanwright: --see thing:0.001:100: looks 0.00057 deg wide, at least 0.02"),
-        (["--see", "wall:0:0"], "scanwright: --see wall:0:0: distance_m = 0: Input should be greater than or equal"),
-        (["--height-m", "-1"], "scanwright: --height-m -1: from 0.001 to 10000 m over the ground"),
-        (["--height-m", "-1", "--see", "all"], "--height-m -1: from 0.001"),
+        (["--see", "ground:a"], "--see = 'ground:a': needs numbers after the colons"),
+        (["--see", "ceiling:1:2"], "at most 1 finite numbers"),
+        (["--see", "ceiling:0.2"], "ceiling_m = 0.2 is not above --height-m = 0.4"),
+        (["--see", "thing:0:3"], "size and distance must be above 0"),
+        (["--see", "thing:0.001:100"], "error: --see = 'thing:0.001:100': appears 0.00057 deg wide, minimum 0.02"),
+        (["--see", "wall:0:0"], "error: --see = 'wall:0:0': distance_m = 0: Input should be greater than or equal"),
+        (["--height-m", "-1"], "error: --height-m = -1: must be between 0.001 and 10000 m"),
+        (["--height-m", "-1", "--see", "all"], "--height-m = -1: must be"),
         (["--lidar", "UST10"], "did you mean 'UST-10LX'?"),
         (["--robot", "box:1"], "box:LENGTH:WIDTH:HEIGHT"),
-        (["--robot", "box:1:1:0.5"], "is not over it"),
+        (["--robot", "box:1:1:0.5"], "is not above it"),
         (["--robot", "none.stl"], "none.stl: no such file"),
         (["--scan-s", "0.1"], "take 2 s at least"),
         (["--scan-s", "-1"], "motion.period_s = -1"),
@@ -123,9 +121,9 @@ def test_an_answer_that_makes_no_sense_is_one_line_and_no_file(command, here, ch
 
 def test_a_file_is_never_written_over_and_nobody_is_asked_where_nobody_is(command, here):
     (here / "dog.toml").write_text("mine")
-    assert "dog.toml: exists already" in command("new", "dog", *DOG)[2][0]
+    assert "dog.toml: exists; choose" in command("new", "dog", *DOG)[2][0]
     assert (here / "dog.toml").read_text() == "mine"
-    assert "give --servo, --height-m, --see" in command("new", "cat", "--lidar", "UST-10LX")[2][0]
+    assert "missing options --servo, --height-m, --see" in command("new", "cat", "--lidar", "UST-10LX")[2][0]
 
 
 QUESTIONS = [
@@ -134,10 +132,10 @@ QUESTIONS = [
     ("did you mean 'UST-10LX'?", "ust-10"),
     ("How many metres", "sixty"),
     ("'sixty' is no number", "0.6"),
-    ("in its way", "box:1:1:0.9"),
-    ("is not over it", "none"),
+    ("blocks the view", "box:1:1:0.9"),
+    ("is not above it", "none"),
     ("must it see", "ground from 0.5 to 5"),
-    ("from: not a thing to see", "wall:2 around"),
+    ("'from': unknown region", "wall:2 around"),
     ("How many seconds", "0.1"),
     ("rpm at most", ""),
 ]

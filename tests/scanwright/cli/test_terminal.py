@@ -1,14 +1,20 @@
 """The terminal: what a person sees there, what a file gets instead, and how little either can be."""
 
 import io
+import json
+import logging
 import pickle
 import re
+from dataclasses import asdict
+from pathlib import Path
 
 import pytest
 
 from scanwright.cli import console
-from scanwright.cli.console import Progress, Voice, hint, own_voice, set_voice, show
+from scanwright.cli.console import ConsoleProgress, Verbosity, command_console, hint, set_verbosity, show
 from scanwright.cli.help import GroupedHelp, first_sentence
+from scanwright.design.errors import DeviceFaultError, NumericalError, RecordingError, TaskError
+from scanwright.firmware_io.recording.importer import ImportSummary
 
 
 class Terminal(io.StringIO):
@@ -46,63 +52,135 @@ class Clock:
         return self.now_s
 
 
-def test_percentages_become_one_bar_with_the_time_that_is_left(screen):
+def test_fractions_become_one_bar_with_the_time_that_is_left(screen):
     screen, clock = screen(), Clock()
-    say = Progress(clock)
-    say("reading the task")
-    say("searching (0%)")
+    progress = ConsoleProgress(clock)
+    progress("reading the task")
+    progress("searching", 0.0)
     clock.now_s += 30
-    say("making the parts (25%)")
-    bar = screen.lines()[-1]
-    assert bar == f"  [{'=' * 6}{' ' * 18}]  25% making the parts, about 90 s left"
-    clock.now_s += 170
-    say("drawing (40%)")
-    assert "about 5 min left" in screen.lines()[-1]
+    progress("making the parts", 0.25)
+    assert re.fullmatch("\u2501{6}.* 25% 0:01:30 making the parts", screen.lines()[-1])
+    clock.now_s += 30
+    progress("drawing", 0.5)
+    assert " 50% 0:01:00 drawing" in screen.lines()[-1]
     show(["done"])
     assert screen.lines() == ["  .. reading the task", "done", ""]
 
 
+def test_a_bar_that_begins_late_estimates_from_there_on(screen):
+    screen, clock = screen(), Clock()
+    progress = ConsoleProgress(clock)
+    for fraction in (0.5, 0.5, 0.75):
+        progress("writing", fraction)
+        assert fraction == 0.75 or " 50% -:--:-- writing" in screen.lines()[-1]
+        clock.now_s += 10
+    assert " 75% 0:00:20 writing" in screen.lines()[-1]
+
+
+def test_a_bar_begins_anew_with_other_work(screen):
+    screen, clock = screen(), Clock()
+    progress = ConsoleProgress(clock)
+    for fraction in (0.0, 1.0, 0.0, 0.5):
+        progress("scanning", fraction)
+        clock.now_s += 10
+    assert " 50% 0:00:10 scanning" in screen.lines()[-1]
+
+
 def test_a_bar_fits_on_its_line(screen, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setenv("COLUMNS", "60")
     screen = screen()
-    Progress(Clock())("counting what cannot be counted in any reasonable time at all (50%)")
-    assert len(screen.lines()[-1]) == 39
+    ConsoleProgress(Clock())("counting what cannot be counted in any reasonable time at all", 0.5)
+    assert len(screen.lines()) == 1 and len(screen.lines()[-1]) == 59
 
 
-def test_in_a_file_a_percentage_is_printed_every_ten_seconds_and_nothing_moves(capsys):
+def test_warnings_among_results_go_to_standard_error(capsys):
+    show(["result", "warning: measure these:", "  MX-64R: mass_g", "more"])
+    assert capsys.readouterr() == ("result\nmore\n", "warning: measure these:\n  MX-64R: mass_g\n")
+
+
+def test_a_result_as_json_is_its_record(command, monkeypatch):
+    summary = ImportSummary(Path("r.mcap"), 2, 40, 9, 0.1, (0.0, 1.5), {"no_angle": 1}, ("late",))
+    monkeypatch.setattr("scanwright.api.import_bag", lambda *_, **__: summary)
+    words = ("import", "a.bag", "--scan", "/scan", "--angle", "/joint_states:pan", "-o", "r.mcap")
+    code, out, _ = command(*words, "--json")
+    assert code == 0 and json.loads(out) == json.loads(json.dumps(asdict(summary) | {"out": "r.mcap"}))
+
+
+def test_logged_warnings_are_printed_in_every_verbosity(capsys):
+    with command_console():
+        set_verbosity(Verbosity.QUIET)
+        logging.getLogger("scanwright.study").warning("%d of %d", 1, 2)
+    assert capsys.readouterr() == ("", "warning: 1 of 2\n")
+
+
+def test_the_environment_variable_of_version_0_1_still_works(monkeypatch, capsys):
+    monkeypatch.setenv("SCANWRIGHT_VOICE", "quiet")
+    ConsoleProgress()("working")
+    assert capsys.readouterr().err == ""
+
+
+def test_in_a_file_a_fraction_is_printed_every_ten_seconds_and_nothing_moves(capsys):
     clock = Clock()
-    say = Progress(clock)
+    progress = ConsoleProgress(clock)
     for second in range(25):
         clock.now_s = float(second)
-        say(f"scanning ({4 * second}%)")
-    say("drawing (97%)")
-    say("assembling")
-    said = capsys.readouterr().err
-    assert said.splitlines() == [f"  .. scanning ({p}%)" for p in (0, 40, 80)] + [
-        "  .. drawing (97%)",
-        "  .. assembling",
-    ]
-    assert not re.search(r"[\r\033]", said)
+        progress(f"scanning, {second} scans", second / 25)
+    progress("drawing", 0.97)
+    progress("assembling")
+    lines = [f"  .. scanning, {second} scans ({4 * second}%)" for second in (0, 10, 20)]
+    printed = capsys.readouterr().err
+    assert printed.splitlines() == [*lines, "  .. drawing (97%)", "  .. assembling"]
+    assert not re.search(r"[\r\033]", printed)
 
 
-def test_quiet_says_results_only_and_verbose_all(capsys):
-    with own_voice():
-        set_voice(Voice.QUIET)
-        Progress()("working")
+def test_quiet_prints_results_only_and_verbose_all(capsys):
+    with command_console():
+        set_verbosity(Verbosity.QUIET)
+        ConsoleProgress()("working")
         hint("next: look")
         show(["result"])
     assert capsys.readouterr() == ("result\n", "")
-    with own_voice():
-        set_voice(Voice.VERBOSE)
-        say = Progress(Clock())
-        for percent in range(3):
-            say(f"scanning ({percent}%)")
+    with command_console():
+        set_verbosity(Verbosity.VERBOSE)
+        progress = ConsoleProgress(Clock())
+        for fraction in (0.0, 0.01, 0.02):
+            progress("scanning", fraction)
     assert len(capsys.readouterr().err.splitlines()) == 3
-    assert console.voice() is Voice.USUAL
+    assert console.verbosity() is Verbosity.USUAL
 
 
 def test_a_second_process_can_be_given_the_progress():
-    assert isinstance(pickle.loads(pickle.dumps(Progress())), Progress)
+    assert isinstance(pickle.loads(pickle.dumps(ConsoleProgress())), ConsoleProgress)
+
+
+@pytest.mark.parametrize(
+    ("line", "printed"),
+    [
+        ("min_range_m = 5, max_range_m = 2: too small", "--min-range-m = 5, --max-range-m = 2: too small"),
+        ("poses: no such file", "--poses: no such file"),
+        ("`imu` requires `poses`", "`--imu` requires `--poses`"),
+        ("r.mcap: poses of another robot", "r.mcap: poses of another robot"),
+        ("r.mcap: motion.lag_s = 2, /tmp/lag_s/a, voxel_m.ply", "r.mcap: motion.lag_s = 2, /tmp/lag_s/a, voxel_m.ply"),
+        ("spin_s = 2: unknown", "spin_s = 2: unknown"),
+    ],
+)
+def test_an_error_names_options_as_they_are_typed(line, printed, command, monkeypatch):
+    def refuse(*_, **__):
+        raise RecordingError(line)
+
+    monkeypatch.setattr("scanwright.api.assemble", refuse)
+    assert command("assemble", "r.mcap", "--angles", "a.json", "-o", "c.ply") == (2, "", [f"error: {printed}"])
+
+
+@pytest.mark.parametrize(
+    ("error", "code"), [(DeviceFaultError("hot"), 3), (NumericalError("J"), 1), (TaskError("x"), 2)]
+)
+def test_the_exit_code_tells_a_device_from_wrong_input(error, code, command, monkeypatch):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr("scanwright.api.optimise", fail)
+    assert command("optimise", "ceiling")[0] == code
 
 
 def test_colours_are_for_terminals_that_want_them(screen, monkeypatch):
@@ -138,9 +216,11 @@ def test_every_command_stands_in_a_group_of_the_help_and_takes_q_and_v(command):
     assert "  build " in named["Parts"] and "  catalogue " in named["Design"] and "  scan " in named["Devices"]
     assert "..." not in out.replace("[ARGS]...", ""), "no description is cut off"
     assert command()[1] == out, "no command at all is a question too"
-    for name in re.findall(r"^  (\w+)  ", "".join(named[title] for title in GroupedHelp.titles), re.MULTILINE):
+    for name in re.findall(r"^  ([\w-]+)  ", "".join(named[title] for title in GroupedHelp.titles), re.MULTILINE):
         _, said, _ = command(name, "--help")
         assert "-q, --quiet" in said and "-v, --verbose" in said
+        assert f"Example: scanwright {name} " in said and "Exit codes: 0 done; " in said
+        assert not re.search(r"[{}]|\[\[", said.splitlines()[0]), "a usage line without doubled brackets"
 
 
 def test_the_first_sentence_of_a_docstring():

@@ -131,7 +131,7 @@ def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
         assert view.points == 3000 and shown + view.forgotten == 3000 and shown <= 2000
         colours = np.concatenate([np.asarray(chunk.handle.colors) for chunk in view.chunks])
         assert len(colours) == shown and len(np.unique(colours, axis=0)) > 10
-        assert "left out 7 scans" in view.facts.content
+        assert "dropped 7 scans" in view.facts.content
         kept = view.cloud()
         assert len(kept.points_m) == shown and set(kept.columns["time_s"]) == set(range(30 - shown // 100, 30))
         ranges = np.concatenate([chunk.values["range"] for chunk in view.chunks])
@@ -215,7 +215,7 @@ class Seen:
 @pytest.mark.parametrize(
     ("error", "case", "code"),
     [
-        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 2),
+        (noted(DeviceError("the line was cut"), OFF, SHINES), "laser may be on", 3),
         (noted(KeyboardInterrupt(), TURNS), "stopped, servo turns", 130),
     ],
     ids=["error", "Ctrl-C"],
@@ -231,7 +231,7 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
     monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
     with pytest.raises(typer.Exit) as ended:
         devices.scan(Path("out"))
-    said = [line.removeprefix("scanwright: ") for line in capsys.readouterr().err.splitlines()]
+    said = [line.removeprefix("error: ") for line in capsys.readouterr().err.splitlines()]
     assert ended.value.exit_code == code
     assert said == [*ENDS[case][0].lines, f"what was recorded is in {__file__}"]
     (end, closed) = seen.ends
@@ -340,12 +340,12 @@ def test_two_clicks_are_a_length_and_a_third_begins_anew():
     with guarded_server("a page") as (server, _):
         ruler = Ruler(server, lambda: [points])
         ruler.click(np.zeros(3), np.array([1.0, 0, 0]))
-        assert ruler.said == ""
+        assert ruler.text == ""
         ruler.click(np.zeros(3), np.array([0.0, 0, -1]))  # at nothing
         ruler.click(np.zeros(3), np.array([4.0, 3, 0]))
-        assert ruler.said == "3.000 m"
+        assert ruler.text == "3.000 m"
         ruler.click(np.zeros(3), np.array([4.0, 0, 1]))
-        assert ruler.said == ""
+        assert ruler.text == ""
 
 
 def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_path):
@@ -370,7 +370,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
                 page.mouse.up()
                 with suppress(AssertionError):
                     until(lambda number=number: len(view.ruler.ends) == number, 3)
-        assert re.fullmatch(r"\d\.\d{3} m", view.ruler.said)
+        assert re.fullmatch(r"\d\.\d{3} m", view.ruler.text)
         with page.expect_download() as download:
             page.get_by_role("button", name="Save what is seen").click()
         assert download.value.suggested_filename == "hall.ply"

@@ -83,7 +83,7 @@ def test_another_setting_of_a_build_folder_is_judged_without_its_parts(made):
 
 def test_angles_may_be_left_out_for_a_build_folder_only(command):
     code, _, (complaint,) = command("evaluate", "uniform")
-    assert code == 2 and "--angles" in complaint and "only a build folder has angles of its own" in complaint
+    assert code == 2 and "--angles" in complaint and "required unless TASK is a build folder" in complaint
 
 
 def test_the_name_of_a_shipped_task_means_the_task(tmp_path, monkeypatch):

@@ -15,10 +15,11 @@ from imports import ROOT
 from patience import BOUND_S
 
 import scanwright.api as sw
-from scanwright.cad.findings import PartFinding
 from scanwright.cli.app import run as scanwright_command
 from scanwright.design.angles import load_angles
 from scanwright.design.errors import BuildError
+from scanwright.design.findings import Finding
+from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import load_task
 from scanwright.pipeline import build as pipeline
@@ -93,7 +94,7 @@ def test_the_angle_set_is_the_optimum_of_its_task(tilted, made):
     angles = load_angles(tilted / "angles.json")
     task = load_task(made.folder.parents[1] / "tilted.toml")
     assert angles.task_sha256 == load_task(tilted / "task.toml").sha256() == task.sha256()
-    found = find_optimum(task, lambda _: None).angle_set()
+    found = find_optimum(task, no_progress).angle_set()
     assert angles == found.model_copy(update={"t_world_rot_mm": angles.t_world_rot_mm, "task_sha256": task.sha256()})
     assert angles.t_world_rot_mm == made.result.t_world_rot_mm
 
@@ -109,7 +110,7 @@ def test_the_report_of_a_build_has_a_picture_of_every_place_that_a_check_names(t
 def test_a_second_run_does_no_work_and_says_so(tilted, monkeypatch, capsys):
     before = {path: path.stat().st_mtime_ns for path in tilted.rglob("*")}
     build(monkeypatch, tilted / "task.toml", "--out", tilted.parent)
-    assert "nothing has changed" in capsys.readouterr().out
+    assert "is up to date" in capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in tilted.rglob("*")} == before
 
 
@@ -127,10 +128,10 @@ def test_a_build_whose_checks_fail_says_so_first_and_exits_with_1(tilted, tmp_pa
     (folder / "checks.json").write_text(json.dumps(checks))
     enter(folder, "checks.json")
     code, out, complaints = command(*words)
-    assert code == 1 and out == f"{folder}: nothing has changed, no work to do ({len(FILES) - 1} files)\n"
+    assert code == 1 and out == f"{folder} is up to date ({len(FILES) - 1} files)\n"
     assert complaints[:2] == [
-        "scanwright: check failed: all is well",
-        f"scanwright: 1 of {len(built.checks)} checks failed: do not make these parts",
+        "error: check failed: all is well",
+        f"error: 1 of {len(built.checks)} checks failed: do not make these parts",
     ]
     assert complaints[-1] == f"next: read the failed checks in {folder / 'report.html'}, and change the task"
     assert [check.message for check in sw.build(folder / "task.toml", tmp_path).failed] == ["all is well"]
@@ -173,8 +174,10 @@ def test_angles_and_task_alone_are_no_build_that_could_have_changed(tilted, tmp_
         require_as_built(tmp_path)
 
 
-def test_a_build_says_whose_work_it_replaces_and_ctrl_c_what_became_of_it(tilted, tmp_path, command, monkeypatch):
-    folder, said = shutil.copytree(tilted, tmp_path / "tilted"), []
+def test_a_build_says_whose_work_it_replaces_and_ctrl_c_what_became_of_it(
+    tilted, tmp_path, command, monkeypatch, caplog
+):
+    folder = shutil.copytree(tilted, tmp_path / "tilted")
     (folder / "parts/servo_shaft.stl").unlink()
     (folder / "bom.csv").write_text("mine")
 
@@ -183,10 +186,11 @@ def test_a_build_says_whose_work_it_replaces_and_ctrl_c_what_became_of_it(tilted
 
     monkeypatch.setattr(pipeline, "_make", stopped)
     with pytest.raises(KeyboardInterrupt):
-        pipeline.build_task(load_task(folder / "task.toml"), folder, said.append)
-    assert said == [f"{folder}: parts/servo_shaft.stl is gone, bom.csv was edited: making it again"]
+        pipeline.build_task(load_task(folder / "task.toml"), folder, no_progress)
+    replaced = f"{folder}: parts/servo_shaft.stl is missing, bom.csv was edited: built again"
+    assert caplog.messages == [replaced]
     code, out, complaints = command("build", folder / "task.toml", "--out", tmp_path)
-    assert (code, out, complaints) == (130, "", [f"scanwright: stopped; {folder} is as it was"])
+    assert (code, out, complaints) == (130, "", [f"warning: {replaced}", f"note: stopped; {folder} is as it was"])
 
     def stopped_late(_loaded, target, _say):
         shutil.copytree(tilted, target, dirs_exist_ok=True)
@@ -194,7 +198,7 @@ def test_a_build_says_whose_work_it_replaces_and_ctrl_c_what_became_of_it(tilted
 
     monkeypatch.setattr(pipeline, "_make", stopped_late)
     _, _, complaints = command("build", folder / "task.toml", "--out", tmp_path)
-    assert complaints == [f"scanwright: stopped; {folder} is finished"]
+    assert complaints == [f"warning: {replaced}", f"note: stopped; {folder} is finished"]
 
 
 def test_ctrl_c_waits_until_all_files_are_moved(tmp_path, monkeypatch):
@@ -388,7 +392,7 @@ def test_what_is_in_the_way_is_told_before_anything_moves(tmp_path):
     target = tmp_path / "task"
     _build_of(target, ["a.txt"])
     (target / "parts").write_text("in the way")
-    with pytest.raises(BuildError, match="a file is where the build needs a folder"):
+    with pytest.raises(BuildError, match="is a file, but the build needs a folder"):
         _build_of(target, ["parts/b.stl"])
     assert _files(target) == ["a.txt", "manifest.json", "parts"]
 
@@ -406,17 +410,17 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
 
 
 def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
-    found = [PartFinding("turn_from_metal", "note", "shaft", "shaft: have it turned")]
-    found += [PartFinding("unverified", "warning", "UTM", f"UTM: {v} is not verified", v) for v in ("a = 1", "b = 2")]
+    found = [Finding("turn_from_metal", "note", "shaft", "shaft: of metal", hint="have it turned")]
+    checks = tuple(Finding("unverified", "note", "UTM", f"UTM: {v} is not verified") for v in ("a = 1", "b = 2"))
     told = SimpleNamespace(table=list, lines=list)
     made = Made(told, told, told, tuple(found), ())
-    gathered = Build(tmp_path, ("one",), ("slow",), (), made).lines()
+    gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
     assert gathered[0] == "warning: slow"
-    assert gathered[1] == "note: shaft: have it turned"
-    assert gathered[2].startswith("warning: measure these on your own before you print")
-    assert gathered[3] == "  UTM: a = 1, b = 2"
-    assert Build(tmp_path, ("one",), (), (), made).lines(in_full=True)[:3] == [
-        "note: shaft: have it turned",
-        "warning: UTM: a = 1 is not verified",
-        "warning: UTM: b = 2 is not verified",
+    assert gathered[1] == "note: shaft: of metal: have it turned"
+    assert gathered[2].startswith("warning: UTM: unverified values that shape parts: 2: measure yours")
+    assert len(gathered) == 4
+    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[:3] == [
+        "note: shaft: of metal: have it turned",
+        "note: UTM: a = 1 is not verified",
+        "note: UTM: b = 2 is not verified",
     ]

@@ -164,7 +164,7 @@ def test_a_scan_does_not_record_through_a_linked_folder_one_line_and_exit_2(tmp_
         scanwright_command()
     (line,) = capsys.readouterr().err.splitlines()
     assert ended.value.code == 2
-    assert line.startswith(f"scanwright: {tmp_path / 'recordings'}: a symbolic link")
+    assert line.startswith(f"error: {tmp_path / 'recordings'}: a symbolic link")
     monkeypatch.setattr("sys.argv", ["scanwright", *words, "--recording", str(tmp_path / "recordings" / "r.mcap")])
     with pytest.raises(SystemExit) as ended:
         scanwright_command()  # a place that the person names is theirs to choose

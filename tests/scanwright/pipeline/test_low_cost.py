@@ -9,6 +9,7 @@ from scanwright.cad.checks.run import run_checks
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.layout import config_hash
+from scanwright.design.progress import no_progress
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def test_its_list_adds_up_to_less_than_300_dollars_where_one_asks_around(bought)
 
 
 def test_no_check_fails_and_no_part_is_in_the_fan(low_cost):
-    checks, _ = run_checks(low_cost.scanner, low_cost.assembly, lambda _: None)
+    checks, _ = run_checks(low_cost.scanner, low_cost.assembly, no_progress)
     assert [check.message for check in checks if check.severity == "error"] == []
     hidden = [check.value for check in checks if "of the fan hidden" in check.message]
     assert hidden and max(hidden) == 0

@@ -13,14 +13,16 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from scanwright.cad.checks.checks_json import checks_text
 from scanwright.design.angles import STANDARD_DEG, Angles, AngleSet
 from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion, self_occlusion_bytes
 from scanwright.design.task.task import load_task
 from scanwright.pipeline import records as writer
-from scanwright.pipeline.manifest import write_json, write_manifest
+from scanwright.pipeline.manifest import write_manifest
 from scanwright.pipeline.records import write_report
 from scanwright.report.answer import problem_as_built
 from scanwright.report.density_sphere import STEP_DEG, density_sphere
@@ -112,12 +114,9 @@ def write_folder(folder):
     apart = {"base_mount": (0, 0, -0.1), "lidar_body": (0, 0, 0.2)}
     (folder / "assembly.glb").write_bytes(glb(dict.fromkeys(apart, (0, 0, -0.1))))
     (folder / "exploded.glb").write_bytes(glb(apart))
-    places = {"pass": "rotor", "note": "fdm-0.4", "warning": "base_mount", "error": "base_mount and lidar_body"}
-    checks = [
-        {"severity": s, "message": f"{s} of {EVIL}", "where": places[s]}
-        for s in ("pass", "note", "warning", "error", "pass")
-    ]
-    write_json(folder / "checks.json", {"schema": "scanwright/checks/1", "checks": checks})
+    places = {"ok": "rotor", "note": "fdm-0.4", "warning": "base_mount", "error": "base_mount and lidar_body"}
+    checks = [Finding("wall", s, places[s], f"{s} of {EVIL}") for s in ("ok", "note", "warning", "error", "ok")]
+    (folder / "checks.json").write_text(checks_text(checks))
     rows = ["bought,lidar,UTM-30LX,1,Hokuyo,,5000.0,5000.0,5000.0,5000.0,2016,370.0,,yes,"]
     rows += ["nut,hexagon nut,ISO 4032 M4,4" + 11 * ","]
     rows += ['total,all rows,,,,,,5438.5,5400,5500,,,,,"sum of 4"']

@@ -13,12 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_folder import ANGLES, EVIL, Page, drawn, own_body, sphere
 
+from scanwright.cad.checks.checks_json import checks_text
+from scanwright.design.findings import Finding
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import NODES, problem_of
 from scanwright.design.objective.score import quick_J, score
 from scanwright.design.self_occlusion import AXIS_STEPS, load_self_occlusion
 from scanwright.design.task.task import Limits, load_task
-from scanwright.pipeline.manifest import is_current, read_manifest, write_json, write_manifest
+from scanwright.pipeline.manifest import is_current, read_manifest, write_manifest
 from scanwright.report import page as report_page
 from scanwright.report.answer import answer
 from scanwright.report.assembly_steps import steps_html
@@ -142,15 +144,16 @@ def test_what_is_in_the_files_stays_text(page, text):
 
 
 def test_errors_come_first_and_what_nobody_knows_with_them(page, tmp_path):
-    found = re.findall(r"(error|warning|note|pass) of", page.text["checks"])
-    assert found == ["error", "warning", "note", "pass", "pass"]
+    found = re.findall(r"(error|warning|note|ok) of", page.text["checks"])
+    assert found == ["error", "warning", "note", "ok", "ok"]
     assert page.text["answer"].split()[:7] == ["1", "check", "failed:", "do", "not", "make", "these"]
     assert page.text["answer"].index(f"error of {EVIL}") < page.text["answer"].index("The answer")
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
-    write_json(tmp_path / "checks.json", {"checks": [{"severity": "fatal", "message": "a new word"}]})
+    text = checks_text([Finding("wall", "error", "part", "a new word")])
+    (tmp_path / "checks.json").write_text(text.replace('"error"', '"fatal"'))
     unknown = Page(report_html(tmp_path)).text["answer"]
     assert "1 error" in unknown and "1 check failed" in unknown
-    write_json(tmp_path / "checks.json", {"checks": [{"severity": "warning", "message": "a check failed"}]})
+    (tmp_path / "checks.json").write_text(text.replace('"error"', '"warning"'))
     assert "check failed: do not" not in Page(report_html(tmp_path)).text["answer"]
 
 
@@ -177,7 +180,7 @@ def test_a_file_that_no_build_wrote_is_one_line(name, content, tmp_path, command
     (tmp_path / name).write_bytes(content)
     code, out, complaint = command("report", tmp_path)
     assert (code, out, len(complaint)) == (2, "", 1)
-    assert complaint[0].startswith(f"scanwright: {tmp_path}") and name in complaint[0]
+    assert complaint[0].startswith(f"error: {tmp_path}") and name in complaint[0]
     assert "build the folder again" in complaint[0]
 
 
@@ -219,7 +222,7 @@ def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
     problem, built = problem_of(loaded), np.radians([0.0, -55.61, -78.72, 79.75])
     planes = np.array([[-80.0, 75.0, -6.1285, 0.0, -55.0], [-80.0, 80.0, -6.128, 0.0, -55.0], [0.0, 0.0, np.inf, 0, 0]])
     found = other_mounts(problem, loaded.task, built, planes)
-    ((kept,), (broken,)) = found.kept, found.broken
+    ((kept,), (broken,)) = found.within, found.broken
     assert (kept.angles_deg, kept.breaks) == ((0, -55, -80, 80), "")
     assert (broken.angles_deg, broken.breaks) == ((0, -55, -80, 75), "blind to 0.019% of the weight")
     assert broken.J < kept.J == score(problem, np.radians(kept.angles_deg)).J
@@ -229,7 +232,7 @@ def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
     assert found.alone.endswith("What keeps all that the task asks costs 0.086% of the beams per ball against it.")
     allowed = loaded.task.model_copy(update={"angles": loaded.task.angles.model_copy(update={"holes": "allow"})})
     assert (
-        len(other_mounts(problem, allowed, built, planes).kept) == 2
+        len(other_mounts(problem, allowed, built, planes).within) == 2
         and not other_mounts(problem, allowed, built, planes).alone
     )
     limited = allowed.model_copy(update={"limits": Limits(min_density=50)})

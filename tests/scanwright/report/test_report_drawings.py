@@ -121,12 +121,12 @@ def test_a_check_knows_its_bodies():
         "MX-64R": {"servo_case", "servo_horn"},
         "UH1256": {"ring_rotor"},
         "UTM-30LX": {"lidar_body", "lidar_cap"},
-        "beams at -3.00 to 4.50 deg": {"lidar_body", "lidar_cap"},
         "rotor": turning,
         "fdm-0.4": set(),
         "": set(),
     }.items():
-        assert set(bodies_named(where, bodies, bought)) == expected, where
+        assert set(bodies_named("wall", where, bodies, bought)) == expected, where
+    assert bodies_named("beams_hidden", "beams at -3.00 to 4.50 deg", bodies, bought) == ("lidar_body", "lidar_cap")
 
 
 def test_the_picture_of_a_check_is_dark_where_its_body_is(folder):

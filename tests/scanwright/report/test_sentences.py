@@ -58,7 +58,7 @@ def test_planes_are_told_in_metres(found):
 
 
 def test_every_motion_has_its_words():
-    assert turns(None) == "in a motion that the angle set does not tell"
+    assert turns(None) == "in a motion that the angle set does not state"
     assert turns(Sweep(mode="sweep", period_s=12, limits_deg=(-90, 80), accel_deg_s2=200)) == (
         "from -90 to 80 deg and back in 12 s"
     )

@@ -216,9 +216,9 @@ def test_only_so_many_visitors_get_in(page):
 
 def test_a_port_that_is_taken_is_said_in_one_line(page):
     with (
-        pytest.raises(TaskError, match=f"--port {page[1].port}: address already in use"),
+        pytest.raises(TaskError, match=f"port = {page[1].port}: address already in use"),
         guarded_server("a page", page[1].port),
     ):
         pass
-    with pytest.raises(TaskError, match="--port 70000"), guarded_server("a page", 70_000):
+    with pytest.raises(TaskError, match="port = 70000"), guarded_server("a page", 70_000):
         pass

@@ -12,6 +12,7 @@ import pytest
 import viser.transforms
 from matplotlib.image import imread
 
+from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import load_task
 from scanwright.serving.page_server import guarded_server
@@ -160,7 +161,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     page.get_by_text(J, exact=True).wait_for()
 
     # a painted region changes the optimum, and the button finds a better one for it
-    before = find_optimum(load_task(folder / "small.toml"), lambda _: None).search.best[0].angles_deg
+    before = find_optimum(load_task(folder / "small.toml"), no_progress).search.best[0].angles_deg
     tab(page, "Paint")
     page.get_by_label("brush").check()
     until(lambda: studio.controls.painting.value)
@@ -262,7 +263,7 @@ def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
     studio, gate = studio
     page = shown(browser, gate.address, *size, color_scheme=scheme)
     page.get_by_text("exact").wait_for()
-    studio.say("what is refused", bad=True)
+    studio.show("what is refused", bad=True)
     studio.controls.painting.value = True  # the line of its mode stands on the view
     page.get_by_role("status").get_by_text("Painting").wait_for()
     for tab in ("Angles", "Paint", "Compare", "View", "Save"):
@@ -274,7 +275,7 @@ def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
     assert contrast(word, page.evaluate(GROUND, open_tab)) >= 4.5  # which axe-core does not see
     assert page.evaluate(GROUND, "canvas[data-engine]") == {"light": [255, 255, 255], "dark": [20, 20, 20]}[scheme]
     studio.controls.painting.value = False
-    studio.say("")
+    studio.show("")
     page.get_by_role("tab", name="Angles").click()
     page.get_by_role("slider", name="beta_rot").wait_for()  # by the name that a screen reader says
     harmless(browser)

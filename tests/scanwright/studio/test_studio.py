@@ -126,7 +126,7 @@ def test_a_file_is_overwritten_only_when_asked_and_a_link_never(loaded, tmp_path
     assert "alpha_rot_deg = 0.0" in (tmp_path / "mine.toml").read_text()
     (tmp_path / "victim").write_text("keep me")
     (tmp_path / "link.toml").symlink_to(tmp_path / "victim")
-    with pytest.raises(TaskError, match="a link"):
+    with pytest.raises(TaskError, match="a symbolic link"):
         save_task(loaded, tmp_path, "link", None, overwrite=True)
     assert (tmp_path / "victim").read_text() == "keep me"
 
@@ -203,10 +203,10 @@ def test_of_many_wishes_the_last_is_done_and_then_the_rest():
             raise RuntimeError("a fault of one wish")
 
     newest = LatestOnly("test", work, rested.append, rest_s=0.01)
-    newest.wish(0)
+    newest.request(0)
     assert begun.wait(10)
     for wish in range(1, 50):
-        newest.wish(wish)
+        newest.request(wish)
     gate.set()
     assert newest.settled(10)
     assert (done, rested, newest.replaced) == ([0, 49], [49], 48)

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from benchmarks.scanwright.study.invented import invented_judge, invented_search, invented_study
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import TaskError
+from scanwright.design.progress import no_progress
 from scanwright.design.task.named_record import names_in
 from scanwright.design.task.task import SHIPPED as TASKS
 from scanwright.design.task.task import Limits, load_task
@@ -53,7 +54,7 @@ def test_the_shipped_study_crosses_everything_and_refuses_with_a_reason():
     assert len({c.name for c in combinations}) == 36
     refused = [c for c in combinations if c.loaded is None]
     assert len(refused) == 12
-    assert all(c.choice["servo"] == "AX-12A" and "no angle is read" in c.refused for c in refused)
+    assert all(c.choice["servo"] == "AX-12A" and "no angle is measured" in c.refused for c in refused)
     sweeping = [c for c in combinations if c.choice["task"] == "indoor_urg"]
     assert all(c.loaded.task.slip_ring is None for c in sweeping)
     assert len({record_digest(c.loaded) for c in sweeping}) == 6  # the same with either ring: made once
@@ -165,7 +166,7 @@ def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path):
     tables, made = set(), set()
     for seed in range(4):
         run = StudyRun(crossing, open_results(tmp_path / str(seed)), invented_judge, invented_search)
-        run.work(crew(seed), lambda _: None)
+        run.work(crew(seed), no_progress)
         assert [row["status"] for row in run.rows()] == expected
         write_tables(tmp_path, run.rows())
         tables.add((tmp_path / "study.csv").read_bytes() + (tmp_path / "study.parquet").read_bytes())
@@ -174,7 +175,7 @@ def test_the_table_is_that_of_all_candidates_whoever_is_first(tmp_path):
     assert len(tables) == 1
     assert max(made) < len(crossing)
     again = StudyRun(crossing, run.results, invented_judge, invented_search)
-    again.work(crew(), lambda _: None)
+    again.work(crew(), no_progress)
     assert (again.tally.judged, again.tally.searches) == (0, 0)
     assert list(again.rows()) == list(run.rows())
 
@@ -190,7 +191,7 @@ def test_a_candidate_whose_bound_is_beaten_is_never_made(tmp_path):
         return invented_judge(loaded, found)
 
     run.judge = judge
-    run.work(crew(at_once=1), lambda _: None)
+    run.work(crew(at_once=1), no_progress)
     assert not any(wasted)
     assert 0 < run.tally.beaten == 60 - len(wasted)
     assert run.tally.beaten == sum(row["status"] == "dominated" for row in run.rows())
@@ -201,7 +202,7 @@ def test_a_record_that_comes_twice_is_made_once(tmp_path):
     same = tuple(mounting.model_copy(update={"limits": Limits()}) for mounting in loaded.study.mounting)
     loaded = replace(loaded, study=loaded.study.model_copy(update={"mounting": same}))
     run = StudyRun(Crossing(loaded), open_results(tmp_path), invented_judge, invented_search)
-    run.work(crew(), lambda _: None)
+    run.work(crew(), no_progress)
     assert (run.tally.searches, run.tally.judged, run.tally.looked_up) == (2, 2, 4)
     by_name = {row["name"]: row for row in run.rows()}
     assert {row["status"] for row in by_name.values()} == {"front"}

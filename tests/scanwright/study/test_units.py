@@ -14,6 +14,7 @@ import pytest
 from benchmarks.scanwright.study.invented import die, invented_judge, invented_search, invented_study
 from benchmarks.scanwright.study.kills import TABLES, disturbed, site
 from scanwright.design.errors import BuildError
+from scanwright.design.progress import no_progress
 from scanwright.study import workers
 from scanwright.study.crossing import Crossing
 from scanwright.study.results import Results, address, open_results, program
@@ -44,7 +45,7 @@ def test_killed_processes_change_nothing_and_are_told_in_one_line(tmp_path, over
     assert "Traceback" not in told
     crossing = Crossing(invented_study(UNITS))
     alone = StudyRun(crossing, open_results(tmp_path / "alone" / "results"), invented_judge, invented_search)
-    alone.work(Crew(ThreadPoolExecutor(1), lambda: 1), lambda _: None)
+    alone.work(Crew(ThreadPoolExecutor(1), lambda: 1), no_progress)
     write_answer(crossing.loaded.study, alone.rows(), tmp_path / "alone")
     for name in TABLES:
         assert (tmp_path / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
@@ -84,7 +85,7 @@ def test_ctrl_c_ends_a_study_with_its_line(tmp_path, cheapest_task):
     os.killpg(client.pid, signal.SIGINT)  # as a terminal does, while the worker still loads
     assert client.wait(60) == 130
     *progress, last = (tmp_path / "said").read_text().splitlines()
-    assert last == "scanwright: stopped; the same command goes on where it was"
+    assert last == "note: stopped; run the same command to continue"
     assert all(line.startswith("  .. ") for line in progress)
     with pytest.raises(ProcessLookupError):
         until(lambda: os.killpg(client.pid, 0))
@@ -128,7 +129,7 @@ def test_a_worker_of_another_version_or_without_us_is_refused(tmp_path):
     with pytest.raises(BuildError, match=r"worker has numpy .*, this computer 1\.0.*install the same versions"):
         do(unit("any", dict), results, program() | {"numpy": "1.0"}, 1.0)
     missing = Crew(Broken(ModuleNotFoundError("No module named 'design'")), lambda: 1)
-    with pytest.raises(BuildError, match=r"cannot take part .*No module named 'design'"):
+    with pytest.raises(BuildError, match=r"lacks a package .*No module named 'design'"):
         list(finished(missing, [unit("any", dict)], results, 1.0))
     assert {"scanwright", "code", "python", "cadquery"} <= program().keys()
 
@@ -137,11 +138,11 @@ def test_a_worker_keeps_results_only_in_the_folder_of_its_client(tmp_path):
     results = open_results(tmp_path / "results")
     asked = unit("one", dict, {"status": "built"})
     done = do(asked, results, program(), 10.0)
-    assert done.kept and done.seconds is not None
+    assert done.stored and done.seconds is not None
     assert results.get(asked.address) == {"status": "built"}
     assert do(asked, results, program(), 10.0).seconds is None  # looked up
     for elsewhere in (Results(results.folder, "another mark"), Results(tmp_path / "elsewhere", results.mark)):
-        assert not do(asked, elsewhere, program(), 10.0).kept
+        assert not do(asked, elsewhere, program(), 10.0).stored
     cut_off = results.folder / "cd" / f"{'cd' * 32}.json"
     cut_off.parent.mkdir()
     cut_off.write_text('{"status": "bu')  # by a file system that lost its end

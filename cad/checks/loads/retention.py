@@ -1,10 +1,10 @@
-"""What keeps every part on the next one from the lidar to the deck, with nothing but its joints. SI units.
+"""Strength of every joint between lidar and deck. SI units.
 
-Every joint is taken out in turn: what then has no way to the deck hangs on it. That weighs five times its weight, in
-the direction that is worst for each screw; friction and preload hold nothing. Screws share a force equally and take a
-moment as a group of equal springs does; those that point at the axis from a hub or a boss take no moment, their fit
-does; a lone screw keeps a foot from tipping over its edge. What gives way under that fails; what has less than twice of
-it to spare is a warning.
+Each joint is removed in turn: the bodies that then have no path to the deck hang on it. They load it with SHOCK_G times
+their weight, in the direction that is worst for each screw; friction and preload carry nothing. Screws share a force
+equally and carry a moment as a group of equal springs; radial screws of a hub or a boss carry no moment, their fit
+does; a single screw keeps a foot from tipping over its edge. A joint that yields fails; a margin below LEAST_MARGIN is
+a warning.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.checks.check import Check, at_least, tidy
+from scanwright.cad.checks.limits import at_least, tidy
+from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.all_joints import joints_of
@@ -23,22 +24,21 @@ from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, SERVO_CASE, TRIPOD
 from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
 from scanwright.design.arrays import Array
+from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
 from scanwright.design.scanner import Scanner
 
-SHOCK_G = 5.0
-LEAST_MARGIN = 2.0
-ROUNDING_MM = 1e-6  # where the thread is what limits the preload, it asks for just what there is
-AXIAL = 0.9  # cosine to the rotation axis above which a screw does not point at it
+ROUNDING_MM = 1e-6  # a thread that limits the preload engages by just the required length
+AXIAL_COS = 0.9  # to the rotation axis, above which a screw does not point at it
 
 
-def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Check]:
-    """For each joint what hangs on it and how often over it holds that, and how its screws are tightened."""
+def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
+    """Check margin and thread engagement of each joint."""
     return [check for joint in joints_of(assembly.layout) for check in _of_joint(scanner, assembly, joint)]
 
 
 def material_of(assembly: Assembly, body: str) -> Material:
-    """What a made part or a bought body is of."""
+    """Return the material of a made part or a bought body."""
     if body not in assembly.parts:
         scanner = assembly.layout.scanner
         kinds = {SERVO_CASE: scanner.servo.front.kind, LIDAR_BODY: scanner.lidar.base.kind}
@@ -50,40 +50,40 @@ def material_of(assembly: Assembly, body: str) -> Material:
 
 
 def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
-    """Parts and products that have no way to the deck but through a joint."""
+    """Return the parts and products that have no path to the deck but through a joint."""
     layout = assembly.layout
-    ways = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in joints_of(layout) if other != joint]
-    ways += layout.drive.borne
-    everything = {name for way in ways for name in way} | {assembly.thing(joint.part), assembly.thing(joint.onto)}
+    links = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in joints_of(layout) if other != joint]
+    links += layout.drive.borne
+    everything = {name for link in links for name in link} | {assembly.thing(joint.part), assembly.thing(joint.onto)}
     reached, fresh = {DECK, TRIPOD}, {DECK, TRIPOD}
     while fresh:
-        fresh = {b for way in ways for a, b in (way, way[::-1]) if a in fresh} - reached
+        fresh = {b for link in links for a, b in (link, link[::-1]) if a in fresh} - reached
         reached |= fresh
     return frozenset(everything - reached)
 
 
-def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Check]:
-    said, where, hanging = f"{joint.part} on {joint.onto}", _place(joint), hanging_on(assembly, joint)
+def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Finding]:
+    both, subject, hanging = f"{joint.part} on {joint.onto}", _subject(joint), hanging_on(assembly, joint)
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     carries = LIDAR in hanging
     if hold is None:
-        message = f"{said}: {joint.count} x {joint.number} hold by friction: they only keep it from turning"
-        yield Check("retention", "error" if carries else "note", None, None, "", where, message)
+        message = f"{both}: {joint.count} x {joint.number} hold by friction: they only keep it from turning"
+        yield Finding("retention", "error" if carries else "note", subject, message)
         return
     bare = joint.fixing == "thread" and not joint.inserts and material_of(assembly, joint.onto).plastic
     if bare and carries and joint.onto in assembly.parts:
-        message = f"{said}: the lidar hangs on threads in bare plastic, which creeps: nuts or inserts"
-        yield Check("retention", "error", None, None, "", where, message)
+        message = f"{both}: the lidar hangs on threads in bare plastic, which creeps"
+        yield Finding("retention", "error", subject, message, hint="use nuts or inserts")
     yield _margin(scanner, assembly, joint, hold, hanging)
     yield _screws(joint, hold)
 
 
-def _place(joint: Joint) -> str:
-    """Both sides of a joint, as the pictures of a report look for them."""
+def _subject(joint: Joint) -> str:
+    """Return both sides of a joint, as the pictures of a report name them."""
     return f"{joint.part} and {joint.onto}"
 
 
-def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Check:
+def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Finding:
     body = together_of(scanner, assembly, hanging)
     force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
     pull, push = worst_shares(joint, body.centre_m)
@@ -91,27 +91,26 @@ def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hang
     first = min(margins, key=margins.__getitem__)
     nut = {"trap": " and nuts in it", "nut": " and nuts", "deck": " and nuts"}.get(joint.fixing, "")
     what = (
-        f"{joint.count} x {joint.screw.name} into {joint.onto}{nut} hold {body.mass_kg:.2f} kg at {SHOCK_G:g} g "
-        f"({force:.0f} N, worst direction), friction none; first yields {first}: margin"
+        f"{joint.count} x {joint.screw.name} into {joint.onto}{nut} carry {body.mass_kg:.2f} kg at {SHOCK_G:g} g "
+        f"({force:.0f} N, worst direction, no friction); first yields {first}: margin"
     )
-    found = at_least("retention", margins[first], LEAST_MARGIN, "times", joint.part, what)
-    gives_way = margins[first] < 1
-    return found if found.severity == "pass" or gives_way else replace(found, severity="warning")
+    check = at_least("retention", margins[first], LEAST_MARGIN, "times", joint.part, what)
+    return replace(check, severity="warning") if 1 <= margins[first] < LEAST_MARGIN else check
 
 
-def _screws(joint: Joint, hold: Hold) -> Check:
-    said = f"{hold.engaged_mm:.1f} mm of thread" if hold.asked_mm else f"{hold.engaged_mm:.1f} mm of nut or insert"
+def _screws(joint: Joint, hold: Hold) -> Finding:
     message = (
-        f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {said}, {hold.asked_mm:.1f} asked, "
-        f"{hold.torque_nm:g} N m ({hold.preload_n:.0f} N); what loosens it: {hold.loosens}"
+        f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {hold.engaged_mm:.1f} mm of "
+        f"{'thread' if hold.asked_mm else 'nut or insert'} (at least {hold.asked_mm:.1f}), tightened with "
+        f"{hold.torque_nm:g} N m ({hold.preload_n:.0f} N); cause of loosening: {hold.loosens}"
     )
-    held = hold.engaged_mm >= hold.asked_mm - ROUNDING_MM
+    engaged = hold.engaged_mm >= hold.asked_mm - ROUNDING_MM
     value, limit = tidy(hold.engaged_mm), tidy(hold.asked_mm)
-    return Check("screw", "pass" if held else "error", value, limit, "mm", _place(joint), message)
+    return Finding("screw", "ok" if engaged else "error", _subject(joint), message, value, limit, "mm")
 
 
 def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:
-    """Parts and products as one body; the whole of what half turns counts with the shaft and with what holds it."""
+    """Return parts and products as one body; a product of which half turns counts in full on either side."""
     bodies = [assembly.inertial(name) for name in sorted(names & assembly.made.keys())]
     for mass in assembly.layout.drive.masses:
         if mass.product in names or (mass.turning > 0 and assembly.layout.drive.shaft in names):
@@ -125,7 +124,7 @@ def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> 
 
 
 def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
-    """Largest pull along, and push across, any one screw by a force of 1 N at a point, shape (3,), in any direction."""
+    """Return the largest pull along and push across one screw by 1 N at a point, shape (3,), in any direction."""
     start = np.array([axis.start for axis in joint.axes]) / 1000
     along = np.array([axis.along for axis in joint.axes])
     shares = np.broadcast_to(np.eye(3) / joint.count, (joint.count, 3, 3)).copy()
@@ -133,7 +132,7 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
         arm, heel = centre_m - start[0], joint.heel_mm / 1000
         aside = float(np.linalg.norm(arm - (arm @ along[0]) * along[0]))
         return float(np.hypot(1 + aside / heel, arm @ along[0] / heel)), 1.0
-    if abs(along[0, 2]) > AXIAL or not _radial(joint):
+    if abs(along[0, 2]) > AXIAL_COS or not _radial(joint):
         arms = start - start.mean(axis=0)
         stiffness = sum((arm @ arm * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
         turned = np.linalg.pinv(stiffness, rcond=1e-9) @ cross_matrix(centre_m - start.mean(axis=0))
@@ -148,7 +147,7 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
 
 
 def _radial(joint: Joint) -> bool:
-    """Whether the screws point at the rotation axis, from around it."""
+    """Return whether the screws point at the rotation axis, from around it."""
     return all(
         abs(axis.along[2]) < 1e-6 and abs(axis.start[0] * axis.along[1] - axis.start[1] * axis.along[0]) < 1e-6
         for axis in joint.axes

@@ -1,7 +1,7 @@
-"""How far the mount gives way under all that it carries: a lean of the whole scanner that no cloud shows by itself.
+"""Lean of the mount under all that it carries: an error of the scanner's pose that no cloud shows by itself.
 
-It is the same in every position of the servo (to 0.0001 deg, `benchmarks.cad.elements`), so clouds keep their shape,
-and the pose of the scanner on the robot is off by it.
+It is the same in every position of the servo (to 0.0001 deg, `benchmarks.cad.elements`), so it changes no cloud's
+shape.
 """
 
 from __future__ import annotations
@@ -13,29 +13,30 @@ import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.masses import rotor_of
-from scanwright.cad.checks.check import Check, Severity, tidy
+from scanwright.cad.checks.limits import tidy
+from scanwright.cad.checks.table import LEAN_DEG
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
 from scanwright.cad.parts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
-WASHER_MM = 4.0  # of a deck screw's washer beyond its hole
-LEAST_ERROR = 0.25  # of the lean: what CalculiX finds is off by less (`benchmarks.cad.elements`)
-LEANS_DEG = 1.0  # a mount that gives way further is no mount
+WASHER_MM = 4.0  # a deck screw's washer extends so far beyond its hole
+LEAST_ERROR = 0.25  # share of the lean: CalculiX differs by less (`benchmarks.cad.elements`)
 
 
 def mount_checks(
     scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]
-) -> list[Check]:
-    """The lean of a scanner on its mount; nothing where it has none. Arguments as for `deflection_checks`."""
+) -> list[Finding]:
+    """Check the lean of a scanner on its mount, if it has one; arguments as for `deflection_checks`."""
     if BASE_MOUNT not in assembly.made:
         return []
     printer, layout = scanner.printer, assembly.layout
     try:
-        found, more = mount_sag(
+        turned, more = mount_sag(
             meshes[BASE_MOUNT],
             layout.deck,
             layout.drive.mounted,
@@ -44,27 +45,28 @@ def mount_checks(
             printer.density_g_cm3,
         )
     except RuntimeError as error:
-        message = f"{BASE_MOUNT}: nothing carries what it holds: no equilibrium by finite elements ({error})"
-        return [Check("mount_lean", "error", None, LEANS_DEG, "deg", BASE_MOUNT, message)]
-    lean = np.degrees(scanner.angles.T_world_rot(0.0)[:3, :3] @ (found + more))
+        message = f"{BASE_MOUNT}: nothing supports its load: no equilibrium by finite elements ({error})"
+        return [Finding("mount_lean", "error", BASE_MOUNT, message, None, LEAN_DEG, "deg")]
+    lean = np.degrees(scanner.angles.T_world_rot(0.0)[:3, :3] @ (turned + more))
     value = round(float(np.linalg.norm(lean)), 6)
-    doubt = max(math.degrees(float(np.linalg.norm(more))), LEAST_ERROR * value)
-    severity: Severity = "note" if value + doubt <= LEANS_DEG else "warning"
+    error_deg = max(math.degrees(float(np.linalg.norm(more))), LEAST_ERROR * value)
+    severity: Severity = "note" if value + error_deg <= LEAN_DEG else "warning"
     x, y, z = (f"{round(float(part), 3) + 0.0:g}" for part in lean)
     message = (
-        f"{BASE_MOUNT}: leans under what it carries by {value:.2g} +- {doubt:.1g} deg, held under its screws alone, "
-        "less where the deck supports its foot beside them: in every position it turns the scanner by "
-        f"({x}, {y}, {z}) deg about the world's x, y and z, which belongs into its pose on the robot"
+        f"{BASE_MOUNT}: leans under its load by {value:.2g} ± {error_deg:.1g} deg if only its screws hold it, less if "
+        f"the deck supports its foot: in every position it turns the scanner by ({x}, {y}, {z}) deg about the world's "
+        "x, y and z"
     )
-    return [Check("mount_lean", severity, tidy(value), LEANS_DEG, "deg", BASE_MOUNT, message)]
+    hint = "add this rotation to the scanner's pose on the robot"
+    return [Finding("mount_lean", severity, BASE_MOUNT, message, tidy(value), LEAN_DEG, "deg", hint)]
 
 
 def carried(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial]) -> Carried:
-    """All above the mount, its rotor spread about the axis; bodies of `masses.link_bodies`."""
-    rotor, standing = rotor_of(scanner, bodies), bodies["servo"]
+    """Return all above the mount, its rotor spread about the axis; bodies of `masses.link_bodies`."""
+    rotor, fixed = rotor_of(scanner, bodies), bodies["servo"]
     below = [assembly.inertial(name) for name in (BASE_MOUNT, TRIPOD_FOOT) if name in assembly.made]
     shares = [
-        (standing.mass_kg, standing.centre_m),
+        (fixed.mass_kg, fixed.centre_m),
         (rotor.mass_kg, rotor.centre_m * [0.0, 0.0, 1.0]),
         *((-body.mass_kg, body.centre_m) for body in below),
     ]

@@ -1,0 +1,88 @@
+"""Values of the products that are wrong or unverified, and required modules that have no place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.layout.drive import DriveLayout
+from scanwright.design.catalogue.holes import Hole, what_holds
+from scanwright.design.catalogue.measuring import how_to_measure
+from scanwright.design.catalogue.products import Product
+from scanwright.design.findings import Finding
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
+
+# Values of a product that shape no part alone.
+SHAPING = {
+    "lidar.holes": "the screws of the lidar",
+    "printer.screw_clearance_mm": "every screw hole",
+    "servo.holes": "the screws of the servo's case",
+}
+SHOWN_CHARS = 60  # of a value in a message; a longer one is cut
+
+
+def products_of(scanner: Scanner, drive: DriveLayout) -> list[Product]:
+    """Return every product that shapes parts, each once."""
+    products: list[Product | None] = [scanner.lidar, scanner.servo, scanner.slip_ring, *drive.products, scanner.printer]
+    return list({product.name: product for product in products if product is not None}.values())
+
+
+def known_errors(products: Iterable[Product]) -> list[Finding]:
+    """Return a warning for each wrong value for which the parts do not fit the device, a note for the others."""
+    fit = {True: "the printed parts still fit", False: "the printed parts will not fit"}
+    return [
+        Finding(
+            "known_error",
+            "note" if error.fits else "warning",
+            product.name,
+            f"{product.name}: {error.words(product)}; {fit[error.fits]}",
+        )
+        for product in products
+        for error in product.known_wrong
+    ]
+
+
+def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Finding]:
+    """Return an error for each module that the task requires and that has no place in this scanner.
+
+    A module and the part that it adds have the same name.
+    """
+    return [
+        Finding(
+            "module",
+            "error",
+            part.what,
+            f"{part.what}: the task requires it (modules.{part.what} = true), but it has no place: {part.why}",
+        )
+        for part in left_out
+        if getattr(scanner.modules, part.what, False)
+    ]
+
+
+def unverified(products: Iterable[Product], assembly: Assembly) -> list[Finding]:
+    """Return a warning for each unverified value of a product that shapes a part."""
+    return [warning for product in products for warning in _unverified(product, assembly)]
+
+
+def _unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
+    provenance, shaping = product.provenance(), dict(SHAPING)
+    for field in product.unverified():
+        parts = [part.name for part in assembly.parts.values() if f"{product.kind}.{field}" in part.shaped_by]
+        if parts:
+            shaping[f"{product.kind}.{field}"] = " and ".join(parts)
+    for part in reversed(assembly.parts.values()):  # the first part that describes a value wins
+        shaping |= part.shapes
+    for field in product.unverified():
+        if f"{product.kind}.{field}" in shaping:
+            value, source = _shown(getattr(product, field)), provenance[field].source
+            message = f"{product.name}: {field} = {value} is not verified ({source})"
+            hint = f"{how_to_measure(field)}: it shapes {shaping[f'{product.kind}.{field}']}"
+            yield Finding("unverified", "warning", product.name, message, hint=hint)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple) and value and isinstance(value[0], Hole):
+        return what_holds(value)
+    text = str(list(value)) if isinstance(value, tuple) else str(value)
+    return text if len(text) < SHOWN_CHARS else f"{text[: SHOWN_CHARS - 3]}..."

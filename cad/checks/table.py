@@ -1,0 +1,95 @@
+"""The table of all checks: code, subject, limit, and the source of the limit. A page of the docs prints it.
+
+Limits that are constants stand here, with their reason; those that products, printer or layout give are described.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most
+OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
+LINKAGE_HIDES_DEG = 2.0  # beyond servo, ring and shaft: below 1 % of a field of view of 270 deg
+SHOCK_G = 5.0  # bumps and transport: assumed
+LEAST_MARGIN = 2.0  # over strengths that are makers' or assumed
+LEAN_DEG = 1.0  # more than a pose on a robot is usually known to
+THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is not what was meant
+SMALLEST_HOLE_MM = 1.5  # diameter: smaller ones close when printed
+
+
+class CheckRow(NamedTuple):
+    """One row of the table; `code` is `kind` in `checks.json`, an empty limit means that the check only informs."""
+
+    code: str
+    subject: str
+    limit: str = ""
+    source: str = ""
+
+
+NOISE = "range noise of the lidar, as an angle at 10 m"
+TABLE = (
+    CheckRow("known_error", "product whose record is known to be wrong"),
+    CheckRow("unverified", "value of a product that shapes a part and is not verified"),
+    CheckRow("module", "module that the task requires", "has a place", "task"),
+    CheckRow(
+        "clearance", "turning and fixed bodies, over a full turn", f"at least {CLEARANCE_MM:g} mm", "print accuracy"
+    ),
+    CheckRow("interference", "bodies that move together", f"at most {OVERLAP_MM3:g} mm3", "accuracy of the meshes"),
+    CheckRow("beams_hidden", "beams hidden at every axis angle"),
+    CheckRow("beams_partly_hidden", "beams hidden on average over a turn"),
+    CheckRow("beams_linkage", "beams hidden by the linkage alone", f"at most {LINKAGE_HIDES_DEG:g} deg", "chosen"),
+    CheckRow("centre_of_mass", "distance of the rotor's centre of mass from the axis"),
+    CheckRow(
+        "static_torque", "torque of the imbalance", "a fifth of the servo's stall torque", "catalogue; rule of thumb"
+    ),
+    CheckRow(
+        "spin_up_torque", "torque to full speed", "a fifth of the servo's stall torque", "catalogue; rule of thumb"
+    ),
+    CheckRow("flanks", "torque of the imbalance, through the backlash", "friction of ring and bearing", "assumed"),
+    CheckRow(
+        "tilt_moment", "moment on the servo's horn", "radial load at 10 mm; half of it with a bearing", "catalogue"
+    ),
+    CheckRow("axial_load", "weight along the servo's axis", "axial load of the servo", "catalogue"),
+    CheckRow("bearing_load", "load across a bearing", "static load of the bearing", "catalogue"),
+    CheckRow("bearing_axial", "load along a bearing"),
+    CheckRow("belt_tension", "tighter strand of the belt", "working tension of the belt", "catalogue"),
+    CheckRow("belt_angle", "angle between axis and servo encoder", NOISE, "catalogue"),
+    CheckRow(
+        "waist_torque", "stall torque on the shaft's waist", "yield of aluminium and of steel", "EN 755-2, EN ISO 683-2"
+    ),
+    CheckRow("shaft_slope", "bend of the shaft at the hub", NOISE, "catalogue"),
+    CheckRow(
+        "retention", "each joint under a shock", f"margin {LEAST_MARGIN:g} at {SHOCK_G:g} g; error below 1", "assumed"
+    ),
+    CheckRow(
+        "screw", "thread engagement of each joint", "length that carries its preload", "ISO 3506-1; makers' tables"
+    ),
+    CheckRow(
+        "wiring", "circuits, wires, fuses, supply, voltages", "the rules of `design.electrics.rules`", "catalogue"
+    ),
+    CheckRow("leads", "cables between slip ring and lidar, if there are none"),
+    CheckRow("lead_bend", "bend radius of a cable", "bend radius of the cable", "catalogue"),
+    CheckRow("lead_joint", "straight piece of a cable for its joint", "length of its shrink tube", "chosen"),
+    CheckRow("lead_length", "length of a cable"),
+    CheckRow("lead_tie", "distance of a cable from its cable-tie anchor"),
+    CheckRow("deflection", "constant bend by gravity", f"{NOISE}; error above 1 deg", "catalogue"),
+    CheckRow("deflection_turning", "bend by gravity that changes over a turn", NOISE, "catalogue"),
+    CheckRow("mount_lean", "lean of the mount", f"warning above {LEAN_DEG:g} deg", "chosen"),
+    CheckRow("bed", "size of a part in its print pose", "bed of the printer", "catalogue"),
+    CheckRow("support", "volume of support in the print pose"),
+    CheckRow("islands", "layers that start in the air", "warning above 0", "a slicer must support them"),
+    CheckRow("wall", "area thinner than min_wall_mm", f"{THIN_SHARE:.0%} of the surface; warning above 0", "printer"),
+    CheckRow(
+        "smallest_hole", "diameter of the smallest hole", f"at least {SMALLEST_HOLE_MM:g} mm", "smaller ones close"
+    ),
+)
+
+
+def table_page() -> str:
+    """Return the table as a page of Markdown."""
+    rows = "\n".join(f"| `{row.code}` | {row.subject} | {row.limit or 'informs'} | {row.source} |" for row in TABLE)
+    return (
+        "# Checks\n\n`scanwright build` writes the result of each check to `checks.json`, where `kind` is the code. "
+        "An error fails the build.\n\n| code | what is checked | limit | source of the limit |\n"
+        f"| --- | --- | --- | --- |\n{rows}\n"
+    )

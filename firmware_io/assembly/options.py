@@ -1,0 +1,56 @@
+"""The options of `assemble`, shared by the command, the Python interface and the assembly itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from scanwright.design.task.task import LoadedTask
+
+Per = Literal["recording", "turn", "half"]
+COLUMNS = ("intensity", "time_s", "joint_rad", "ring")  # that a cloud can have besides x y z
+
+
+@dataclass(frozen=True, slots=True)
+class AssembleOptions:
+    """How a recording becomes clouds.
+
+    Attributes:
+        organised: keep one row per beam; NaN if there is no point.
+        lag_s: delay of the joint angles.
+        per: one cloud per recording, turn or half turn; each direction of a sweep is a turn.
+        poses: platform poses: TUM or CSV file, or TOPIC[:PARENT:CHILD] of the recording.
+        imu: gyro between poses: CSV file (wx wy wz), or topic of sensor_msgs/Imu.
+        imu_rpy_deg: roll, pitch, yaw of the IMU on the platform; else from /tf_static.
+        smooth: smooth the encoder steps of the joint angles; else interpolate linearly.
+        columns: those of `COLUMNS` that are written; time_s counts from the first beam, ring is the index of the beam.
+        camera: colour points with the images of this task's [camera].
+        min_range_m: drop shorter beams.
+        max_range_m: drop longer beams.
+        edges_deg: drop mixed pixels whose neighbours lie within this grazing angle; 8 is usual.
+        outliers: drop isolated points beyond this many standard deviations; 2 is usual.
+        voxel_m: keep one point per voxel of this edge.
+        normals: add normals nx ny nz that face the scanner.
+    """
+
+    organised: bool = False
+    lag_s: float = 0.0
+    per: Per = "recording"
+    poses: str | None = None
+    imu: str | None = None
+    imu_rpy_deg: tuple[float, float, float] | None = None
+    smooth: bool = True
+    columns: tuple[str, ...] = COLUMNS
+    camera: LoadedTask | Path | str | None = None
+    min_range_m: float = 0.0
+    max_range_m: float = math.inf
+    edges_deg: float | None = None
+    outliers: float | None = None
+    voxel_m: float | None = None
+    normals: bool = False
+
+
+DEFAULT = AssembleOptions()

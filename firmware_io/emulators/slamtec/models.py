@@ -1,0 +1,112 @@
+"""Models of RPLIDAR: identity, line, motor and scan modes, as the maker's SDK and logs of its users list them.
+
+Sources: GET_LIDAR_CONF in sl_lidar_cmd.h of rplidar_sdk 2.1; the modes that rplidar_ros prints for real sensors (issues
+68 and 84 of robopeak/rplidar_ros, 48 of Slamtec/rplidar_ros). What no source gives is marked [assumed].
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import Literal
+
+STANDARD, EXPRESS, ULTRA, DENSE = 0x81, 0x82, 0x84, 0x85  # types of packets
+
+_COUNT, _SAMPLE_US, _MAX_DISTANCE, _ANSWER, _TYPICAL, _NAME = 0x70, 0x71, 0x74, 0x75, 0x7C, 0x7F  # keys of GET_CONF
+_DESIRED_SPEED = 0x01
+_RPM, _PWM = 600, 660  # [assumed]: the SDK's defaults
+
+
+@dataclass(frozen=True, slots=True)
+class ScanMode:
+    """One of its modes.
+
+    Attributes:
+        name: as the sensor states it.
+        kind: type of its packets.
+        point_us: time between two points.
+        range_m: longest range.
+    """
+
+    name: str
+    kind: int
+    point_us: float
+    range_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SlamtecIdentity:
+    """A model.
+
+    Attributes:
+        model: byte of INFO; its upper half is the series.
+        baud: of its line.
+        motor: what starts the motor: a scan, the duty cycle of an accessory board, or a speed command.
+        modes: by number; empty for firmware before 1.24, which does not answer GET_CONF.
+        typical: number of the mode that the maker's programs choose.
+        legacy: the mode of EXPRESS_SCAN with number 0.
+        firmware: major and minor version.
+    """
+
+    model: int
+    baud: int
+    motor: Literal["scan", "pwm", "rpm"]
+    modes: tuple[ScanMode, ...]
+    typical: int
+    legacy: ScanMode
+    firmware: tuple[int, int] = (1, 29)
+
+    @property
+    def usual(self) -> ScanMode:
+        """The mode that the maker's programs choose."""
+        return self.modes[self.typical] if self.modes else self.legacy
+
+    def configuration(self, payload: bytes) -> bytes | None:
+        """Answer GET_CONF; None for an entry that it does not have."""
+        key, number = int.from_bytes(payload[:4], "little"), int.from_bytes(payload[4:6], "little")
+        mode = self.modes[number] if number < len(self.modes) else None
+        if not self.modes or (mode is None and key in (_SAMPLE_US, _MAX_DISTANCE, _ANSWER, _NAME)):
+            return None
+        values = {
+            _COUNT: struct.pack("<H", len(self.modes)),
+            _TYPICAL: struct.pack("<H", self.typical),
+            _DESIRED_SPEED: struct.pack("<HH", _RPM, _PWM),
+        }
+        if mode is not None:
+            values |= {
+                _SAMPLE_US: struct.pack("<I", round(mode.point_us * 256)),
+                _MAX_DISTANCE: struct.pack("<I", round(mode.range_m * 256)),
+                _ANSWER: bytes([mode.kind]),
+                _NAME: mode.name.encode() + b"\0",
+            }
+        return payload[:4] + values[key] if key in values else None
+
+
+def _triangulating(point_us: float, range_m: float) -> tuple[ScanMode, ...]:
+    """Return the five modes of the A series, of which Boost and Sensitivity measure every `point_us`."""
+    return (
+        ScanMode("Standard", STANDARD, 4 * point_us, range_m),
+        ScanMode("Express", EXPRESS, 2 * point_us, range_m),
+        ScanMode("Boost", ULTRA, point_us, range_m),
+        ScanMode("Sensitivity", ULTRA, point_us, range_m),
+        ScanMode("Stability", ULTRA, 1.6 * point_us, range_m),
+    )
+
+
+_A1, _A2, _A3 = _triangulating(127.0, 12.0), _triangulating(63.0, 12.0), _triangulating(63.0, 25.0)
+_S1 = (  # all but 9.2 thousand points a second [assumed]
+    ScanMode("Standard", STANDARD, 217.0, 40.0),
+    ScanMode("Express", EXPRESS, 108.7, 40.0),
+    ScanMode("DenseBoost", DENSE, 108.7, 40.0),
+)
+_S2 = ScanMode("Standard", STANDARD, 125.0, 30.0), ScanMode("DenseBoost", DENSE, 31.25, 30.0)
+_C1 = ScanMode("Standard", STANDARD, 200.0, 16.0), ScanMode("DenseBoost", DENSE, 200.0, 16.0)
+
+IDENTITIES = {
+    "RPLIDAR A1": SlamtecIdentity(0x18, 115_200, "scan", _A1, 3, _A1[1]),
+    "RPLIDAR A2": SlamtecIdentity(0x2C, 256_000, "pwm", _A2, 3, _A2[1]),
+    "RPLIDAR A3": SlamtecIdentity(0x31, 256_000, "pwm", _A3, 3, _A3[1]),
+    "RPLIDAR S1": SlamtecIdentity(0x61, 256_000, "rpm", _S1, 2, _S1[1]),
+    "RPLIDAR S2": SlamtecIdentity(0x71, 1_000_000, "rpm", _S2, 1, _S2[0]),
+    "RPLIDAR C1": SlamtecIdentity(0x41, 460_800, "scan", _C1, 0, _C1[0]),  # 4 for its series [assumed]
+}
