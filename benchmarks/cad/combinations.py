@@ -38,10 +38,12 @@ SAME_MM = 2.1  # slots take a screw this far from its place
 def main(angles: tuple[float, ...] = TILTED) -> None:
     """Lay out all of them, and print what goes with what, and the screws that meet no hole."""
     catalogue = load_catalogue()
-    kinds = [[one.name for one in catalogue if isinstance(one, kind)] for kind in (Lidar, Servo, SlipRing)]
+    lidars = [one.name for one in catalogue if isinstance(one, Lidar)]
+    servos = [one.name for one in catalogue if isinstance(one, Servo)]
+    rings = [None, *(one.name for one in catalogue if isinstance(one, SlipRing))]
     laid_out: defaultdict[tuple[str, str | None], list[str]] = defaultdict(list)
     refused, misses = Counter[str](), Counter[str]()
-    for lidar, servo, ring in itertools.product(*kinds[:2], [None, *kinds[2]]):
+    for lidar, servo, ring in itertools.product(lidars, servos, rings):
         try:
             layout = _layout(catalogue, angles, lidar, servo, ring)
             misses.update(screws_without_a_hole(layout))
@@ -52,7 +54,7 @@ def main(angles: tuple[float, ...] = TILTED) -> None:
     accepted = sum(map(len, laid_out.values()))
     print(f"{accepted} of {accepted + refused.total()} laid out, at {angles}; {misses.total()} screws meet no hole")
     for (servo, ring), lidars in laid_out.items():
-        named = "every lidar" if len(lidars) == len(kinds[0]) else ", ".join(lidars)
+        named = "every lidar" if len(lidars) == len(lidars) else ", ".join(lidars)
         print(f"  {servo} with {ring}: {len(lidars)}: {named}")
     for reason, count in refused.most_common():
         print(f"  refused {count}: {reason}")

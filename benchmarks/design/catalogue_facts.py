@@ -23,9 +23,18 @@ from typing import Any
 import numpy as np
 
 from scanwright.design.catalogue.catalogue import SHIPPED, load_product
-from scanwright.design.catalogue.products import Product
+from scanwright.design.catalogue.holes import Face, mounting_holes
+from scanwright.design.catalogue.products import Product, Servo
 
 TOLERANCE = 1e-6
+RENAMED = {
+    "mount_holes_mm": "base.places",
+    "mount_thread_depth_mm": "base.depth_mm",
+    "case_holes_mm": "front.places",
+    "case_rear_holes_mm": "rear.places",
+}
+FACES: dict[str, Face] = {"case_holes_z_mm": "+z", "case_rear_holes_z_mm": "-z"}
+"""Where the record holds the values of a table that names the fields of version 0.1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +65,12 @@ def number_of(text: str) -> Any:
 
 def value_of(product: Product, field: str) -> Any:
     """Return the value of a field, or of a part of it after a dot; None if the record has none."""
+    if field in FACES and isinstance(product, Servo):
+        pattern = mounting_holes(product.holes, FACES[field])
+        others = (hole.at_mm[2] for hole in product.holes if hole.axis == FACES[field])
+        return pattern.z_mm if pattern.places else next(others, None)
     value: Any = product
-    for part in field.split("."):
+    for part in RENAMED.get(field, field).split("."):
         value = getattr(value, part, None)
     return value
 
