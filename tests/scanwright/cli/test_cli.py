@@ -202,7 +202,7 @@ def test_schema_and_catalogue(command):
     for name in ("UTM-30LX", "URG-04LX", "UST-10LX", "MX-64R", "AX-12A", "UH1256-02-0610-06S", "SNU11-P0210", "sla"):
         assert name in out
     _, out, _ = command("catalogue", "SNU11-P0210")
-    assert "? bore_mm = 12.7" in out
+    assert "? length_mm = 38.0" in out
     _, out, _ = command("catalogue", "--kind", "lidar", "--min-range-m", "8", "--max-mass-g", "200", "--json")
     listed = {product["name"]: product for product in json.loads(out)["products"]}
     assert {"UST-10LX", "UST-20LX"} <= set(listed) and "UTM-30LX" not in listed
