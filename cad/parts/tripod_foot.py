@@ -20,7 +20,7 @@ from scanwright.cad.layout.modules.tripod_foot import (
     FLOOR,
     HEEL,
     OVER_NUTS,
-    STANDS_OUT,
+    PROTRUDES,
     TripodFoot,
     corner_turn,
 )
@@ -75,7 +75,7 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
         grip_mm=DECK_MM,
         thread_mm=p.thickness if p.tripod.trap is None else FLOOR,
         thread=p.tripod,
-        stands_out_mm=STANDS_OUT,
+        protrudes_mm=PROTRUDES,
         heel_mm=HEEL,
     )
 

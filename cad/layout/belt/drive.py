@@ -85,7 +85,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         shaft=names.MAIN_SHAFT,
         bend=belt_shaft_bend(stack),
         mounted=mounted,
-        servo_pose=(stack.turn(), stack.beside()),
+        servo_pose=(stack.turn(), stack.servo_origin()),
         floor=stack.pulley_top,
         ceiling=stack.tower_top - SHELF,
         lead_exits=partial(_lead_exits, stack),
