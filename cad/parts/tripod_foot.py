@@ -48,6 +48,7 @@ def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
         turns=False,
         make=partial(tripod_foot, place.deck, p),
         step=Step("Tripod foot", words, "no screw stands out below the plate, and the nut does not turn"),
+        after=BASE_MOUNT,
         lifted="deck",
         joints=tuple(_joints(place.deck, p)),
     )
