@@ -336,7 +336,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert (tie.quantity, tie.note.split(";")[0]) == (2, "1 at the shaft, 1 at the foot of the mount")
     assert "Close a cable tie around shaft and bundles" in text and "behind the plate" not in text
     assert len(set(re.findall(r"by the shaft's window at (\d+) deg", text))) == 2
-    assert "one of its windows" not in text and 'by the one that the step "Leads between lidar and ring" tells' in text
+    assert "one of its windows" not in text and 'by the one that the step "Leads between lidar and ring" names' in text
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
@@ -383,7 +383,8 @@ def test_the_frame_chain_names_the_servo_beside_the_axis(made):
     servo, rot = bodies["servo"], bodies["rot"]
     text = urdf_text(made.scanner, drive, bodies, {"servo": [], "rot": []})
     horn = drive.stack.servo_origin()
-    low, high = np.array(drive.shapes[0].low), np.array(drive.shapes[0].high)
+    (case,) = [station.shape for station in drive.stations if station.name == "servo"]
+    low, high = np.array(case.low), np.array(case.high)
     centre = (low + high) / 2
     assert sorted(high - low) == pytest.approx([40.2, 41.0, 61.1]) and f"{centre[0] / 1000:.6g}" in text
     assert np.linalg.norm(centre[:2] - horn[:2]) < 20
