@@ -205,7 +205,7 @@ def test_schema_and_catalogue(command):
     assert "? length_mm = 38.0" in out
     _, out, _ = command("catalogue", "--kind", "lidar", "--min-range-m", "8", "--max-mass-g", "200", "--json")
     listed = {product["name"]: product for product in json.loads(out)["products"]}
-    assert {"UST-20LX", "RPLIDAR C1"} <= set(listed) and "UTM-30LX" not in listed
+    assert {"UST-20LX", "RPLIDAR S2"} <= set(listed) and "UTM-30LX" not in listed
     assert listed["UST-10LX"]["provenance"]["mass_g"]["verified"] is True
 
 
