@@ -40,7 +40,7 @@ def rated(scanner, newton):
     return replace(scanner, servo=Servo.model_validate(scanner.servo.model_dump() | {"radial_load_n": newton}))
 
 
-ASKED_FOR = {"counterweight", "tripod_foot"}  # by balance, or by a task
+ASKED_FOR = {"counterweight", "servo_frame", "tripod_foot"}  # by balance, a servo without rear holes, or a task
 
 
 SCANNERS = {
