@@ -7,7 +7,7 @@ DIALECT = {
     "things that tell": r"\b(?:tells?|told|telling)\b",
     "things that say": r"\b(?:says?|said|saying)\b",
     "nobody, whoever": r"\b(?:nobody|somebody|whoever)\b",
-    "a clause for a noun": r"\b(?:what|who) (?:is|are|was|were|has|have|had|can|cannot|may|no|counts|hangs|stands|lies)\b",
+    "a clause for a noun": r"\b(?:what|who) (?:is|are|was|were|has|have|had|can|cannot|may|no|counts|hangs|lies)\b",
     "where for if": r"(?:^|[.;:] )Where\b[^.?]*,|\bwherever\b"
     r"|\bwhere (?:it|they|that|there|this|one|none) (?:is|are|was|does|do|has|have|had|can)\b",
     "things that stand or lie": r"\b(?:stands?|stood|standing)\b(?! still)|\b(?:lies|lay|lying)\b",
@@ -20,12 +20,12 @@ DIALECT = {
     "of its own": r"\bof (?:its|their) own\b",
     "beside": r"\bbeside\b",
     "so many": r"\bso many\b|\bas (?:light|cheap)\b(?! as)",
-    "way": r"\b(?:each|both|one|other|other's|wrong|same|that|in the|the) ways?\b(?! to\b)",
+    "way": r"\b(?:each|both|one|other|other's|wrong|in the) ways?\b(?! (?:to|of)\b)",
     "old words": r"\b(?:shall|yet|aslant|dear|to and fro|mend(?:s|ed|ing)?|unasked|for ever|likewise|whence)\b",
     "house": r"\b(?:the house|rooms? of (?:the|what|its)|at hand|by hand|in hand)\b",
     "left out": r"\b(?:left|leaves?|leaving) out\b|\bleaves? [^.]{,40} out\b",
     "history": r"\b(?:no longer|had been|the code before|used to be)\b",
-    "private words": r"\b(?:twins?|refused?|lever arm beside|leaders?|full looks?|second looks?|crisp|unrest)\b",
+    "private words": r"\b(?:twins?|refused?|leaders?|crisp|unrest)\b",
 }
 
 
@@ -90,7 +90,8 @@ def strange(markdown):
             if kind == "heading" or sentence.rstrip("*_ ").endswith("?"):
                 continue
             for name, pattern in DIALECT.items():
-                found += [(name, sentence[max(0, m.start() - 30) : m.end() + 30]) for m in re.finditer(pattern, sentence)]
+                places = re.finditer(pattern, sentence, re.IGNORECASE)
+                found += [(name, sentence[max(0, place.start() - 30) : place.end() + 30]) for place in places]
     return found
 
 
