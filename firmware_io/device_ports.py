@@ -90,8 +90,13 @@ def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
     )
 
 
+def known_usb_ids(kind: type[Lidar] | type[Servo] | tuple[type[Lidar], type[Servo]] = (Lidar, Servo)) -> set[str]:
+    """Return the USB ids ("0403:6014") of lidars and servo adapters of the catalogue."""
+    return {usb_id for product in load_catalogue() if isinstance(product, kind) for usb_id in product.usb_ids or ()}
+
+
 def _plugged(kind: type[Lidar] | type[Servo]) -> list[str]:
-    known = {usb_id for product in load_catalogue() if isinstance(product, kind) for usb_id in product.usb_ids or ()}
+    known = known_usb_ids(kind)
     plugged = [port for port in list_ports.comports() if port.vid is not None and port.pid is not None]
     return sorted(port.device for port in plugged if f"{port.vid:04x}:{port.pid:04x}" in known)
 

@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.lidar.lidar import LidarDriver as LidarDriver
     from scanwright.firmware_io.mapping.map_files import MapSummary as MapSummary
     from scanwright.firmware_io.recording.arrays import RecordingArrays as RecordingArrays
+    from scanwright.firmware_io.recording.import_checks.corrections import Corrections as Corrections
     from scanwright.firmware_io.recording.importer import ImportSummary as ImportSummary
     from scanwright.firmware_io.recording.recording import Recording as Recording
     from scanwright.firmware_io.registration.register_files import RegisteredFiles as RegisteredFiles
@@ -91,6 +92,7 @@ _MODULES = {
     "scanwright.design.task.task": "LoadedTask Task",
     "scanwright.firmware_io.assembly.assemble": "AssembleSummary",
     "scanwright.firmware_io.assembly.options": "AssembleOptions",
+    "scanwright.firmware_io.recording.import_checks.corrections": "Corrections",
     "scanwright.firmware_io.calibration.calibrate": "Calibration",
     "scanwright.firmware_io.clouds.cloud": "Cloud",
     "scanwright.firmware_io.lidar.lidar": "LidarDriver",

@@ -2,7 +2,7 @@
 
     python -m benchmarks.cad.combinations [ALPHA_ROT BETA_ROT ALPHA_LASER BETA_LASER]
 
-Every triple is laid out with all its parts and joints, without the CAD kernel: what cannot be made is refused there.
+Every triple is laid out with all its parts and joints, but no solid: what cannot be made is refused there.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ import re
 import sys
 from collections import Counter, defaultdict
 
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.layout import layout_of
-from scanwright.cad.parts.all_parts import parts_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
@@ -55,9 +53,7 @@ def _refusal(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, servo:
         slip_ring=ring,
     )
     try:
-        layout = layout_of(scanner_of(chosen, "fdm-0.4", catalogue))
-        parts_of(layout)
-        list(joints_of(layout))
+        laid_out(scanner_of(chosen, "fdm-0.4", catalogue))
     except BuildError as error:
         return str(error)
     return None

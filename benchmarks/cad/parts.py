@@ -183,8 +183,8 @@ def _values(scanner: Scanner, assembly: Assembly, checks: list[Finding]) -> dict
         "bearing": float(assembly.layout.stack.bearing is not None),
         "sub_plate": float(assembly.layout.stack.sub_plate is not None),
         "counterweight": float("counterweight" in assembly.made),
-        "leads": float(len(assembly.leads)),
-        "leads_laid": float(sum(lead.path is not None for lead in assembly.leads)),
+        "leads": float(len(assembly.layout.leads)),
+        "leads_laid": float(sum(lead.path is not None for lead in assembly.layout.leads)),
         **({"horn_share": max(horn)} if horn else {}),
         **found,
     }

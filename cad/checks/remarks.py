@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.modules.unasked import unasked
-from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.screws import passing_hole
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.findings import Finding
-from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 
@@ -26,22 +25,7 @@ def remarks_of(scanner: Scanner, assembly: Assembly) -> tuple[Finding, ...]:
     return tuple(remarks)
 
 
-def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
-    """Return the parts that this scanner does not need."""
-    layout = assembly.layout
-    out = [*layout.drive.left_out]
-    if isinstance(layout.counterweight, LeftOut):
-        out.append(layout.counterweight)
-    ties = hub_tie_of(layout.scanner, layout.linkage), plate_ties_of(layout.scanner.lidar, layout.linkage)
-    out += [tie for tie in ties if isinstance(tie, LeftOut)]
-    if layout.deck.tripod is None:
-        out.append(unasked(TRIPOD_FOOT))
-    if layout.deck.flat:
-        out.append(LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
-    return tuple(out)
-
-
-def without_traps(printer: Printer, joints: list[Joint]) -> list[Finding]:
+def without_traps(printer: Printer, joints: Sequence[Joint]) -> list[Finding]:
     """Return a note for each joint with plain threads although the printer's profile requires nuts."""
     if printer.thread != "nut":
         return []

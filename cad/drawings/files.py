@@ -10,8 +10,7 @@ from scanwright.cad.drawings.part import Part, azimuth_deg, part_of, planes_acro
 from scanwright.cad.drawings.patterns import number
 from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.fits import OnSheet
+from scanwright.cad.parts.fits import OnSheet
 from scanwright.cad.parts.part_spec import Process
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.scanner import Scanner
@@ -47,7 +46,7 @@ def drawing_of(
     """Return the sheet of one part."""
     spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
-    part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, joints_of(assembly.layout))
+    part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, assembly.layout.joints)
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),

@@ -1,8 +1,8 @@
 """Joints: what holds what, by which screw, where, and how long that is. Declared here, and read by everybody.
 
-Parts list, steps, drawings and findings read them; the parts cut their holes from the same numbers of the layout, and a
-test reads the joints back from the solids. What only one drive has is in `direct/joints.py` and `belt/joints.py`.
-Lengths are the shortest of the standards that hold. Rotation frame at gamma = 0, mm.
+Each part declares its own (`PartSpec.joints`). Parts list, steps, drawings and findings read them; the parts cut their
+holes from the same numbers of the layout, and a test reads the joints back from the solids. Lengths are the shortest of
+the standards that hold. Rotation frame at gamma = 0, mm.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
     return next((n for n in known if n >= grip + depth + NUT * screw.nominal), known[-1])
 
 
-def held_in(thread: Thread) -> Fixing:
+def fixing_in(thread: Thread) -> Fixing:
     """How a screw holds in a printed part."""
     return "thread" if thread.trap is None else "trap"
 

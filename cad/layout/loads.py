@@ -1,10 +1,13 @@
-"""What the rotor's weight is, and what a servo's horn is rated for. SI units. No kernel: plain numpy."""
+"""The weight of the rotor, the give of its shaft, and the rating of a servo's horn. SI units. No kernel."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
@@ -13,6 +16,7 @@ FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of t
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
 STEEL_G_CM3 = 7.85
+METAL_POISSON = 0.33
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +39,33 @@ class Weight:
     def moment_nm(self) -> float:
         """Moment about the horn in the worst position of a turn."""
         return self.across_n * self.lever_m + self.along_n * self.off_axis_m
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftBend:
+    """What a load at the hub's lower end does to it. A force along x bends it about y, and so all around.
+
+    Attributes:
+        compliance: (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m].
+        twist_rad_per_nm: about the axis.
+        stretch_m_per_n: along the axis.
+    """
+
+    compliance: Array
+    twist_rad_per_nm: float
+    stretch_m_per_n: float
+
+    def rotation_of(self, force_n: Array, moment_nm: Array) -> Array:
+        """Rotation of the hub [rad], rotation frame; force and moment act on it at the height of its lower end."""
+        along = np.array([-force_n[1], force_n[0], 0.0])  # z x force
+        bend = self.compliance[1, 0] * along + self.compliance[1, 1] * np.array([*moment_nm[:2], 0.0])
+        return bend + np.array([0.0, 0.0, self.twist_rad_per_nm * moment_nm[2]])
+
+    def shift_of(self, force_n: Array, moment_nm: Array) -> Array:
+        """Displacement of the hub's lower end [m]."""
+        across = np.array([moment_nm[1], -moment_nm[0], 0.0])  # moment x z
+        bend = self.compliance[0, 0] * np.array([*force_n[:2], 0.0]) + self.compliance[0, 1] * across
+        return bend + np.array([0.0, 0.0, self.stretch_m_per_n * force_n[2]])
 
 
 def tilt_sine(scanner: Scanner) -> float:

@@ -32,7 +32,7 @@ LIDAR = "lidar"
 RING = "ring"
 ROTOR_LEADS = "rotor_leads"
 SERVO = "servo"
-STANDING_LEADS = "standing_leads"
+FIXED_CABLES = "standing_leads"
 TRIPOD = "tripod"
 
 # bodies of bought products

@@ -13,20 +13,21 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.drive import Stack
 from scanwright.cad.layout.envelope import (
     EAR_REACH,
     EAR_SCREW,
+    PLATE_THICKNESS,
     SUB_PLATE_THICKNESS,
     ear_corner,
     ear_screws,
     screw_travel_mm,
     slot_ends,
 )
-from scanwright.cad.layout.hub import Axis
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SUB_PLATE
+from scanwright.cad.layout.hub import Axis, Hub
+from scanwright.cad.layout.joints import Joint, fixing_in, lidar_thread_mm, placed_axes, screws, upright_axes
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR_BODY, SUB_PLATE
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
@@ -36,9 +37,9 @@ from scanwright.design.scanner import Scanner
 CHAMFER = 3.0
 
 
-def sub_plate_spec(layout: Layout) -> PartSpec | None:
-    """The sub-plate of one scanner; None where a driver reaches all screws of the lidar."""
-    scanner, axis = layout.scanner, layout.stack.sub_plate
+def sub_plate_spec(place: Placement) -> PartSpec | None:
+    """The sub-plate of one scanner; None if a driver reaches all screws of the lidar."""
+    scanner, axis = place.scanner, place.stack.sub_plate
     if axis is None:
         return None
     words = (
@@ -49,15 +50,40 @@ def sub_plate_spec(layout: Layout) -> PartSpec | None:
     return PartSpec(
         name=SUB_PLATE,
         turns=True,
-        make=partial(sub_plate, scanner, layout.stack, axis),
+        make=partial(sub_plate, scanner, place.stack, axis),
         step=Step("Lidar and sub-plate on the linkage", words, "the two plates meet without a gap"),
         angles="laser",
-        seat=layout.linkage.seat,
+        seat=place.linkage.seat,
         lifted="lidar",
+        joints=(lidar_joint(place, SUB_PLATE, SUB_PLATE_THICKNESS), _ears_joint(place.linkage)),
     )
 
 
-def sub_plate(scanner: Scanner, stack: Stack, axis: Axis) -> cq.Solid:
+def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
+    """The lidar on the linkage, or on its sub-plate."""
+    p = place.linkage
+    axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), p.stack.R())
+    slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
+    deep = lidar_thread_mm(place.scanner.lidar)
+    return Joint(part, LIDAR_BODY, "thread", p.screw, axes, grip_mm=grip, thread_mm=deep, slot_mm=slot)
+
+
+def _ears_joint(p: AlignmentLinkage) -> Joint:
+    """The sub-plate on the linkage."""
+    thread = p.ear_thread
+    return Joint(
+        SUB_PLATE,
+        ALIGNMENT_LINKAGE,
+        fixing_in(thread),
+        EAR_SCREW,
+        placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
+        grip_mm=SUB_PLATE_THICKNESS,
+        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
+        thread=thread,
+    )
+
+
+def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
     """Make the sub-plate, its ears along an axis of the laser frame.
 
     Raises:

@@ -12,18 +12,21 @@ what the axis does between two samples without a trace in them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 from scipy.linalg import solveh_banded
 
-from scanwright.design.arrays import Floats, Ints
+from scanwright.design.arrays import Floats, Ints, Times
+from scanwright.firmware_io.recording.import_checks.angles import outliers
 from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
 _LEAST = 32  # samples; with fewer there is nothing to average
 _FINEST = 4  # samples to a knot
+_MOST_REJECTED = 0.1  # share of the samples: of more, nobody can tell which are right
+_LISTED = 5  # times of rejected samples in a message
 _SWING = 6.0  # residuals beyond this many times their rms are jumps (a stop, a slip), not noise
 _MISSED = 2 / np.sqrt(12)  # of a step; twice what rounding to steps does is motion that the curve misses
 _REST_S = 0.1  # a staircase slower than this may as well be an axis that stops for its scans
@@ -41,6 +44,7 @@ class SmoothAxis:
         step_rad: step of the encoder; 0 where the positions have none.
         residual_rad: rms of samples against the curve.
         error_rad: rms error of the curve, from its residuals and from what a curve with half the knots makes of them.
+        rejected_ns: times of the samples that lie far off the others and were not used.
     """
 
     curve: AxisCurve
@@ -49,6 +53,7 @@ class SmoothAxis:
     step_rad: float
     residual_rad: float
     error_rad: float
+    rejected_ns: Times
 
 
 def axis_curve(log: JointLog, *, at_rest: bool) -> tuple[AxisCurve, str]:
@@ -64,18 +69,41 @@ def axis_curve(log: JointLog, *, at_rest: bool) -> tuple[AxisCurve, str]:
     off_deg, error_deg = np.degrees([fitted.residual_rad, fitted.error_rad])
     return fitted.curve, (
         f"axis angle: smoothed, a knot every {fitted.knot_s:.3g} s; samples lie {off_deg:.2g} deg rms off the curve, "
-        f"the curve about {error_deg:.1g} deg rms off the truth"
+        f"the curve about {error_deg:.1g} deg rms off the truth{_rejected(fitted.rejected_ns, log)}"
     )
+
+
+def _rejected(rejected_ns: Times, log: JointLog) -> str:
+    """Name the samples that were rejected, by their times after the first one."""
+    if not rejected_ns.size:
+        return ""
+    seconds = [f"{(time_ns - log.time_ns[0]) / 1e9:.2f}" for time_ns in rejected_ns[:_LISTED].tolist()]
+    more = " ..." if rejected_ns.size > _LISTED else ""
+    return f"; rejected {rejected_ns.size} of {log.time_ns.size} angles, at {', '.join(seconds)}{more} s"
 
 
 def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float | None = None) -> SmoothAxis | str:
     """Fit a spline to the log, or say why straight lines between its samples are better.
+
+    If a few samples lie far off their neighbours, the spline is fitted without them.
 
     Args:
         log: at least 32 samples, or nothing can be averaged.
         longest_knot_s: no knots farther apart, whatever cross-validation says.
         per_knot: samples to a knot, where that has been chosen already; else cross-validation chooses.
     """
+    fitted = _smooth(log, longest_knot_s, per_knot)
+    if isinstance(fitted, SmoothAxis):
+        return fitted
+    wrong = outliers(log.position_rad)[0]
+    if not 0 < np.mean(wrong) <= _MOST_REJECTED:
+        return fitted
+    position_rad = np.unwrap(log.position_rad[~wrong])  # an outlier may have cost a turn
+    again = _smooth(JointLog(log.time_ns[~wrong], position_rad), longest_knot_s, per_knot)
+    return replace(again, rejected_ns=log.time_ns[wrong]) if isinstance(again, SmoothAxis) else fitted
+
+
+def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> SmoothAxis | str:
     count = log.time_ns.size
     if count < _LEAST:
         return f"{count} samples are too few to smooth"
@@ -110,6 +138,7 @@ def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float |
         step_rad=step_rad,
         residual_rad=rms,
         error_rad=_error(seconds, position, best, rms, per_step),
+        rejected_ns=np.empty(0, np.int64),
     )
 
 

@@ -26,7 +26,7 @@ COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring":
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
 _COLUMN_KINDS = {"f4", "f8", *(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
-_EVER_NS = 2**63
+_EVER_NS = 2**63  # an int64 ends there, in 2262
 _FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
 
@@ -156,9 +156,10 @@ def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
     names = rows.dtype.names or ()
     if not {*"xyz"} <= set(names):
         raise RecordingError(f"the columns are {' '.join(names)}; a cloud has x y z")
-    real = np.float32 if all(rows.dtype[axis].itemsize == 4 for axis in "xyz") else np.float64
+    real = np.float32 if all(rows.dtype[axis].str[1:] == "f4" for axis in "xyz") else np.float64
     points_m: NDArray[np.floating] = np.stack([rows[axis] for axis in "xyz"], axis=1).astype(real)
-    return with_header(Cloud(points_m, {name: np.array(rows[name]) for name in names if name not in "xyz"}), lines)
+    columns = {name: rows[name].astype(rows.dtype[name].newbyteorder("=")) for name in names if name not in "xyz"}
+    return with_header(Cloud(points_m, columns), lines)
 
 
 def headlines(cloud: Cloud) -> list[str]:

@@ -1,57 +1,96 @@
-"""Clouds in the formats that others read: one record, a format by its suffix, and a word on what it cannot hold."""
+"""The formats of clouds. One line here makes a format known to every command.
+
+An installed package adds one without a line here: an entry point of the group "scanwright.cloud_formats" that names a
+`CloudFormat`; its module has `read(path) -> (clouds, notes)` and, if it can write, `write(path, cloud) -> notes`.
+"""
 
 from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from scanwright.design.errors import RecordingError, require, suggest
 from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.foreign import of_file
+from scanwright.firmware_io.installed import with_installed
 
-_FORMATS = {  # suffix: module of this folder, and the packages of the extra `clouds` that it needs
-    ".ply": ("ply",),
-    ".pcd": ("pcd", "pypcd4"),
-    ".las": ("las", "laspy"),
-    ".laz": ("las", "laspy", "lazrs"),
-    ".e57": ("e57", "pye57"),
-    ".npz": ("npz",),
-    ".xyz": ("xyz",),
-}
-_SHAPED = {".pcd", ".e57", ".npz"}  # their own fields say what rows and columns are, or which rows are no points
-_POINTS_ONLY = {".las", ".laz"}
+GROUP = "scanwright.cloud_formats"
+_CLOUDS = "scanwright.firmware_io.clouds"
+
+
+@dataclass(frozen=True, slots=True)
+class CloudFormat:
+    """A format of clouds.
+
+    Attributes:
+        name: suffix of its files in lower case, without the dot.
+        module: dotted name of the module that reads and writes it; imported when it is used.
+        packages: top-level names of the packages that the module needs, of the extra `clouds`.
+        rows: fields if the format has fields for rows and columns, comments if it can keep them in comments, else none.
+        several: a file can hold several clouds; `write` takes a list of them.
+    """
+
+    name: str
+    module: str
+    packages: tuple[str, ...] = ()
+    rows: Literal["fields", "comments", "none"] = "none"
+    several: bool = False
+
+
+FORMATS = (
+    CloudFormat("ply", f"{_CLOUDS}.ply", rows="comments"),
+    CloudFormat("pcd", f"{_CLOUDS}.pcd", ("pypcd4",), rows="fields"),
+    CloudFormat("las", f"{_CLOUDS}.las", ("laspy",)),
+    CloudFormat("laz", f"{_CLOUDS}.las", ("laspy", "lazrs")),
+    CloudFormat("e57", f"{_CLOUDS}.e57", ("pye57",), rows="fields", several=True),
+    CloudFormat("npz", f"{_CLOUDS}.npz", rows="fields"),
+    CloudFormat("npy", f"{_CLOUDS}.npy"),
+    CloudFormat("ptx", f"{_CLOUDS}.ptx"),
+    *(CloudFormat(name, f"{_CLOUDS}.text", rows="comments") for name in ("xyz", "txt", "asc", "csv", "pts")),
+)
+
+
+@cache
+def all_formats() -> dict[str, CloudFormat]:
+    """Return the shipped formats and those of installed packages, by name.
+
+    Raises:
+        RecordingError: an installed package names something else, or a format that there is already.
+    """
+    return with_installed(GROUP, CloudFormat, FORMATS, RecordingError)
 
 
 def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
-    """All clouds of a file (E57 holds several, the others one), and lines about what was not read.
+    """Read all clouds of a file (E57 and PTX hold several, the others one), with notes about what was not read.
 
     Raises:
         InstallError: the format needs a package that is not installed.
-        RecordingError: the format is not known, or the file is not what its suffix says.
+        RecordingError: the format is unknown, or the content of the file is not what its suffix promises.
     """
     if path.is_dir():
-        raise RecordingError(f"{path}: this is a folder; name a cloud in it, a file")
+        raise RecordingError(f"{path}: is a folder; name a file of a cloud")
     if path.suffix in (".mcap", ".bag", ".db3"):
-        raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes the one of the other")
-    module = _format(path)
+        raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes a cloud of a recording")
+    module = _module(_format(path), path)
     with of_file(path):
         clouds: tuple[list[Cloud], list[str]] = module.read(path)
     return clouds
 
 
 def check_target(path: Path) -> None:
-    """Refuse what cannot be written, before the work that it is to hold.
+    """Refuse a file that cannot be written, before the work whose result it is to hold.
 
     Raises:
         InstallError: the format needs a package that is not installed.
-        RecordingError: the format is not known, or no file can be there.
+        RecordingError: the format is unknown or is only read, or no file can be there.
     """
-    _format(path)
+    _writer(path)
     check_place(path, RecordingError)
 
 
@@ -85,22 +124,21 @@ def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False
         InstallError: the format needs a package that is not installed.
         RecordingError: the format is not known or cannot hold this, or the file cannot be written.
     """
-    module = _format(path)
-    suffix = path.suffix.lower()
+    form, module = _format(path), _writer(path)
     if organised:
-        _check_organised(path, suffix, clouds)
+        _check_organised(path, form, clouds)
     notes: list[str] = []
     for number, cloud in enumerate(clouds):
         if not cloud.valid.any():
             raise RecordingError(f"{path}: none of the {len(cloud.points_m)} rows of cloud {number + 1} is a point")
-    formed = [cloud if cloud.organised and (organised or suffix in _SHAPED) else cloud.flat() for cloud in clouds]
+    formed = [cloud if cloud.organised and (organised or form.rows == "fields") else cloud.flat() for cloud in clouds]
     rows = sum(len(cloud.points_m) for cloud in formed)
     if lost := sum(len(cloud.points_m) for cloud in clouds) - rows:
-        notes.append(f"left out {lost:,} rows without a point")
-    if suffix not in _SHAPED and not organised and any(cloud.organised for cloud in clouds):
+        notes.append(f"dropped {lost:,} rows without a point")
+    if form.rows != "fields" and not organised and any(cloud.organised for cloud in clouds):
         shapes = ", ".join(f"{cloud.shape[0]} x {cloud.shape[1]}" for cloud in clouds if cloud.organised)
-        notes.append(f"the shape {shapes} is lost (pcd, e57 and npz keep it)")
-    if suffix == ".e57":
+        notes.append(f"the shape {shapes} is lost ({_listed('fields')} keep it)")
+    if form.several:
         return Written((path,), rows, (*notes, *module.write(path, formed)))
     paths = [path] if len(clouds) == 1 else [path.with_stem(f"{path.stem}_{k}") for k in range(1, len(clouds) + 1)]
     for one, cloud in zip(paths, formed, strict=True):
@@ -108,21 +146,37 @@ def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False
     return Written(tuple(paths), rows, tuple(dict.fromkeys(notes)))
 
 
-def _check_organised(path: Path, suffix: str, clouds: Sequence[Cloud]) -> None:
-    if suffix in _POINTS_ONLY:
-        raise RecordingError(f"{path}: LAS holds points, no rows and columns: organised clouds are ply pcd e57 npz xyz")
+def _check_organised(path: Path, form: CloudFormat, clouds: Sequence[Cloud]) -> None:
+    if form.rows == "none":
+        keep = f"{_listed('fields')}, {_listed('comments')}"
+        raise RecordingError(f"{path}: organised: {form.name} holds points, no rows and columns; {keep} keep them")
     if not all(cloud.organised for cloud in clouds):
-        raise RecordingError(f"{path}: organised: the cloud is flat, nobody knows its rows and columns")
+        raise RecordingError(f"{path}: organised: the cloud is flat, its rows and columns are unknown")
 
 
-def _format(path: Path) -> Any:
-    """The module of the format that the suffix names; loaded only once its packages are known to be there."""
-    suffix = path.suffix.lower()
-    if suffix not in _FORMATS:
-        raise RecordingError(f"{path}: '{suffix}' is no format of clouds{suggest(suffix, _FORMATS)}")
-    module, *packages = _FORMATS[suffix]
-    need = f"{path}: {suffix} needs {' and '.join(packages)}"
-    if suffix == ".e57" and platform.machine() == "aarch64":
-        need += ", which has no wheel for Linux on aarch64: take another format, or on another computer"
-    require("clouds", need, *packages)
-    return import_module(f"scanwright.firmware_io.clouds.{module}")
+def _listed(rows: str) -> str:
+    return ", ".join(form.name for form in all_formats().values() if form.rows == rows)
+
+
+def _format(path: Path) -> CloudFormat:
+    name = path.suffix.lower().removeprefix(".")
+    if name not in all_formats():
+        raise RecordingError(f"{path}: '{path.suffix}' is not a format of clouds{suggest(name, all_formats())}")
+    return all_formats()[name]
+
+
+def _module(form: CloudFormat, path: Path) -> Any:
+    """Import the module of a format, once its packages are known to be there."""
+    need = f"{path}: {form.name} needs {' and '.join(form.packages)}"
+    if "pye57" in form.packages and platform.machine() == "aarch64":
+        need += ", which has no wheel for Linux on aarch64: choose another format, or use another computer"
+    require("clouds", need, *form.packages)
+    return import_module(form.module)
+
+
+def _writer(path: Path) -> Any:
+    form = _format(path)
+    module = _module(form, path)
+    if not hasattr(module, "write"):
+        raise RecordingError(f"{path}: {form.name} is only read: write ply, or another format")
+    return module

@@ -6,6 +6,7 @@ software ignores: it sees the points where they belong, in the world.
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import laspy
@@ -19,8 +20,10 @@ from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, with_header
 from scanwright.firmware_io.foreign import foreign
 
+_HEADER = struct.Struct("<94xHII")  # size of the header, byte of the first point, number of records before it
+_RECORD_BYTES = 54  # of the head of each
 _STEPS_M = (1e-4, 1e-3, 1e-2)
-_MOST_STEPS = 2**31 - 1
+_MOST_STEPS = 2**31 - 1  # LAS stores coordinates as int32
 _PACKED = 1000  # times smaller than its points LAZ never gets
 _OURS = "scanwright"
 _EXACT = "intensity_exact"
@@ -40,7 +43,12 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         for line in vlr.record_data_bytes().decode("utf-8", "replace").splitlines()
     ]
     extra = list(las.point_format.extra_dimension_names)
-    columns: dict[str, Column] = {name: np.array(las[name]) for name in extra if name != _EXACT}
+    columns: dict[str, Column] = {}
+    for name in extra:
+        values = np.array(las[name]).reshape(len(las.points), -1)
+        names = [name] if values.shape[1] == 1 else [f"{name}_{k}" for k in range(values.shape[1])]
+        columns |= dict(zip(names, np.ascontiguousarray(values.T), strict=True))
+    columns.pop(_EXACT, None)
     intensity = np.array(las[_EXACT] if _EXACT in extra else las.intensity)
     if _EXACT in extra or intensity.any():
         columns["intensity"] = intensity.astype(COLUMN_TYPES["intensity"])
@@ -97,7 +105,8 @@ def write(path: Path, cloud: Cloud) -> list[str]:
 
 
 def _check_header(path: Path) -> None:
-    """Refuse a header that promises what the file has no room for, or no coordinates."""
+    """Refuse a header that announces what the file has no room for, or no coordinates."""
+    _check_records(path)
     with foreign(f"{path}: not a LAS file", laspy.open, path) as reader:
         header = reader.header
         room = path.stat().st_size * (_PACKED if header.are_points_compressed else 1)
@@ -110,6 +119,20 @@ def _check_header(path: Path) -> None:
             raise RecordingError(f"{path}: scales {header.scales}, offsets {header.offsets}: finite, scales above 0")
         if header.are_points_compressed:
             _check_chunks(path, header.offset_to_point_data, header.point_count)
+
+
+def _check_records(path: Path) -> None:
+    """Refuse more variable length records than fit between header and points: laspy would read for minutes."""
+    size = path.stat().st_size if path.is_file() else 0
+    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
+        head = stream.read(_HEADER.size)
+    if len(head) < _HEADER.size or head[:4] != b"LASF":
+        raise RecordingError(f"{path}: not a LAS file")
+    header_size, points, records = _HEADER.unpack(head)
+    if not header_size + _RECORD_BYTES * records <= points <= size:
+        raise RecordingError(
+            f"{path}: byte 96: {records:,} records announced before the points at byte {points:,} of {size:,}"
+        )
 
 
 def _check_chunks(path: Path, at: int, points: int) -> None:

@@ -1,4 +1,8 @@
-"""PCD of the Point Cloud Library: holds everything, the start of the times as a comment."""
+"""PCD 0.5 to 0.7 of the Point Cloud Library: holds everything, the start of the times as a comment.
+
+Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Read by ourselves, since the usual library
+fails on older versions and on padding.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import lzf
 import numpy as np
 from numpy.lib import recfunctions
 from numpy.typing import NDArray
@@ -15,74 +20,181 @@ from pypcd4.pypcd4 import Encoding, PointCloud
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
-from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines, pose_matrix, pose_numbers
-from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.clouds.cloud import (
+    Cloud,
+    as_type,
+    cloud_from_rows,
+    cloud_rows,
+    headlines,
+    pose_matrix,
+    pose_numbers,
+)
+from scanwright.firmware_io.clouds.text import read_numbers
+from scanwright.firmware_io.foreign import foreign, of_file
 
-_LONGEST_HEADER = 1 << 16
-_DIGITS = 16
+_LONGEST_HEADER = 1 << 16  # bytes: hundreds of fields
+_DIGITS = 16  # of a count: more than any file has points
 _MOST_PACKED = 100  # times smaller LZF never gets: 264 bytes in 3
+_KINDS = {"<f4", "<f8", *(f"<{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
 _AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
-    """The cloud of a file, whether ascii, binary or binary_compressed."""
+    """Read the cloud of a file, whether ascii, binary or binary_compressed; padding (fields named `_`) is skipped."""
     data = foreign(f"{path}: cannot read", path.read_bytes)
     header = _header(path, data)
-    pcd = foreign(f"{path}: not a PCD file", PointCloud.from_fileobj, io.BufferedReader(io.BytesIO(data)))
-    rows = pcd.pc_data
-    if rows.shape != (header.shape[0] * header.shape[1],):
-        raise RecordingError(
-            f"{path}: {rows.size} rows, HEIGHT x WIDTH {header.shape[0]} x {header.shape[1]} announced"
-        )
-    cloud = cloud_from_rows(_unpacked(rows), header.comments)
+    fields = [field for field in header.fields if not field.padding]
+    if header.encoding == "ascii":
+        rows = _from_text(path, data, header)
+    else:
+        body = data[header.start :]
+        if header.encoding == "binary_compressed":
+            body = _unpacked_bytes(path, body)
+        rows = _from_bytes(path, body, header)
+    named = np.empty(header.rows, [(name, kind) for field in fields for name, kind in field.columns()])
+    for field in fields:
+        for k, (name, _) in enumerate(field.columns()):
+            named[name] = rows[field.key].reshape(header.rows, -1)[:, k]
+    cloud = cloud_from_rows(_unpacked(named), header.comments)
     return [Cloud(cloud.points_m, cloud.columns, header.shape, header.T_world_cloud, cloud.start_ns)], []
+
+
+@dataclass(frozen=True, slots=True)
+class PcdField:
+    """A field of a header: `count` numbers of one type, `key` unlike that of any other field."""
+
+    name: str
+    key: str
+    kind: str
+    count: int
+
+    @property
+    def padding(self) -> bool:
+        """Whether it only fills up the row."""
+        return self.name == "_"
+
+    def columns(self) -> list[tuple[str, str]]:
+        """Return names and types of its columns: `fpfh_0`, `fpfh_1` and so on of several numbers."""
+        names = [self.name] if self.count == 1 else [f"{self.name}_{k}" for k in range(self.count)]
+        return [(name, self.kind) for name in names]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PcdHeader:
-    """What the header of a cloud says, checked against the file.
+    """The header of a cloud, checked against the file.
 
     Attributes:
+        fields: of a row, padding included.
         shape: HEIGHT and WIDTH.
+        encoding: ascii, binary or binary_compressed.
+        start: byte after the header.
         T_world_cloud: VIEWPOINT.
         comments: lines that begin with #.
     """
 
+    fields: tuple[PcdField, ...]
     shape: tuple[int, int]
+    encoding: str
+    start: int
     T_world_cloud: Pose
     comments: tuple[str, ...]
 
+    @property
+    def rows(self) -> int:
+        """Number of points."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def layout(self) -> np.dtype[np.void]:
+        """Type of a row."""
+        return np.dtype([(field.key, field.kind, (field.count,)) for field in self.fields])
+
 
 def _header(path: Path, data: bytes) -> PcdHeader:
-    """Refuse a header that is none, or that promises more rows than the file has bytes for."""
-    end = re.search(rb"^DATA (ascii|binary|binary_compressed)\r?\n", data[:_LONGEST_HEADER], re.MULTILINE)
+    """Read the header; refuse one that announces more rows than the file has bytes for."""
+    end = re.search(rb"^DATA[ \t]+(ascii|binary_compressed|binary)[ \t]*\r?\n", data[:_LONGEST_HEADER], re.MULTILINE)
     if end is None:
         raise RecordingError(f"{path}: not a PCD file: no line DATA ascii, binary or binary_compressed")
     lines = data[: end.start()].decode("ascii", "replace").splitlines()
     entries = {words[0]: words[1:] for line in lines if (words := line.split()) and not line.startswith("#")}
-    fields = entries.get("FIELDS", [])
-    if len(set(fields)) != len(fields) or not {*"xyz"} <= set(fields):
-        raise RecordingError(f"{path}: the fields are {' '.join(fields)[:200]}; a cloud has x y z, each field once")
-    counts = entries.setdefault("COUNT", ["1"] * len(fields))
+    names = entries.get("FIELDS", entries.get("COLUMNS", []))  # COLUMNS: version 0.5
+    names = [name.lower() if name in ("X", "Y", "Z") else name for name in names]  # PDAL
+    entries.setdefault("COUNT", ["1"] * len(names))
     for key in ("SIZE", "TYPE", "COUNT"):
-        if len(entries.get(key, [])) != len(fields):
+        if len(entries.get(key, [])) != len(names):
+            entry = " ".join(entries.get(key, []))[:80]
+            raise RecordingError(f"{path}: {key} {entry}: must be one for each of {len(names)} fields")
+    fields = []
+    for k, name in enumerate(names):
+        kind = f"<{entries['TYPE'][k].lower()}{entries['SIZE'][k]}"
+        if kind not in _KINDS:
             raise RecordingError(
-                f"{path}: {key} {' '.join(entries.get(key, []))[:80]}: one for each of {len(fields)} fields"
+                f"{path}: field {name}: TYPE {entries['TYPE'][k]} of SIZE {entries['SIZE'][k]}: unknown"
             )
-    size = sum(_integer(path, entries, "SIZE", k) * _integer(path, entries, "COUNT", k) for k in range(len(fields)))
-    rows, height, width = (_integer(path, entries, key, 0) for key in ("POINTS", "HEIGHT", "WIDTH"))
-    room = (len(data) - end.end()) * (_MOST_PACKED if end[1] == b"binary_compressed" else 1)
-    if not 0 < rows == height * width or rows * (2 * sum(map(int, counts)) if end[1] == b"ascii" else size) > room + 1:
-        raise RecordingError(
-            f"{path}: POINTS {rows}, HEIGHT {height}, WIDTH {width} of {size} bytes each announced, "
-            f"{len(data) - end.end()} bytes there"
-        )
+        fields.append(PcdField(name, f"{k}", kind, _integer(path, entries, "COUNT", k)))
+    used = [field.name for field in fields if not field.padding]
+    if len(set(used)) != len(used) or not {*"xyz"} <= set(used):
+        raise RecordingError(f"{path}: the fields are {' '.join(used)[:200]}; a cloud has x y z, each field once")
+    if "WIDTH" in entries:
+        width = _integer(path, entries, "WIDTH", 0)
+        height = _integer(path, entries, "HEIGHT", 0) if "HEIGHT" in entries else 1
+    else:
+        width, height = _integer(path, entries, "POINTS", 0), 1
+    rows = _integer(path, entries, "POINTS", 0) if "POINTS" in entries else height * width
     viewpoint = foreign(f"{path}: VIEWPOINT", lambda: [float(word) for word in entries.get("VIEWPOINT", _AT_ORIGIN)])
     if len(viewpoint) != 7:
         raise RecordingError(f"{path}: VIEWPOINT of {len(viewpoint)} numbers: x y z qw qx qy qz")
-    x, y, z, w, i, j, k = viewpoint
+    x, y, z, w, *axis = viewpoint
     comments = tuple(line[1:].strip() for line in lines if line.startswith("#"))
-    return PcdHeader((height, width), pose_matrix([x, y, z, i, j, k, w]), comments)
+    T = pose_matrix([x, y, z, *axis, w])
+    header = PcdHeader(tuple(fields), (height, width), end[1].decode(), end.end(), T, comments)
+    least = 2 * sum(field.count for field in fields) if header.encoding == "ascii" else header.layout.itemsize
+    room = (len(data) - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)
+    if not 0 < rows == header.rows or rows * least > room + 1:
+        raise RecordingError(
+            f"{path}: POINTS {rows}, HEIGHT {height}, WIDTH {width} of {header.layout.itemsize} bytes each announced, "
+            f"{len(data) - header.start} bytes there"
+        )
+    return header
+
+
+def _from_text(path: Path, data: bytes, header: PcdHeader) -> NDArray[np.void]:
+    lines = data[header.start :].decode("ascii", "replace").splitlines()
+    values = read_numbers(path, lines, data.count(b"\n", 0, header.start) + 1)
+    if values.shape != (header.rows, sum(field.count for field in header.fields)):
+        raise RecordingError(f"{path}: {values.shape[0]} rows of {values.shape[1]} numbers, {header.rows} announced")
+    rows, begin = np.empty(header.rows, header.layout), 0
+    for field in header.fields:
+        part = values[:, begin : begin + field.count]
+        if not field.padding:
+            with of_file(path):
+                rows[field.key] = as_type(part.ravel(), field.kind).reshape(part.shape)
+        begin += field.count
+    return rows
+
+
+def _from_bytes(path: Path, body: bytes, header: PcdHeader) -> NDArray[np.void]:
+    if header.encoding == "binary":
+        return np.frombuffer(body, header.layout, header.rows)
+    if len(body) < header.rows * header.layout.itemsize:
+        raise RecordingError(f"{path}: {len(body)} bytes unpacked, {header.rows} rows announced")
+    rows, begin = np.empty(header.rows, header.layout), 0
+    for field in header.fields:  # field by field
+        values = np.frombuffer(body, field.kind, header.rows * field.count, begin)
+        rows[field.key] = values.reshape(header.rows, field.count)
+        begin += values.nbytes
+    return rows
+
+
+def _unpacked_bytes(path: Path, body: bytes) -> bytes:
+    """Undo LZF: the bytes begin with their packed and their unpacked size, of four bytes each."""
+    packed, size = int.from_bytes(body[:4], "little"), int.from_bytes(body[4:8], "little")
+    if packed > len(body) - 8 or size > _MOST_PACKED * packed:
+        raise RecordingError(f"{path}: {packed:,} packed bytes announced, {max(len(body) - 8, 0):,} there")
+    unpacked = foreign(f"{path}: damaged", lzf.decompress, body[8 : 8 + packed], size)
+    if unpacked is None:
+        raise RecordingError(f"{path}: damaged: not {size:,} bytes of LZF")
+    return unpacked
 
 
 def _integer(path: Path, entries: dict[str, list[str]], key: str, place: int) -> int:

@@ -1,4 +1,4 @@
-"""PLY, binary little endian: one `vertex` element of scalar columns; shape, pose and start of a cloud as comments.
+"""PLY: written binary little endian, shape, pose and start of a cloud as comments; read in every form.
 
 Format: G. Turk, "The PLY polygon file format" (1994). Written by ourselves, because the usual library is GPL. It holds
 everything but integers of 64 bits.
@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from types import TracebackType
 
@@ -20,22 +21,24 @@ from numpy.typing import NDArray
 
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write, check_place
-from scanwright.firmware_io.clouds.cloud import Cloud, cloud_from_rows, cloud_rows, headlines
-from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
+from scanwright.firmware_io.clouds.text import read_numbers
+from scanwright.firmware_io.foreign import foreign, of_file
 
 _WORDS = {
-    "|i1": "char",
-    "|u1": "uchar",
-    "<i2": "short",
-    "<u2": "ushort",
-    "<i4": "int",
-    "<u4": "uint",
-    "<f4": "float",
-    "<f8": "double",
+    "i1": "char",
+    "u1": "uchar",
+    "i2": "short",
+    "u2": "ushort",
+    "i4": "int",
+    "u4": "uint",
+    "f4": "float",
+    "f8": "double",
 }
-_TYPES = {word: code for code, word in _WORDS.items()}
-_DIGITS = 20
-_LONGEST_HEADER = 1 << 20
+_SIZED = {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
+_TYPES = {word: code for code, word in _WORDS.items()} | _SIZED | {"float32": "f4", "float64": "f8"}
+_DIGITS = 20  # of a count: an int64 has 19
+_LONGEST_HEADER = 1 << 20  # bytes: thousands of comments
 
 
 class PlyWriter:
@@ -89,7 +92,7 @@ class PlyWriter:
     def _header(self) -> bytes:
         # A last comment gives back what the number takes, so that the header's length never changes.
         filler = "-" * (_DIGITS - len(str(self.rows)))
-        columns = [f"property {_WORDS[self._fields[name].str]} {name}" for name in self._fields.names or ()]
+        columns = [f"property {_WORDS[self._fields[name].str[1:]]} {name}" for name in self._fields.names or ()]
         lines = [
             "ply",
             "format binary_little_endian 1.0",
@@ -120,86 +123,166 @@ def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterab
 
 
 @dataclass(frozen=True, slots=True)
+class PlyElement:
+    """One element of a header: name, number of rows, and type of each property; of a list those of length and item."""
+
+    name: str
+    rows: int
+    properties: dict[str, str | tuple[str, str]]
+
+    @property
+    def lists(self) -> bool:
+        """Whether a property is a list, so that rows differ in length."""
+        return any(isinstance(kind, tuple) for kind in self.properties.values())
+
+    def fields(self, order: str) -> np.dtype[np.void]:
+        """Return the type of a row without lists in a byte order, `<` or `>`."""
+        return np.dtype([(name, order + str(kind)) for name, kind in self.properties.items()])
+
+
+@dataclass(frozen=True, slots=True)
 class PlyHeader:
-    """What the header of a cloud says, checked against the file.
+    """The header of a PLY file.
 
     Attributes:
-        fields: of a row; x y z among them, all floats.
-        rows: at least 1, and all there.
+        form: ascii, binary_little_endian or binary_big_endian.
+        elements: in the order of the file; one is `vertex`, with x y z.
         comments: without the filler.
-        start: where the rows begin.
+        start: byte after the header.
+        lines: of the header.
     """
 
-    fields: np.dtype[np.void]
-    rows: int
+    form: str
+    elements: tuple[PlyElement, ...]
     comments: tuple[str, ...]
     start: int
+    lines: int
+
+    @property
+    def vertex(self) -> PlyElement:
+        """The points."""
+        return next(element for element in self.elements if element.name == "vertex")
 
     @property
     def width(self) -> int:
         """Rows of a scan of an organised cloud, 0 of a flat one."""
         sizes = dict(words for line in self.comments if len(words := line.split()) == 2 and words[1].isdigit())
         width, height = int(sizes.get("width", 0)), int(sizes.get("height", 0))
-        return width if height > 1 and width * height == self.rows else 0
+        return width if height > 1 and width * height == self.vertex.rows else 0
 
 
 def read_header(path: Path) -> PlyHeader:
-    """The header of a cloud such as `PlyWriter` writes.
+    """Read the header of any PLY file with a cloud.
 
     Raises:
-        RecordingError: the file is missing, cut off, or another kind of PLY.
+        RecordingError: the file is missing, is no PLY, or has no element `vertex` of x y z; a line is named.
     """
     with foreign(f"{path}: cannot read", path.open, "rb") as stream:
         text = foreign(f"{path}: cannot read", stream.read, _LONGEST_HEADER)
-    end = re.search(rb"^end_header\r?\n", text, re.MULTILINE)
+    end = re.search(rb"^end_header[ \t]*(\r\n|\n|\r)", text, re.MULTILINE) or re.search(rb"\rend_header(\r)", text)
     lines = text[: end.start() if end else len(text)].decode("ascii", "replace").splitlines()
     if not lines or lines[0].strip() != "ply":
         raise RecordingError(f"{path}: not a PLY file")
-    fields: list[tuple[str, str]] = []
-    rows = -1
-    for line in lines[1:]:
+    form, elements = "", list[PlyElement]()
+    for number, line in enumerate(lines[1:], 2):
         match line.split():
-            case ["format", kind, *_] if kind != "binary_little_endian":
-                raise RecordingError(f"{path}: PLY format {kind}; only binary_little_endian is read")
-            case ["element", "vertex", number] if rows < 0 and number.isdecimal() and len(number) <= _DIGITS:
-                rows = int(number)
-            case ["property", word, name] if word in _TYPES and rows >= 0:
-                fields.append((name, _TYPES[word]))
-            case ["format" | "comment" | "obj_info", *_]:
+            case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as form, *_]:
+                pass
+            case ["element", name, count] if count.isdecimal() and len(count) <= _DIGITS:
+                elements.append(PlyElement(name, int(count), {}))
+            case ["property", kind, name] if kind in _TYPES and elements and name not in elements[-1].properties:
+                elements[-1].properties[name.lower() if name in ("X", "Y", "Z") else name] = _TYPES[kind]
+            case ["property", "list", length, kind, name] if {length, kind} <= set(_TYPES) and elements:
+                elements[-1].properties[name] = _TYPES[length], _TYPES[kind]
+            case [] | ["comment" | "obj_info", *_]:
                 pass
             case _:
-                raise RecordingError(f"{path}: not a cloud of scalar columns: '{line.strip()[:80]}' in the header")
-    if not end:
-        raise RecordingError(f"{path}: no 'end_header' in the first {len(text):,} bytes")
-    names = [name for name, _ in fields]
-    if twice := [name for k, name in enumerate(names) if name in names[:k]]:
-        raise RecordingError(f"{path}: property {twice[0]} stands twice in the header")
-    kinds = dict(fields)
-    if not all(kinds.get(axis, "") in ("<f4", "<f8") for axis in "xyz"):
-        raise RecordingError(f"{path}: the columns are {' '.join(names)[:200]}; a cloud has x y z, float or double")
-    layout = np.dtype(fields)
-    start, size = end.end(), path.stat().st_size
-    if rows < 1 or size < start + rows * layout.itemsize:
-        raise RecordingError(
-            f"{path}: {max(rows, 0)} rows of {layout.itemsize} bytes announced, {size - start} bytes there"
-        )
-    comments = [line.removeprefix("comment ") for line in lines if line.startswith("comment ")]
-    return PlyHeader(layout, rows, tuple(comment for comment in comments if comment.strip("-")), start)
+                raise RecordingError(
+                    f"{path}: line {number}: '{line.strip()[:80]}': unknown type, or a name given twice"
+                )
+    if not end or not form:
+        raise RecordingError(f"{path}: no '{'format' if end else 'end_header'}' in the first {len(text):,} bytes")
+    comments = [line.strip().removeprefix("comment ") for line in lines if line.startswith("comment ")]
+    shown = tuple(comment for comment in comments if comment.strip("-"))
+    header = PlyHeader(form, tuple(elements), shown, end.end(), len(lines) + 1)
+    if not any(element.name == "vertex" for element in elements):
+        raise RecordingError(f"{path}: no element vertex: {', '.join(element.name for element in elements)[:200]}")
+    if header.vertex.lists or not {*"xyz"} <= set(header.vertex.properties):
+        names = " ".join(header.vertex.properties)[:200]
+        raise RecordingError(f"{path}: the properties of vertex are {names}; a cloud has x y z and no lists")
+    return header
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
-    """Rows of a cloud such as `PlyWriter` writes, shape (n,), read only and mapped: columns are loaded when touched.
+    """Read the rows of a cloud, shape (n,); binary ones are mapped: columns are loaded when touched.
 
     Raises:
-        RecordingError: as for `read_header`.
+        RecordingError: as for `read_header`; or the file is cut off, or a line of text is not numbers.
     """
     header = read_header(path)
-    return np.memmap(path, header.fields, "r", header.start, (header.rows,))
+    vertex, before = header.vertex, header.elements[: header.elements.index(header.vertex)]
+    if not vertex.rows:
+        raise RecordingError(f"{path}: element vertex has 0 rows")
+    if header.form == "ascii":
+        return _read_lines(path, header, sum(element.rows for element in before))
+    order = "<" if header.form == "binary_little_endian" else ">"
+    fields = vertex.fields(order)
+    start, size = header.start, path.stat().st_size
+    for element in before:
+        start = _end_of(path, element, start, order)
+    if size < start + vertex.rows * fields.itemsize:
+        raise RecordingError(
+            f"{path}: {vertex.rows} rows of {fields.itemsize} bytes announced, {size - start} bytes there"
+        )
+    return np.memmap(path, fields, "r", start, (vertex.rows,))
+
+
+def _end_of(path: Path, element: PlyElement, start: int, order: str) -> int:
+    """Return the byte after an element of a binary file that begins at `start`."""
+    if not element.lists:
+        return start + element.rows * element.fields(order).itemsize
+    with path.open("rb") as stream:
+        stream.seek(start)
+        for row in range(element.rows):
+            for kind in element.properties.values():
+                if isinstance(kind, str):
+                    stream.seek(np.dtype(kind).itemsize, 1)
+                    continue
+                data = stream.read(np.dtype(kind[0]).itemsize)
+                if not data:
+                    raise RecordingError(f"{path}: cut off in row {row} of {element.name}")
+                stream.seek(int(np.frombuffer(data, order + kind[0])[0]) * np.dtype(kind[1]).itemsize, 1)
+        return stream.tell()
+
+
+def _read_lines(path: Path, header: PlyHeader, skipped: int) -> NDArray[np.void]:
+    """Read the rows of a text file, each as its header types it."""
+    fields, first = header.vertex.fields("<"), header.lines + skipped
+    with path.open(encoding="ascii", errors="replace") as stream:
+        lines = islice(stream, first, first + header.vertex.rows)
+        values = read_numbers(path, lines, first + 1)
+    if values.shape != (header.vertex.rows, len(header.vertex.properties)):
+        raise RecordingError(
+            f"{path}: {header.vertex.rows} rows of {len(header.vertex.properties)} numbers announced, "
+            f"{values.shape[0]} of {values.shape[1]} there"
+        )
+    rows = np.empty(header.vertex.rows, fields)
+    for k, name in enumerate(header.vertex.properties):
+        with of_file(path):
+            rows[name] = as_type(values[:, k], fields[name])
+    return rows
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
-    """The cloud of a file."""
-    return [cloud_from_rows(read_ply(path), read_header(path).comments)], []
+    """Read the cloud of a file; other elements than `vertex` are skipped and named."""
+    header = read_header(path)
+    skipped = [
+        f"{element.rows:,} of {element.name}"
+        for element in header.elements
+        if element.rows and element.name != "vertex"
+    ]
+    notes = [f"dropped of {path}: {', '.join(skipped)}"] if skipped else []
+    return [cloud_from_rows(read_ply(path), header.comments)], notes
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

@@ -17,8 +17,8 @@ from scanwright.firmware_io.lidar.scip import measurement, protocol
 Look = Callable[[Times], tuple[Floats, Floats]]
 
 _SCAN = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?")
-_BOOT_NS = 1_000_000_000
-_NEVER_NS = 1 << 62
+_BOOT_NS = 1_000_000_000  # [assumed]
+_NEVER_NS = 1 << 62  # 146 years
 
 
 @dataclass(slots=True)

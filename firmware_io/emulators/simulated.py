@@ -18,7 +18,7 @@ from scanwright.firmware_io.emulators.world import measure_ranges, range_model, 
 from scanwright.firmware_io.recording.arrays import RecordingArrays
 from scanwright.firmware_io.samples import JointLog
 
-JOINT_HZ = 200.0
+JOINT_HZ = 200.0  # twice as often as a scan reads the servo
 
 
 def simulated_recording(

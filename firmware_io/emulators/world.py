@@ -22,9 +22,10 @@ from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import TaskError
 from scanwright.design.scene.ray_caster import Hits, Scene, build_scene, cast, load_scene
 
-_MOST_NOISE_MM = 1e5
-_WANDER = 0.01
-_WANDER_S = 1.7
+_MOST_NOISE_MM = 1e5  # more is a wrong unit
+_WANDER = 0.01  # of the speed [assumed]
+SPIN_UP_S = 0.5  # time constant of a motor [assumed]: after 1.5 s it has 95 % of its speed
+_WANDER_S = 1.7  # period of it [assumed]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +137,15 @@ def turned_deg(rate_hz: float, since_s: Floats) -> tuple[Floats, Floats]:
     usual_deg_s, phase = 360 * rate_hz, 2 * np.pi * since_s / _WANDER_S
     wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
     return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
+
+
+def spun_up(since_s: Floats) -> tuple[Floats, Floats]:
+    """Time [s] at full speed in which a motor turns as far as since its start from rest, and its share of that speed.
+
+    It nears its speed exponentially.
+    """
+    share = -np.expm1(-since_s / SPIN_UP_S)
+    return since_s - SPIN_UP_S * share, share
 
 
 def furnished_room() -> Float64[ndarray, "triangles 3 3"]:

@@ -13,7 +13,7 @@ from collections import deque
 from scanwright.firmware_io.lidar.tick_line import half_hull, middle_slope
 
 _BUCKET_NS = 200_000_000  # of which the earliest arrival is kept
-_BUCKETS = 300
+_BUCKETS = 300  # a minute of them: longer averages better, shorter follows a warming quartz
 _FEWEST = 3  # buckets that tell a rate
 _NEAR = 320  # arrivals among which the earliest must touch the line
 _BEHIND_NS = 50_000_000  # longer than a busy computer delays all arrivals of two buckets, shorter than a lidar's turn

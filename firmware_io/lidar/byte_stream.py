@@ -13,7 +13,7 @@ from typing import Protocol
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.serial_port import open_serial_port
 
-FIRST_BAUD = 115_200
+FIRST_BAUD = 115_200  # until a driver sets its own
 
 
 class Stream(Protocol):

@@ -28,7 +28,7 @@ from scanwright.firmware_io.lidar.tick_line import StampLine, half_hull, middle_
 STAMP_WRAP_MS = 1 << 24  # SCIP 2.0, p. 12
 
 _RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
-_RATE_USUAL = 5e-5
+_RATE_USUAL = 5e-5  # [assumed] of two quartzes
 _BUCKETS = 100  # seconds that the line looks back: longer averages better, shorter follows a warming quartz
 _NEAR = 320  # arrivals among which the earliest must touch the line
 _CHANCE = 2.0  # times the earliness that is usual among so many arrivals

@@ -1,4 +1,4 @@
-"""The line to one sensor as every driver has it: what comes until something is whole, what is left when it ends.
+"""The line to one sensor, and the life cycle of its driver.
 
 Arrival times of bytes are right only if the bytes are read when they arrive. A reader that was held up (a stopped
 process, a busy computer) finds bytes that waited in the buffers of kernel and adapter, and others are missing.
@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import math
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
+from types import TracebackType
+from typing import Self, TypeVar
 
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
 
-_POLL_S = 0.05
+_POLL_S = 0.05  # between two tries to connect
 _LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
 _SETTLE_S = 0.03  # adapters and sensors that had to wait send the rest of their own buffers within this
 _READS = 10_000  # without finding the port empty
@@ -120,25 +122,6 @@ class SensorLine:
         self._open(address or self.address)
         self.address = address or self.address
 
-    def leave(self, stop: Callable[[], None], error: BaseException | None) -> None:
-        """End a `with`: stop the sensor, and close the line whatever happens; an error of the body stays in front.
-
-        Args:
-            stop: the driver's.
-            error: what ended the body, None where nothing did.
-
-        Raises:
-            UnsafeError: it could not be stopped, and its laser may still be on.
-        """
-        try:
-            stop()
-        except DeviceError as unsafe:
-            if error is None:
-                raise UnsafeError(f"{unsafe}: its laser may still be on") from unsafe
-            error.add_note(UnsafeNote(f"its laser may still be on: {unsafe}"))
-        finally:
-            self.close()
-
     def _open(self, address: str) -> None:
         self.stream = open_stream(address)
         self._read_ns = time.monotonic_ns()  # when the last read returned
@@ -167,6 +150,31 @@ class SensorLine:
         # A port that we closed after it vanished is None to pyserial, and -1 to select.
         except (OSError, TypeError, ValueError) as error:
             raise DeviceError(f"{self.name}: connection lost ({error}); plug it in again") from error
+
+
+class LineDriver(ABC):
+    """A sensor on a line; the end of a `with` stops it, and closes the line whatever happens."""
+
+    _line: SensorLine
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stop the sensor."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.stop()
+        except DeviceError as unsafe:
+            if error is None:
+                raise UnsafeError(f"{unsafe}: its laser may still be on") from unsafe
+            error.add_note(UnsafeNote(f"its laser may still be on: {unsafe}"))
+        finally:
+            self._line.close()
 
 
 def until_back(name: str, timeout_s: float, connect: Callable[[], None]) -> None:

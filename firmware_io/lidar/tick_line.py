@@ -21,7 +21,7 @@ import numpy as np
 Point = tuple[float, float]
 
 _BLOCK_MS = 1e3  # what is forgotten at once
-_BLOCKS = 100
+_BLOCKS = 100  # 100 s: a beat of turns and ticks takes up to a minute
 _FEWEST = 3  # blocks
 _SLACK_MS = 0.02  # by which a motor may be uneven from turn to turn
 

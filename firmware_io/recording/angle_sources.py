@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -22,10 +22,8 @@ from scanwright.design.errors import RecordingError, suggest
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
-from scanwright.firmware_io.recording.bags import Source, number_at
+from scanwright.firmware_io.recording.bags import Source, numbers_at
 from scanwright.firmware_io.samples import JointLog
-
-AngleUnit = Literal["deg", "rad"]
 
 TF = "tf2_msgs/msg/TFMessage"
 SECONDS, NANOSECONDS = ("time_s", "time", "t"), ("time_ns",)
@@ -34,10 +32,11 @@ ACROSS_RAD = math.radians(0.5)  # what an axis may wander: more is no turning ab
 MOST_ANGLE, MOST_NS = 1e9, 2**63 - 1  # years of turns; what an int64 holds
 STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
 WRAP, WRAP_LEAST, WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
-FASTEST_RPM = 120.0
-SWEEP_RAD = 4 * math.pi
+FEWEST_COUNTS = 512  # of an encoder turn: of fewer, degrees are as likely
+FASTEST_RPM = 120.0  # the fastest servo of the catalogue turns at 103 rpm without a load
+SWEEP_RAD = 4 * math.pi  # two turns: cables of a sweeping axis allow less
 BACK_RAD = 1.0  # farther than an axis that turns on for ever swings
-LEAST_RAD = math.radians(7.0)
+LEAST_RAD = math.radians(7.0)  # about 2 pi deg: a turn in rad that is taken for deg
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +69,8 @@ def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[
         RecordingError: the message holds no such thing.
     """
     if isinstance(source, Source):
-        number, stamp_ns = number_at(body, source, bag)
-        return [((number,), stamp_ns)]
+        numbers, stamp_ns = numbers_at(body, source, bag)
+        return [(numbers, stamp_ns)] if numbers else []
     if getattr(body, "__msgtype__", "") != TF:
         raise RecordingError(f"{bag}: {source}: {source.topic} holds no transforms; write TOPIC or TOPIC:FIELD")
     values: list[tuple[tuple[float, ...], int]] = []
@@ -82,7 +81,7 @@ def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[
     return values
 
 
-def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource) -> tuple[Floats, str]:
+def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source) -> tuple[Floats, str]:
     """How far a frame has turned about the one axis that it turns about, shape (n,), and what a person must know.
 
     Counted from where the frames agree, where they ever do, else from the first one.
@@ -111,7 +110,7 @@ def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource) -> tuple
     if np.linalg.norm(first[:3] - (first[:3] @ axis) * axis) < math.sin(ACROSS_RAD / 2):
         return angle + 2 * np.arctan2(first[:3] @ axis, first[3]), ""
     named = ", ".join(f"{part:z.3f}" for part in axis)
-    return angle, f"{source}: angles count from the first one, about the axis ({named}) of {source.child}"
+    return angle, f"{source}: angles count from the first one, about its axis ({named})"
 
 
 def read_table(text: str) -> tuple[Times, Floats]:
@@ -147,7 +146,7 @@ def read_table(text: str) -> tuple[Times, Floats]:
     return np.array(time_ns, np.int64), np.array(values, float)
 
 
-def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleUnit) -> Iterator[str]:
+def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[str]:
     """What speaks for the other unit: where angles wrap, how fast the axis would turn, how far; whole numbers.
 
     Args:
@@ -156,6 +155,12 @@ def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleU
         log: the same, unwrapped.
         angle_unit: that they are said to have.
     """
+    counts = _counts_of_turn(angle)
+    if counts and angle_unit in ("deg", "rad"):
+        yield f"angles are integers from 0 to nearly {counts}: is the unit {counts}/turn?"
+        return
+    if angle_unit not in ("deg", "rad"):
+        return
     yield from _unlikely_motion(time_ns, angle, log, angle_unit)
     if np.any(angle != np.round(angle)):
         return
@@ -168,7 +173,15 @@ def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleU
         )
 
 
-def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: AngleUnit) -> Iterator[str]:
+def _counts_of_turn(angle: Floats) -> int:
+    """Return the counts of an encoder turn if angles are integers that fill 0 to a power of two; 0 else."""
+    if angle.min() < 0 or np.any(angle != np.round(angle)):
+        return 0
+    counts = 2 ** math.ceil(math.log2(max(float(angle.max()), 1.0)))
+    return counts if counts >= FEWEST_COUNTS and angle.max() > (1 - WRAP_ERROR) * counts else 0
+
+
+def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[str]:
     step = np.abs(np.diff(angle[np.argsort(time_ns, kind="stable")]))
     usual = float(np.median(step)) if step.size else 0.0
     wraps = step[step > max(WRAP * usual, WRAP_LEAST)]

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Int64
 from numpy import ndarray
 
 from scanwright.design.arrays import Times
@@ -20,6 +20,8 @@ from scanwright.firmware_io.samples import JointLog
 _SAME_CLOCK_NS = (
     1_000_000_000  # a message that is received later than this after its stamp was stamped by another clock
 )
+_AHEAD_S = 0.05  # stamps that lie so much after their receipt are worse than the times of receipt
+_RECEIPT = ": both take the time they were received; a scan is received after its last beam, so expect a lag"
 _LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
 
 
@@ -51,6 +53,11 @@ class OneClock:
 
 def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
     """Choose the times of scans and angles, each shape (n,)."""
+    ahead_s = [_ahead_s(stamps) if stamps.complete() else 0.0 for stamps in (scans, angles)]
+    if max(ahead_s) > _AHEAD_S and max(ahead_s) < 1e-9 * _SAME_CLOCK_NS and _overlap(scans.stamp_ns, angles.stamp_ns):
+        subject = "scans" if ahead_s[0] >= ahead_s[1] else "angles"
+        note = f"the stamps of {subject} lie {max(ahead_s):.3f} s after they were received: another clock"
+        return OneClock(scans.receive_ns, angles.receive_ns, note + _RECEIPT)
     if scans.complete() and angles.complete() and _overlap(scans.stamp_ns, angles.stamp_ns):
         return OneClock(scans.stamp_ns, angles.stamp_ns, "")
     if scans.on_host_clock() and not angles.complete():
@@ -66,14 +73,8 @@ def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
             f"the stamps of scans (from {scans.stamp_ns[0] / 1e9:.0f} s) and angles (from "
             f"{angles.stamp_ns[0] / 1e9:.0f} s) have no time in common"
         )
-    note += ": both take the time they were received; a scan is received after its last beam, so expect a lag"
+    note += _RECEIPT
     return OneClock(scans.receive_ns, angles.receive_ns, note)
-
-
-def unwrapped_log(time_ns: Int64[ndarray, " n"], angle_rad: Float64[ndarray, " n"]) -> JointLog:
-    """A log sorted by time, one sample per time (the first one), turns counted."""
-    one_per_time, first = np.unique(time_ns, return_index=True)
-    return JointLog(one_per_time, np.unwrap(angle_rad[first]))
 
 
 def log_at_rest(
@@ -104,6 +105,11 @@ def log_at_rest(
 def times(values: Sequence[int]) -> Int64[ndarray, " n"]:
     """Integer nanoseconds as an array."""
     return np.array(values, dtype=np.int64)
+
+
+def _ahead_s(stamps: Stamps) -> float:
+    """Return how long stamps lie after their receipt, but for the latest twentieth; negative for good ones."""
+    return -float(np.quantile(stamps.receive_ns - stamps.stamp_ns, 0.05)) / 1e9
 
 
 def _overlap(a_ns: Times, b_ns: Times) -> bool:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from rosbags.typesys import Stores, get_typestore
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign, foreign_items
 from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.mcap_chunks import profile_of, unchunked_messages
 
 _STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
 _SEQUENCES = (list, tuple, np.ndarray)
@@ -100,7 +102,10 @@ class Bag:
         """
         self.check(topics)
         wanted = [connection for connection in self._reader.connections if connection.topic in topics]
-        raw_messages = self._reader.messages(connections=wanted)
+        raw_messages: Iterable[tuple[Any, int, bytes]] = self._reader.messages(connections=wanted)
+        if self.path.suffix == ".mcap" and (unchunked := unchunked_messages(self.path, topics)) is not None:
+            by_topic = {connection.topic: connection for connection in wanted}
+            raw_messages = [(by_topic[topic], log_ns, data) for log_ns, topic, data in unchunked]
         for connection, receive_ns, raw in foreign_items(f"{self.path}: damaged bag", raw_messages):
             what = f"{self.path}: {connection.topic}: a message that is not a {connection.msgtype}"
             body = foreign(what, self._reader.deserialize, raw, connection.msgtype)
@@ -108,34 +113,60 @@ class Bag:
 
 
 @contextmanager
-def open_bag(path: Path) -> Iterator[Bag]:
-    """Open a bag: a `.bag`, `.mcap` or `.db3` file, or a folder with a `metadata.yaml`.
+def open_bag(path: Path, *more: Path) -> Iterator[Bag]:
+    """Open a bag: a `.bag`, `.mcap` or `.db3` file, or a folder of one; the parts of a split bag as one.
 
     Raises:
         RecordingError: there is no such bag, or it cannot be read.
     """
-    if not path.exists():
-        raise RecordingError(f"{path}: no such bag")
-    if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise RecordingError(f"{path}: a ROS 2 bag folder has a metadata.yaml, this one has none")
-    if path.is_file() and path.suffix not in _SUFFIXES:
-        raise RecordingError(f"{path}: not a bag: '{path.suffix}' is none of {', '.join(_SUFFIXES)}")
-    if path.is_file() and path.stat().st_size == 0:
-        raise RecordingError(f"{path}: the file is empty")
-    what = f"{path}: unreadable bag"
-    if path.suffix == ".bag":
-        with foreign(what, path.open, "rb") as stream:
-            if stream.read(7) != b"#ROSBAG":
-                raise RecordingError(f"{path}: not a ROS 1 bag: it does not begin with #ROSBAG")
-        what += " (`rosbag reindex` restores one that was cut off)"
-    if path.suffix == ".mcap":
-        what += " (`scanwright repair` saves what is whole of one that was cut off)"
-    reader = foreign(what, AnyReader, [path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
-    foreign(what, reader.open)
+    paths = [_bag_file(part) for part in (path, *more)]
+    reader = foreign(_unreadable(path), AnyReader, paths, default_typestore=get_typestore(Stores.ROS2_JAZZY))
+    foreign(_unreadable(path), reader.open)
     try:
         yield Bag(path, reader)
     finally:
         reader.close()
+
+
+def _bag_file(path: Path) -> Path:
+    """Return what the reader opens; refuse what is no bag."""
+    if not path.exists():
+        raise RecordingError(f"{path}: no such bag")
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        inside = sorted(part for part in path.iterdir() if part.suffix in _SUFFIXES)
+        if len(inside) != 1:
+            names = f"name one of {', '.join(part.name for part in inside)}" if inside else "no bag in it either"
+            raise RecordingError(f"{path}: a ROS 2 bag folder has a metadata.yaml, this one has none: {names}")
+        return _bag_file(inside[0])
+    if path.is_file() and path.suffix not in _SUFFIXES:
+        raise RecordingError(f"{path}: not a bag: '{path.suffix}' is none of {', '.join(_SUFFIXES)}")
+    if path.is_file() and path.stat().st_size == 0:
+        raise RecordingError(f"{path}: the file is empty")
+    if path.suffix == ".bag":
+        with foreign(_unreadable(path), path.open, "rb") as stream:
+            if stream.read(7) != b"#ROSBAG":
+                raise RecordingError(f"{path}: not a ROS 1 bag: it does not begin with #ROSBAG")
+    for database in sorted(path.glob("*.db3")) if path.is_dir() else [path] * (path.suffix == ".db3"):
+        if fault := foreign(_unreadable(path), _database_fault, database):
+            raise RecordingError(f"{path}: damaged bag: {fault}")
+    if path.suffix == ".mcap" and profile_of(path) == "ros1":
+        raise RecordingError(f"{path}: holds ROS 1 messages: name the .bag that it was converted from")
+    return path
+
+
+def _database_fault(path: Path) -> str:
+    """Return what is wrong with a database, or "": SQLite from 3.46 on reads the rest of a cut one without an error."""
+    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as database:
+        (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
+    return "" if verdict == "ok" else " ".join(verdict.split())
+
+
+def _unreadable(path: Path) -> str:
+    hints = {
+        ".bag": " (`rosbag reindex` restores a bag that was cut off)",
+        ".mcap": " (`scanwright repair` saves the intact part of a bag that was cut off)",
+    }
+    return f"{path}: unreadable bag{hints.get(path.suffix, '')}"
 
 
 def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
@@ -161,13 +192,15 @@ def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
     return value, stamp_ns
 
 
-def laser_scan_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
-    """The LaserScan that `source` names, and its stamp [ns] (0: none).
+def laser_scan_at(body: Any, source: Source, bag: Path, echo: str = "first") -> tuple[Any, int]:
+    """Return the LaserScan that `source` names, and its stamp [ns] (0: none); of several echoes the one asked for.
 
     Raises:
         RecordingError: it is something else; the line says what, and where LaserScans are.
     """
     value, stamp_ns = value_at(body, source, bag)
+    if _kind(value) == ros_messages.MULTI_ECHO:
+        return ros_messages.single_echo(value, echo), stamp_ns
     if _kind(value) != ros_messages.LASER_SCAN:
         scans = [
             f"{source.topic}:{name}" for name in _fields(body) if _kind(getattr(body, name)) == ros_messages.LASER_SCAN
@@ -188,30 +221,38 @@ def scan_fault(laser_scan: Any) -> str:
     return ""
 
 
-def number_at(body: Any, source: Source, bag: Path) -> tuple[float, int]:
-    """The number that `source` names, and its stamp [ns] (0: none).
+def numbers_at(body: Any, source: Source, bag: Path) -> tuple[tuple[float, ...], int]:
+    """Return the number that `source` names, or the x y z w of a quaternion, and its stamp [ns] (0: none).
 
-    Without a field: `position[0]` of a JointState, `data` of a std_msgs message. Of a JointState a field may also be
-    the name of a joint.
+    Without a field: the only joint of a JointState, `data` of a std_msgs message. Of a JointState a field may also be
+    the name of a joint. A JointState without it, or without its position, has no numbers: others publish there, too.
 
     Raises:
         RecordingError: it is not a number; the line says what it is, and what is there instead.
     """
     if not source.field:
-        default = (
-            "position[0]" if _kind(body) == ros_messages.JOINT_STATE else "data" if "data" in _fields(body) else ""
-        )
-        source = Source(source.topic, default)
-    elif _kind(body) == ros_messages.JOINT_STATE and _joint(source.field, body):
-        if source.field not in body.name:
-            raise RecordingError(f"{bag}: {source.topic}: no joint '{source.field}'{suggest(source.field, body.name)}")
-        source = Source(source.topic, f"position[{list(body.name).index(source.field)}]")
+        if _kind(body) == ros_messages.JOINT_STATE:
+            if len(body.name) > 1:
+                one = f"{source.topic}:{body.name[-1]}"
+                raise RecordingError(f"{bag}: {source.topic}: joints {', '.join(body.name)}: name one, such as {one}")
+            source = Source(source.topic, body.name[0] if len(body.name) else "position[0]")
+        else:
+            source = Source(source.topic, "data" if "data" in _fields(body) else "")
+    if _kind(body) == ros_messages.JOINT_STATE and _joint(source.field, body):
+        names = list(body.name)
+        if source.field not in names or names.index(source.field) >= len(body.position):
+            return (), 0
+        source = Source(source.topic, f"position[{names.index(source.field)}]")
     value, stamp_ns = value_at(body, source, bag)
+    if _kind(value) == ros_messages.QUATERNION:
+        return (float(value.x), float(value.y), float(value.z), float(value.w)), stamp_ns
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        numbers = [f"{source.topic}:{name}" for name in _fields(value) if isinstance(getattr(value, name), int | float)]
+        path = f"{source}." if source.field else f"{source.topic}:"
+        usable = ("a float", "a int", ros_messages.QUATERNION)
+        numbers = [f"{path}{name}" for name in _fields(value) if _kind(getattr(value, name)) in usable]
         hint = f"; did you mean '{numbers[0]}'?" if numbers else "; name one number in it, for example position[0]"
         raise RecordingError(f"{bag}: {source} is {_kind(value)}, not a number{hint}")
-    return float(value), stamp_ns
+    return (float(value),), stamp_ns
 
 
 def _joint(field: str, body: Any) -> bool:

@@ -1,4 +1,4 @@
-"""`scanwright import`: somebody else's bag becomes the project's recording.
+"""`scanwright import`: convert a ROS bag to a recording.
 
 Two passes over the bag. The first reads every time and every angle (small), the second copies the scans one by one.
 """
@@ -7,27 +7,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scanwright.design.arrays import Floats, Times
+from scanwright.design.arrays import Times
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
+from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.angle_sources import (
-    AngleUnit,
-    FrameSource,
-    angles_in,
     is_table,
     parse_frames,
     read_table,
-    turned_rad,
     unit_doubts,
 )
 from scanwright.firmware_io.recording.bag_clocks import (
@@ -36,10 +32,14 @@ from scanwright.firmware_io.recording.bag_clocks import (
     gap_warnings,
     log_at_rest,
     one_clock,
-    times,
-    unwrapped_log,
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
+from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, joint_positions
+from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
+from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings
+from scanwright.firmware_io.recording.import_checks.survey import Survey, endless, survey_bag
 from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
@@ -50,10 +50,12 @@ from scanwright.firmware_io.recording.recording import (
 )
 from scanwright.firmware_io.samples import JointLog
 
+_AS_IT_IS = Corrections()
+
 
 @dataclass(frozen=True, slots=True)
 class ImportSummary:
-    """What an import wrote, what it left out and why, and what a person should know.
+    """What an import wrote, what it dropped and why, and what a person should know.
 
     Attributes:
         out: the recording.
@@ -63,7 +65,7 @@ class ImportSummary:
         duration_s: from the first to the last scan.
         angle_deg: smallest and largest angle of the joint log.
         left_out: reason -> number of scans or angles.
-        warnings: one sentence each.
+        findings: of the checks.
     """
 
     out: Path
@@ -73,56 +75,57 @@ class ImportSummary:
     duration_s: float
     angle_deg: tuple[float, float]
     left_out: dict[str, int]
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Messages of the findings that are warnings."""
+        return tuple(finding.message for finding in self.findings if finding.severity == "warning")
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Return the summary as lines of text."""
         low, high = self.angle_deg
+        texts = [
+            line
+            for finding in self.findings
+            for line in (
+                f"{finding.severity}: {finding.message}",
+                *([f"  hint: {finding.hint}"] if finding.hint else []),
+            )
+        ]
         return [
-            *(f"warning: {warning}" for warning in self.warnings),
+            *texts,
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
             f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
             f"{high:z.2f} deg, {self.duration_s:.1f} s, to {self.out}",
         ]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Survey:
-    """First pass. Scan arrays have one entry per usable scan, angle arrays one per usable angle."""
-
-    scan_stamps: Stamps
-    arc_ns: Times
-    beams: NDArray[np.int64]
-    endless: int
-    angle_stamps: Stamps
-    angle: Floats
-    angle_note: str
-    left_out: Counter[str]
-
-
 def import_bag(
-    bag: Path,
+    bag: Path | Sequence[Path],
     out: Path,
     *,
     scan: str,
     angle: str,
-    angle_unit: AngleUnit | None,
+    angle_unit: str | None,
     hold: bool,
     also: Collection[str] = (),
+    corrections: Corrections = _AS_IT_IS,
 ) -> ImportSummary:
     """Write the scans and angles of a bag as a recording.
 
     Args:
-        bag: ROS 1 or ROS 2 bag.
+        bag: ROS 1 or ROS 2 bag; several are the parts of a split one.
         out: the recording to write, `.mcap`.
         scan: TOPIC[:FIELD] of a LaserScan.
-        angle: where the axis angle stands: TOPIC[:FIELD] of a number, which may lie in the same message as the scan,
-            TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
-        angle_unit: unit of the angle; None for transforms, which have none.
+        angle: source of the axis angle: TOPIC[:FIELD] of a number or quaternion, which may lie in the same message as
+            the scan, TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
+        angle_unit: deg, rad, or counts such as 4096/turn; None for transforms and quaternions, which have none.
         hold: the motor stands still during each scan: the angle of the scan's own message, or the last one before
             the scan, holds from its first to its last beam. A bag made from a recording of which this is known says
             so itself, and its log stays as it is.
-        also: topics that come along as they are, such as poses and an IMU for `assemble`.
+        also: topics that are copied unchanged, such as poses and an IMU for `assemble`.
+        corrections: of the recording.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
@@ -131,46 +134,67 @@ def import_bag(
     check_place(out, RecordingError)
     if out.suffix != ".mcap":
         raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
-    if angle_unit not in ("deg", "rad", None):
-        raise RecordingError(f"angle unit '{angle_unit}': write deg or rad")
-    if out.resolve() == bag.resolve():
+    first, *parts = [bag] if isinstance(bag, Path) else bag
+    bag = first
+    if out.resolve() in [part.resolve() for part in (bag, *parts)]:
         raise RecordingError(f"{out}: this is the bag itself; name another file")
     scan_source = parse_source(scan)
     angle_source = None if is_table(angle) else parse_frames(angle) or parse_source(angle)
-    if isinstance(angle_source, FrameSource):
-        angle_unit = "rad"
-    if angle_unit is None:
-        raise RecordingError("angle unit: write deg or rad, as the bag has it")
+    unit_rad = radians_per(angle_unit) if angle_unit else None
     table = read_table(angle) if angle_source is None else None
     if reserved := {SCAN_TOPIC, JOINT_TOPIC, BEAMS_TOPIC}.intersection(also):
         raise RecordingError(f"also {min(reserved)}: the recording has a topic of its own under this name")
-    with open_bag(bag) as opened:
+    with open_bag(bag, *parts) as opened:
         opened.check({scan_source.topic, *([] if angle_source is None else [angle_source.topic]), *also})
-        survey = _survey(opened, scan_source, angle_source, table)
-        clock = one_clock(survey.scan_stamps, survey.angle_stamps)
+        survey = survey_bag(opened, scan_source, angle_source, table, corrections)
+        if survey.turned:
+            angle_unit, unit_rad = "rad", 1.0
+        if unit_rad is None or angle_unit is None:
+            raise RecordingError("angle_unit: write deg or rad, as the bag has it, or counts such as 4096/turn")
+        headers = survey.headers
+        increment_s = _time_increment_s(headers, corrections)
+        stated_s = headers.time_increment_s if increment_s is None else increment_s
+        arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
+        clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps), survey, arc_ns, corrections)
         in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
         if not in_time.any():
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{bag}: no scan falls into the time of the angles: {spans}")
-        log = unwrapped_log(clock.angle_ns, np.radians(survey.angle) if angle_unit == "deg" else survey.angle)
-        doubled = clock.angle_ns.size - log.time_ns.size
-        left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled})
-        warnings = [note for note in (clock.note, survey.angle_note) if note]
-        warnings += unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
-        warnings += _scan_warnings(survey, clock)
-        if also and clock.note:
-            warnings.append(f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times")
-        if not in_time.all():
-            warnings.append(
-                f"{np.sum(~in_time)} scans begin before the first or after the last angle: no point of them"
-            )
-        if hold:
-            log, cut = log_at_rest(log, clock.scan_ns, survey.arc_ns)
-            if cut:
-                warnings.append(f"{cut} scans end after the next one begins: their last beams take its angle")
+        order = np.argsort(clock.angle_ns, kind="stable")
+        wrong = outliers(survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
+        time_ns, first_of = np.unique(clock.angle_ns[order][~wrong], return_index=True)
+        log = JointLog(time_ns, joint_positions(survey.angle[order][~wrong][first_of], unit_rad, corrections))
+        doubled = order.size - int(wrong.sum()) - log.time_ns.size
+        left_out = survey.left_out + Counter(
+            {"angle_at_the_time_of_another": doubled, "angle_outlier": int(wrong.sum())}
+        )
         still = hold or rests_in_scans(note_in(opened))
+        findings = [_remark("clock", note) for note in (clock.note, survey.angle_note) if note]
+        unit_notes = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
+        findings += [_remark("angle_unit", note) for note in unit_notes]
         if not still:
-            warnings += gap_warnings(log)
+            in_order = clock.angle_ns[order], survey.angle[order] * unit_rad
+            findings += angle_findings(*in_order, dropped=corrections.drop_outliers, timed=not clock.note)
+        speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
+        findings += header_findings(headers.corrected(increment_s, corrections), speed_rad_s)
+        if not clock.note and corrections.stamp != "receipt":
+            same = angle_source is not None and angle_source.topic == scan_source.topic
+            shifted = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
+            findings += clock_findings(shifted, survey.angle_stamps, headers.arc_ns, speed_rad_s, one_message=same)
+        findings += _scan_findings(survey)
+        if also and clock.note:
+            also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"
+            findings.append(_remark("clock", also_note))
+        if not in_time.all():
+            outside = f"{np.sum(~in_time)} scans begin before the first or after the last angle: no point of them"
+            findings.append(_remark("scans_outside", outside))
+        if hold:
+            log, cut = log_at_rest(log, clock.scan_ns, arc_ns)
+            if cut:
+                short = f"{cut} scans end after the next one begins: their last beams take its angle"
+                findings.append(_remark("scans_overlap", short))
+        if not still:
+            findings += [_remark("angle_gaps", gap) for gap in gap_warnings(log)]
         note = {
             "schema": "scanwright/recording/1",
             "source": bag.name,
@@ -178,91 +202,64 @@ def import_bag(
             "angle": str(angle_source or angle),
             "angle_unit": angle_unit,
             "hold": str(still).lower(),
-            "warnings": "\n".join(warnings),
+            "warnings": "\n".join(finding.message for finding in findings if finding.severity == "warning"),
         }
         with RecordingWriter(out, note) as writer:
-            _write(opened, scan_source, clock, log, writer, also)
+            _write(opened, scan_source, clock, log, writer, also, corrections, increment_s)
     return ImportSummary(
         out=out,
         scans=clock.scan_ns.size,
-        beams=int(survey.beams.sum()),
+        beams=int(headers.beams.sum()),
         joint_samples=log.time_ns.size,
         duration_s=float(np.ptp(clock.scan_ns)) / 1e9,
         angle_deg=(math.degrees(log.position_rad.min()), math.degrees(log.position_rad.max())),
         left_out=dict(left_out),
-        warnings=tuple(warnings),
+        findings=tuple(findings),
     )
 
 
-def _survey(
-    bag: Bag, scan_source: Source, angle_source: Source | FrameSource | None, table: tuple[Times, Floats] | None
-) -> _Survey:
-    left_out: Counter[str] = Counter()
-    scans: list[tuple[int, int, int, int, bool]] = []
-    angles: list[tuple[int, int, tuple[float, ...]]] = []
-    if table is not None:
-        angles = [(when, when, (value,)) for when, value in zip(*(part.tolist() for part in table), strict=True)]
-    topics = {scan_source.topic, *([] if angle_source is None else [angle_source.topic])}
-    for message in bag.messages(topics):
-        scan_stamp_ns = 0
-        if message.topic == scan_source.topic:
-            laser_scan, scan_stamp_ns = laser_scan_at(message.body, scan_source, bag.path)
-            fault = scan_fault(laser_scan)
-            if fault:
-                left_out[fault] += 1
-            else:
-                arc_ns = round(1e9 * float(laser_scan.time_increment) * (len(laser_scan.ranges) - 1))
-                beams = len(laser_scan.ranges)
-                scans.append((scan_stamp_ns, message.receive_ns, arc_ns, beams, _endless(laser_scan)))
-        if angle_source is not None and message.topic == angle_source.topic:
-            for value, angle_stamp_ns in angles_in(message.body, angle_source, bag.path):
-                if all(map(math.isfinite, value)):
-                    angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, value))
-                else:
-                    left_out["angle_not_a_number"] += 1
-    for source, samples in ((scan_source, scans), (angle_source, angles)):
-        if not samples:
-            why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "it has no such message"
-            raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
-    stamps, receives, arcs, widths, endless = zip(*scans, strict=True)
-    angle_stamps, angle_receives, values = zip(*angles, strict=True)
-    numbers, note = np.array(values, dtype=float), ""
-    if isinstance(angle_source, FrameSource):
-        angle, note = turned_rad(numbers, angle_source)
-    else:
-        angle = numbers[:, 0]
-    return _Survey(
-        scan_stamps=Stamps(times(stamps), times(receives)),
-        arc_ns=times(arcs),
-        beams=np.array(widths),
-        endless=sum(endless),
-        angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
-        angle=angle,
-        angle_note=note,
-        left_out=left_out,
-    )
+def _time_increment_s(headers: Headers, corrections: Corrections) -> float | None:
+    """Return the time increment to use; None for that of each scan."""
+    if corrections.time_increment == "auto":
+        return headers.time_increment_from_turn_s
+    return corrections.time_increment
 
 
-def _endless(laser_scan: Any) -> bool:
-    """Whether the longest range is not told: some drivers leave it 0."""
-    return not laser_scan.range_max > laser_scan.range_min
+def _corrected(clock: OneClock, survey: Survey, arc_ns: Times, corrections: Corrections) -> OneClock:
+    """Return the times after the corrections of stamps."""
+    scan_ns, angle_ns, note = clock.scan_ns, clock.angle_ns, clock.note
+    if corrections.stamp == "receipt":
+        scan_ns, angle_ns, note = survey.scan_stamps.receive_ns - arc_ns, survey.angle_stamps.receive_ns, ""
+    elif corrections.stamp == "last":
+        scan_ns = scan_ns - arc_ns
+    return OneClock(scan_ns + round(1e9 * corrections.scan_offset_s), angle_ns, note)
 
 
-def _scan_warnings(survey: _Survey, clock: OneClock) -> Iterator[str]:
-    if not survey.arc_ns.any():
-        yield "time_increment is 0: every beam takes the time of its scan's stamp, not its own"
+def _remark(code: str, message: str) -> Finding:
+    return Finding(code, "warning", "recording", message)
+
+
+def _scan_findings(survey: Survey) -> Iterator[Finding]:
+    beams = survey.headers.beams
     if survey.left_out["empty_scan"]:
-        yield f"{survey.left_out['empty_scan']} scans have no beam and are left out"
-    if np.ptp(survey.beams):
-        yield f"scans have {survey.beams.min()} to {survey.beams.max()} beams: beam i is not the same direction in each"
-    if np.any(np.diff(clock.scan_ns) <= 0):
-        yield f"{int(np.sum(np.diff(clock.scan_ns) <= 0))} scans are not later than the one before them"
+        yield _remark("empty_scans", f"{survey.left_out['empty_scan']} scans have no beam and are left out")
+    if np.ptp(beams):
+        many = f"scans have {beams.min()} to {beams.max()} beams: beam i is not the same direction in each"
+        yield _remark("ragged_scans", many)
     if survey.endless:
-        yield f"{survey.endless} scans have a range_max not above range_min: no longest range is applied"
+        none = f"{survey.endless} scans have a range_max not above range_min: no longest range is applied"
+        yield _remark("no_range_max", none)
 
 
 def _write(
-    bag: Bag, source: Source, clock: OneClock, log: JointLog, writer: MessageWriter, also: Collection[str]
+    bag: Bag,
+    source: Source,
+    clock: OneClock,
+    log: JointLog,
+    writer: MessageWriter,
+    also: Collection[str],
+    corrections: Corrections,
+    time_increment_s: float | None,
 ) -> None:
     """Second pass: copy the scans, with the joint samples between them by time, and what comes along as received."""
     samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
@@ -271,8 +268,10 @@ def _write(
 
     def write_scan(laser_scan: Any, beams: ros_messages.Beams | None) -> None:
         nonlocal written
-        scan = ros_messages.scan_from_message(laser_scan, next(scan_times))
-        if _endless(laser_scan):
+        limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
+        raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
+        scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
+        if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:
             scan = replace(scan, beam_bearing_rad=beams[0], beam_offset_ns=beams[1])
@@ -293,7 +292,7 @@ def _write(
                 stamp_ns, beams_of_one = ros_messages.beams_in(message.body)
                 beams[stamp_ns] = beams_of_one
         elif message.topic == source.topic:
-            laser_scan, stamp_ns = laser_scan_at(message.body, source, bag.path)
+            laser_scan, stamp_ns = laser_scan_at(message.body, source, bag.path, corrections.echo)
             if not scan_fault(laser_scan):
                 waiting.append((laser_scan, stamp_ns))
         while waiting and (not own or len(waiting) > 1 or waiting[0][1] in beams):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Collection, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import lru_cache
 from itertools import chain
 from operator import itemgetter
@@ -29,9 +29,9 @@ from scanwright.firmware_io.foreign import foreign
 
 CHUNK_S = 0.25
 """What damage may cost: a chunk holds no more."""
-_RUN_BYTES = 1_000_000
+_RUN_BYTES = 1_000_000  # unpacked: smaller chunks are handed over together
 _MAGIC = b"\x89MCAP"
-_MESSAGE = 0x05
+_MESSAGE = 0x05  # opcode of a message (MCAP specification, Message)
 _RECORD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
@@ -151,7 +151,7 @@ def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: 
     stream.seek(index.chunk_start_offset + _RECORD.size)
     unpacked, size = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=summed)
     data = unpacked.read(size)
-    status = []
+    messages = []
     at = 0
     while at < size:
         opcode, length = _RECORD.unpack_from(data, at)
@@ -160,13 +160,33 @@ def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: 
             channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
             if channel in wanted:
                 body = data[at + _MESSAGE_HEAD.size : at + length]
-                status.append((log_ns, index.chunk_start_offset, wanted[channel], body))
+                messages.append((log_ns, index.chunk_start_offset, wanted[channel], body))
         at += length
-    return status
+    return messages
 
 
 def _unchunked(stream: BinaryIO, topics: Collection[str]) -> list[_Timed]:
     """The messages of a file without chunks; such a file has no index, so all of it is held."""
     stream.seek(0)
-    status = NonSeekingReader(stream).iter_messages(topics=list(topics), log_time_order=True)
-    return [(message.log_time, 0, channel.topic, message.data) for _, channel, message in status]
+    messages = NonSeekingReader(stream).iter_messages(topics=list(topics), log_time_order=True)
+    return [(message.log_time, 0, channel.topic, message.data) for _, channel, message in messages]
+
+
+def unchunked_messages(path: Path, topics: Collection[str]) -> list[tuple[int, str, bytes]] | None:
+    """Return times [ns], topics and data of the messages of a file without chunks, by time; None if it has chunks.
+
+    Raises:
+        RecordingError: the file cannot be read.
+    """
+    with _opened(path) as stream:
+        if _summary(path, stream).chunk_indexes:
+            return None
+        messages = foreign(f"{path}: damaged", _unchunked, stream, topics)
+    return [(log_ns, topic, data) for log_ns, _, topic, data in messages]
+
+
+def profile_of(path: Path) -> str:
+    """Return the profile in the header of an MCAP file, such as ros2; empty if it has none or cannot be read."""
+    with path.open("rb") as stream, suppress(Exception):
+        return str(NonSeekingReader(stream).get_header().profile)
+    return ""

@@ -11,6 +11,7 @@ import math
 import struct
 from collections.abc import Iterable
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ from scanwright.firmware_io.clouds.cloud import pose_numbers
 from scanwright.firmware_io.samples import Scan
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
+MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"
+QUATERNION = "geometry_msgs/msg/Quaternion"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
@@ -132,6 +135,26 @@ def scan_from_message(message: Any, first_beam_ns: int) -> Scan:
         range_m=ranges,
         intensity=_one_by_one(intensities, ranges),
     )
+
+
+def single_echo(message: Any, echo: str) -> Any:
+    """Return a MultiEchoLaserScan as a LaserScan of its first, last or strongest echoes."""
+
+    def chosen(k: int, echoes: Any) -> int:
+        if echo != "strongest" or k >= len(message.intensities) or len(message.intensities[k].echoes) != len(echoes):
+            return -1 if echo == "last" else 0
+        return int(np.argmax(message.intensities[k].echoes))
+
+    ranges, intensities = [], []
+    for k, ray in enumerate(message.ranges):
+        which = chosen(k, ray.echoes) if len(ray.echoes) else 0
+        ranges.append(ray.echoes[which] if len(ray.echoes) else math.inf)
+        if k < len(message.intensities):
+            lit = message.intensities[k].echoes
+            intensities.append(lit[which] if len(lit) == len(ray.echoes) and len(lit) else 0.0)
+    fields = {name: getattr(message, name) for name in message.__dataclass_fields__ if name != "__msgtype__"}
+    fields |= {"ranges": np.array(ranges, np.float32), "intensities": np.array(intensities, np.float32)}
+    return SimpleNamespace(**fields)
 
 
 def encode_joint(time_ns: int, position_rad: float) -> bytes:

@@ -14,6 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from threading import Event
 
 import numpy as np
@@ -36,7 +37,7 @@ from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
 
-_STEADY_PATIENCE_S = 15.0
+_STEADY_PATIENCE_S = 15.0  # a heavy head takes some seconds
 _MOST_SPEEDS = 3600  # an hour of them, for the mean
 
 
@@ -75,7 +76,10 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
         axis = scans.axis = stack.enter_context(turning_servo(servo, plan.motion))
         reporter.step("starting the servo")
         _wait_until_steady(scans, axis, plan.motion, reporter)
-        return _record(plan, scans, axis, reporter)
+        before = servo.lost_replies
+        axis.longest_gap_ns = 0
+        summary = _record(plan, scans, axis, reporter)
+        return replace(summary, lost_replies=servo.lost_replies - before, longest_gap_s=axis.longest_gap_ns / 1e9)
 
 
 @contextmanager

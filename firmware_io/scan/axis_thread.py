@@ -25,7 +25,7 @@ from scanwright.firmware_io.scan.setpoints import Move, course
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import ServoDriver
 
-SERVO_HZ = 100.0
+SERVO_HZ = 100.0  # an angle every 0.6 deg at 60 deg/s
 
 _STOP_ANSWER_S = 5.0  # three tries of two orders take 1.5 s
 _DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that
@@ -46,6 +46,7 @@ class AxisThread:
         stop_answers: from the thread, whether the servo answered the order to stand; False from one that has failed.
         window: the good angles of the last half second.
         left_out: angles that are not recorded, reason -> count.
+        longest_gap_ns: between two good angles.
     """
 
     def __init__(self, motion: Motion, start_rad: float, step_rad: float) -> None:
@@ -53,6 +54,7 @@ class AxisThread:
         self.received: SimpleQueue[ServoState | Exception] = SimpleQueue()
         self.window: deque[ServoState] = deque(maxlen=_WINDOW)
         self.left_out: Counter[str] = Counter()
+        self.longest_gap_ns = 0
         self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
         self._unread: list[ServoState] = []  # heard by `go`, for the next who hears
         self._motion = motion
@@ -104,6 +106,8 @@ class AxisThread:
             ):
                 self.left_out["servo angles with uncertain timestamp"] += 1  # the host was busy during the transaction
             else:
+                if self.window:
+                    self.longest_gap_ns = max(self.longest_gap_ns, state.time_ns - self.window[-1].time_ns)
                 self.window.append(state)
                 good.append(state)
         return good

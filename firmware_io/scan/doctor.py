@@ -21,6 +21,7 @@ from scanwright.firmware_io.device_ports import emulated, lidar_ports, servo_por
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.scan.acquire import check_model
 from scanwright.firmware_io.scan.axis_thread import SERVO_HZ
+from scanwright.firmware_io.scan.host import examine_host
 from scanwright.firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
 from scanwright.firmware_io.serial_port import latency_timer
 from scanwright.firmware_io.servo import settings
@@ -52,6 +53,8 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
     if emulators is not None and lidar is None and servo is None:
         yield _ok("emulated", str(out), f"the scanner of {out} is emulated by process {emulators.pid}")
         lidars, servos = [emulators.lidar], [emulators.servo]
+    else:
+        yield from examine_host([*lidars, *servos])
     model, spins = _servo_of(angles)
     examinations = [_guarded(port, _examine_lidar(port, angles)) for port in lidars]
     examinations += [_guarded(port, _examine_servo(port, model, servo_id, spins=spins)) for port in servos]

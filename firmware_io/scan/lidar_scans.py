@@ -14,10 +14,10 @@ from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread
 from scanwright.firmware_io.scan.reporter import Reporter
 
-CLOCK_GOOD_NS = 500_000
-_CLOCK_LEAST_S = 3.0
-_CLOCK_PATIENCE_S = 10.0
-_AWAY_S = 10.0
+CLOCK_GOOD_NS = 500_000  # 0.03 deg at 60 deg/s, a third of an encoder's step
+_CLOCK_LEAST_S = 3.0  # three one-second buckets give a rate
+_CLOCK_PATIENCE_S = 10.0  # longer improves it no more on a busy computer
+_AWAY_S = 10.0  # to plug it in again, and for its start
 _SERVO_UNKNOWN = "the servo has not answered that it stands: look, and cut its power if it turns"
 
 

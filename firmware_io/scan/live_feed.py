@@ -26,8 +26,8 @@ from scanwright.firmware_io.samples import JointSample, Scan
 from scanwright.firmware_io.scan.scan_end import ScanEnd
 
 MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
-MOST_ANGLES = 2000
-EVERY_S = 0.2
+MOST_ANGLES = 2000  # 20 s at 100 Hz
+EVERY_S = 0.2  # five times a second looks continuous
 
 
 class Watch(Protocol):

@@ -15,7 +15,7 @@ from scanwright.design.motion import Motion, Spin
 from scanwright.firmware_io.device_ports import Ports, find_ports
 from scanwright.firmware_io.lidar.lidar import StampAt
 
-_LONGEST_S = 7 * 24 * 3600.0
+_LONGEST_S = 7 * 24 * 3600.0  # a week
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,8 @@ class ScanSummary:
         clock_ns: standard uncertainty of the beams' times at the end.
         reconnects: how often the lidar was away and came back.
         left_out: what was not recorded, reason -> count.
+        lost_replies: answers of the servo that were damaged or did not come.
+        longest_gap_s: between two angles of the servo.
     """
 
     recording: Path
@@ -33,6 +35,8 @@ class ScanSummary:
     clock_ns: int
     reconnects: int
     left_out: dict[str, int]
+    lost_replies: int = 0
+    longest_gap_s: float = 0.0
 
     @property
     def lost_data(self) -> bool:
@@ -44,6 +48,13 @@ class ScanSummary:
         lines = [f"dropped {count:,}: {reason}" for reason, count in self.left_out.items()]
         if self.reconnects:
             lines.append(f"lidar reconnects: {self.reconnects}")
+        if self.lost_replies:
+            share = self.lost_replies / (self.joint_samples + self.lost_replies)
+            turned_deg = abs(self.speed_deg_s) * self.longest_gap_s
+            lines.append(
+                f"lost servo replies: {self.lost_replies:,} ({share:.1%}); longest gap between angles: "
+                f"{self.longest_gap_s:.3f} s" + (f", {turned_deg:.1f} deg" if turned_deg else "")
+            )
         if self.speed_deg_s:
             lines.append(f"servo speed: {self.speed_deg_s:.2f} deg/s, rms deviation {self.ripple_deg:.3f} deg")
         return [

@@ -10,7 +10,7 @@ from statistics import median
 from scanwright.firmware_io.servo.find import find_servo, listen_first, open_bus
 from scanwright.firmware_io.servo.fitness import SettingChange, slow_adapter, unfit_settings
 
-_READS = 100
+_READS = 100  # a second of them
 
 
 @dataclass(frozen=True, slots=True)

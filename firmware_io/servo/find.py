@@ -16,8 +16,8 @@ from scanwright.firmware_io.servo.fitness import mute_servo
 
 Unmute = Literal["never", "until power-off", "for good"]
 
-_PATIENT_PING_S = 0.2
-_LISTEN_S = 0.3
+_PATIENT_PING_S = 0.2  # four times as long, for a device that starts
+_LISTEN_S = 0.3  # thirty readings of another program at 100 Hz
 
 
 def open_bus(port: str) -> ServoBus:

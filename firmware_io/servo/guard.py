@@ -22,8 +22,8 @@ import time
 SILENCE_S = 2.0  # as long as a turning servo may go without a word from the program
 
 _TURNING, _RESTING, _DONE = b"t", b"r", b"d"
-_GIVE_UP_S = 2.0
-_ANSWER_S = 0.05
+_GIVE_UP_S = 2.0  # forty tries
+_ANSWER_S = 0.05  # as `unit.PING_S`, which this program does not import
 
 
 class Guard:

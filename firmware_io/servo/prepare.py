@@ -17,7 +17,7 @@ from scanwright.firmware_io.servo.fitness import (
 )
 from scanwright.firmware_io.servo.settings import write_changes
 
-_REBOOT_S = 3.0
+_REBOOT_S = 3.0  # [assumed]: the e-manual states no time
 
 
 def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) -> tuple[str, ...]:

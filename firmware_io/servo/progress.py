@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-_STALL_S = 0.5
+_STALL_S = 0.5  # as long as the horn may take to start moving
 _STALL_COUNTS = 8  # of the encoder, due at least before a stall can be told from its steps
 _STALL_SHARE = 0.1  # of the way due
 _ARRIVED_RAD = math.radians(5.0)  # a loop without integral stops short of its goal, by friction and weight

@@ -104,6 +104,11 @@ class ServoDriver:
             trouble.add_note(f"{self} {_IS_OFF}")
             raise trouble
 
+    @property
+    def lost_replies(self) -> int:
+        """Count of answers that were damaged or did not come."""
+        return self._bus.lost_replies
+
     def warnings(self) -> tuple[str, ...]:
         """What was not as it should be when the servo was opened, and what to do about it."""
         return self._warnings
@@ -264,6 +269,10 @@ class ServoDriver:
     def _stop(self) -> None:
         self._spins, self._order = None, None
         self._unit.write(self._table.torque, 0)
+        if self._unit.has_torque():  # a late goal turns the torque of a Feetech on again
+            self._unit.write(self._table.torque, 0)
+            if self._unit.has_torque():
+                raise DeviceError(f"{self}: its torque stays on: cut its power")
         self._rest()
 
     def _here(self) -> float:

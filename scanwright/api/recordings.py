@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from scanwright.api.arguments import AnglesLike, as_angle_set, as_task, with_say
 from scanwright.design.angles import AngleSet
@@ -17,6 +17,7 @@ from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.assembly.options import DEFAULT, AssembleOptions
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.clouds.formats import check_target
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections
 from scanwright.firmware_io.ros import robot_frames
 
 if TYPE_CHECKING:
@@ -28,33 +29,39 @@ if TYPE_CHECKING:
 
 
 def import_bag(
-    bag: str | Path,
+    bag: str | Path | Sequence[str | Path],
     out: str | Path,
     *,
     scan: str,
     angle: str,
-    angle_unit: Literal["deg", "rad"] | None = None,
+    angle_unit: str | None = None,
     hold: bool = False,
     also: Collection[str] = (),
+    corrections: Corrections | None = None,
 ) -> ImportSummary:
     """Convert a ROS 1 or ROS 2 bag to a recording: MCAP with /scan and /joint_states.
 
     Args:
-        bag: the bag.
+        bag: the bag, or all parts of a split one.
         out: recording to write, `.mcap`.
         scan: TOPIC[:FIELD] of the LaserScan.
         angle: joint angle: TOPIC[:FIELD], TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of
             transforms, or FILE.csv[:COLUMN].
-        angle_unit: of that angle; transforms have none.
+        angle_unit: deg, rad, or counts such as 4096/turn; transforms and quaternions have none.
         hold: the axis was at rest during each scan.
         also: topics to copy, such as /odom, /imu and /tf_static for `assemble`.
+        corrections: of the recording, as its checks offer them.
 
     Raises:
         RecordingError: the bag is unreadable, has no such topic, or `out` cannot be written.
     """
     from scanwright.firmware_io.recording.importer import import_bag
 
-    return import_bag(Path(bag), Path(out), scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also)
+    bags = [Path(bag)] if isinstance(bag, str | Path) else [Path(part) for part in bag]
+    chosen = corrections or Corrections()
+    return import_bag(
+        bags, Path(out), scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also, corrections=chosen
+    )
 
 
 def open_recording(path: str | Path) -> Recording:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 from typer import Argument, Option
@@ -14,6 +14,7 @@ from scanwright.cli.console import ConsoleProgress, show, show_result
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections, read_time_increment
 
 app = Commands("Clouds")
 
@@ -21,27 +22,37 @@ Organised = Annotated[bool, Option("--organised", help="Keep one row per beam; N
 
 
 @app.command("import", example="import bag --scan /scan --angle /joint_states:pan --angle-unit rad -o rec.mcap")
+@record_options(Corrections, "time_increment")
 def import_(
-    bag: Annotated[Path, Argument(metavar="BAG", help="ROS 1 or ROS 2 bag.")],
-    scan: Annotated[str, Option(metavar="TOPIC[:FIELD]", help="LaserScan.")],
+    bag: Annotated[list[Path], Argument(metavar="BAG", help="ROS 1 or ROS 2 bag, or all parts of a split one.")],
+    scan: Annotated[str, Option(metavar="TOPIC[:FIELD]", help="LaserScan or MultiEchoLaserScan.")],
     angle: Annotated[
         str, Option(metavar="TOPIC[:FIELD]", help="Joint angle; or TOPIC:JOINT, /tf:PARENT:CHILD, FILE.csv[:COLUMN].")
     ],
     out: Annotated[Path, Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
+    options: Corrections,
     angle_unit: Annotated[
-        Literal["deg", "rad"] | None, Option(help="Required unless the angle is a transform.")
+        str | None, Option(metavar="UNIT", help="deg, rad or 4096/turn; not for a transform or quaternion.")
     ] = None,
     hold: Annotated[bool, Option("--hold", help="The axis was at rest during each scan.")] = False,
     also: Annotated[list[str] | None, Option(metavar="TOPIC", help="Topic to copy, such as /odom; repeatable.")] = None,
+    time_increment: Annotated[
+        str | None, Option(metavar="S", help="Time from beam to beam; auto: from step and mirror turn.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Convert a ROS bag to a Scanwright recording.
 
-    The recording is an MCAP file with /scan and /joint_states.
+    The recording is an MCAP file with /scan and /joint_states. The checks of the bag print what is wrong with it, what
+    that costs at 5 m, and the option that corrects it.
     """
     from scanwright import api
 
-    summary = api.import_bag(bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or ())
+    if time_increment is not None:
+        options = replace(options, time_increment=read_time_increment(time_increment))
+    summary = api.import_bag(
+        bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or (), corrections=options
+    )
     show_result(summary.lines, asdict(summary), as_json)
 
 
@@ -69,7 +80,7 @@ def repair(
 def assemble(
     recording: Annotated[Path, Argument(metavar="RECORDING", help="Recording made by `scan` or `import`.")],
     angles: Angles,
-    out: Annotated[Path, Option("--out", "-o", metavar="FILE", help="Cloud: ply pcd las laz e57 npz xyz.")],
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE", help="Cloud; its suffix is the format, such as ply.")],
     options: AssembleOptions,
     straight: Annotated[bool, Option("--straight", help="Interpolate joint angles linearly.")] = False,
     columns: Annotated[str, Option(metavar="LIST", help="Columns besides x,y,z.")] = ",".join(COLUMNS),
@@ -192,7 +203,7 @@ def convert(
 ) -> None:
     """Convert a point cloud or recording to another format.
 
-    Clouds: ply pcd las laz e57 npz xyz. A recording becomes a ROS 1 bag if OUT ends in .bag, otherwise a ROS 2 bag
+    The suffix of a cloud is its format. A recording becomes a ROS 1 bag if OUT ends in .bag, otherwise a ROS 2 bag
     (sqlite3).
     """
     from scanwright.firmware_io.recording.convert import convert

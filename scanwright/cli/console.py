@@ -220,7 +220,7 @@ class ConsoleProgress:
                 speed_estimate_period=_SPEED_S,
             )
             self._bar.add_task(step, total=1.0)
-            self._bar.update(TaskID(0), completed=fraction - 1e-9)  # rich takes the time of what is above this only
+            self._bar.update(TaskID(0), completed=max(fraction, 1e-9))  # rich times from here on, but not from 0
         console = self._bar.console
         self._bar.update(TaskID(0), completed=fraction, description=step)
         with console.capture() as capture:

@@ -242,6 +242,7 @@ def doctor(
     servo_id: ServoId = None,
     fix: Annotated[bool, Option("--fix", help="Correct servo settings; saves the old ones.")] = False,
     restore: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
+    udev: Annotated[bool, Option("--udev", help="Print udev rules for the adapters and exit.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Diagnose the connected lidar and servo.
@@ -249,8 +250,12 @@ def doctor(
     Reads only, unless --fix or --restore is given.
     """
     from scanwright.firmware_io.scan import doctor as diagnosis
+    from scanwright.firmware_io.scan import host
     from scanwright.firmware_io.servo import settings
 
+    if udev:
+        print(host.udev_rules(), end="")
+        return
     if restore is not None:
         print_steps("", settings.restore(restore, servo))
         return
@@ -261,6 +266,8 @@ def doctor(
         hint = finding.hint
         if finding.code == diagnosis.SERVO_SETTING:
             hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
+        if finding.code in host.CURED_BY_RULES:
+            hint += " (`scanwright doctor --udev` prints them)"
         findings.append(replace(finding, hint=hint))
         if not as_json:
             print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)

@@ -28,14 +28,7 @@ class Commands(typer.Typer):
         self.title, self.first = title, first
 
     def command(self, name: str | None = None, *, example: str = "", no: str = "", **options: Any) -> Callable[[F], F]:
-        """As typer's own, with an epilog.
-
-        Args:
-            name: of the command; by default that of the function.
-            example: of its use, without the program.
-            no: what exit code 1 means; empty if the command does not use it.
-            options: as typer's own.
-        """
+        """As typer's own; the help ends with an `example` and the exit codes, of which 1 means `no` if given."""
         codes = ["0 done", *([f"1 {no}"] if no else []), "2 wrong input"]
         codes += ["3 device fault", "130 interrupted"] if self.title == "Devices" else ["130 interrupted"]
         epilog = f"Example: scanwright {example}\n\nExit codes: {'; '.join(codes)}"

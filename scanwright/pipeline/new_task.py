@@ -8,9 +8,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from scanwright.cad.layout.direct.adapter import adapter_of
-from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.layout import drive_of
+from scanwright.cad.layout.placement import drive_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
@@ -139,9 +137,7 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
         angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=ring.name)
         scanner = scanner_of(angles, "fdm-0.4", products)
         try:
-            stack = drive_of(scanner).stack
-            if isinstance(stack, DirectStack) and stack.bearing is None:
-                adapter_of(scanner, stack)
+            drive_of(scanner)
         except BuildError as error:
             why = str(error)
         else:

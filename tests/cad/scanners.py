@@ -1,5 +1,9 @@
 """Scanners that tests of several files take: of equal ones the fixture `parts_of` makes the parts once."""
 
+from scanwright.cad.layout import layout
+from scanwright.cad.layout.deck import deck_of
+from scanwright.cad.layout.placement import drive_of
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, linkage_body_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import NO_MODULES, scanner_of
@@ -24,3 +28,24 @@ def scanner_at(
         motion={"mode": "spin", "period_s": 18.0},
     )
     return scanner_of(angles, printer, load_catalogue(), modules=modules)
+
+
+def digest_of(scanner):
+    """The digest of everything that shapes the parts, without their layout."""
+    return layout.digest_of(scanner, drive_of(scanner))
+
+
+def mount_offset_mm(scanner):
+    """Where the mount puts the optical centre in the world."""
+    return deck_of(scanner, drive_of(scanner)).t_world_rot
+
+
+def bare_linkage(scanner):
+    """The linkage without ear and seats of cable ties."""
+    drive = drive_of(scanner)
+    return AlignmentLinkage.on(linkage_body_of(scanner, drive.envelope, drive.stack))
+
+
+def avoided(parts, *, turns):
+    """Space that cables must stay clear of."""
+    return [shape for part in parts if getattr(part, "turns", None) == turns for shape in part.avoid]

@@ -27,22 +27,16 @@ import time
 import numpy as np
 
 from scanwright.firmware_io.lidar.lidar import LidarFamily, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import SensorLine
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.emulators.lidar_line import LidarLine
 
 
-class Acme:
+class Acme(LineDriver):
     serial_number, firmware, model, scan_rate_hz, dropped, bad_packets = "1", "2", "ACME", 10.0, 0, 0
 
     def __init__(self, address, model, stamp_at):
-        self.address, self.rest, self.line = address, b"", SensorLine(address, 100)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, trace):
-        self.line.leave(self.stop, error)
+        self.address, self.rest, self._line = address, b"", SensorLine(address, 100)
 
     def condition(self):
         return ()
@@ -54,7 +48,7 @@ class Acme:
         pass
 
     def read(self, timeout_s=None):
-        lines, arrival_ns = self.line.hear(self.lines, time.monotonic() + (timeout_s or 5))
+        lines, arrival_ns = self._line.hear(self.lines, time.monotonic() + (timeout_s or 5))
         range_m = np.array(lines[-1].split(), np.float32) / 1000
         scan = Scan(
             stamp_ns=arrival_ns - 100_000_000, angle_min_rad=0.0, angle_increment_rad=-np.pi / 2,

@@ -169,8 +169,8 @@ def test_wrong_input_is_one_line():
         sw.load_task({"name": "x", "sensr": "UTM-30LX"})
     with pytest.raises(TaskError, match="four numbers in degrees"):
         sw.evaluate("uniform", (0, 90, 0))
-    with pytest.raises(RecordingError, match=r"'\.txt' is no format of clouds"):
-        sw.read_cloud("cloud.txt")
+    with pytest.raises(RecordingError, match=r"'\.docx' is not a format of clouds"):
+        sw.read_cloud("cloud.docx")
 
 
 def test_a_calibration_does_not_overwrite_the_angles_that_it_began_with(tmp_path):

@@ -10,12 +10,11 @@ from scanwright.cad.checks.limits import at_most, note, tidy, with_error
 from scanwright.cad.checks.loads.belt import belt_loads
 from scanwright.cad.checks.loads.direct import direct_loads
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.balance.counterweight import RUBS_NM
-from scanwright.cad.layout.balance.imbalance import keeps_flank, play_matters
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.drive import Stack
 from scanwright.cad.layout.loads import FAR_MM, Weight
 from scanwright.cad.layout.names import SERVO
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.counterweight import RUBS_NM
+from scanwright.cad.layout.rotor.imbalance import keeps_flank, play_matters
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
@@ -24,26 +23,23 @@ DEFAULT_PERIOD_S = 1.0  # if the angle set names no motion: the fastest turn of 
 BALANCE_AT_MM = 50.0  # from the axis, for which the message states a counterweight
 
 
-def mechanics_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) -> list[Finding]:
+def mechanics_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Finding]:
     """Check torques, backlash and loads.
 
     Args:
-        scanner: angles and products.
-        stack: its layout.
+        layout: of the scanner.
         bodies: of `masses.link_bodies`.
     """
+    scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
     error_m = off_axis_doubt_m(bodies)
     off = "centre of mass off the axis"
-    if isinstance(stack, BeltStack):
-        loads = belt_loads(scanner, stack, rotor, weight, spin_up_nm(scanner, rotor, weight))
-    else:
-        loads = direct_loads(scanner, stack, weight)
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * error_m),
         *_torques(scanner, rotor, weight, weight.across_n * error_m),
         _flanks(scanner, rotor, weight, error_m),
-        *loads,
+        *belt_loads(layout, rotor, weight, spin_up_nm(scanner, rotor, weight)),
+        *direct_loads(layout, weight),
     ]
 
 

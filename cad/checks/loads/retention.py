@@ -19,7 +19,6 @@ from scanwright.cad.checks.limits import at_least, tidy
 from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import DECK, LIDAR, TRIPOD
 from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
@@ -34,7 +33,7 @@ AXIAL_COS = 0.9  # to the rotation axis, above which a screw does not point at i
 
 def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
     """Check margin and thread engagement of each joint."""
-    return [check for joint in joints_of(assembly.layout) for check in _of_joint(scanner, assembly, joint)]
+    return [check for joint in assembly.layout.joints for check in _of_joint(scanner, assembly, joint)]
 
 
 def material_of(assembly: Assembly, body: str) -> Material:
@@ -50,7 +49,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
 def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
     """Return the parts and products that have no path to the deck but through a joint."""
     layout = assembly.layout
-    links = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in joints_of(layout) if other != joint]
+    links = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in layout.joints if other != joint]
     links += layout.drive.borne
     everything = {name for link in links for name in link} | {assembly.thing(joint.part), assembly.thing(joint.onto)}
     reached, fresh = {DECK, TRIPOD}, {DECK, TRIPOD}

@@ -100,7 +100,8 @@ def _joined(assembly: Assembly) -> str:
     """Return what to connect when all parts are together: leads with a path are connected in their own step."""
     if assembly.layout.scanner.slip_ring is None:
         return IN_A_LOOP
-    laid = assembly.leads and all(lead.path is not None for lead in assembly.leads)
+    leads = assembly.layout.leads
+    laid = leads and all(lead.path is not None for lead in leads)
     return TO_COMPUTER if laid else THROUGH_RING
 
 

@@ -44,10 +44,9 @@ def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
     widest = max((x for x, _ in free), default=0.0)
     ys = sorted(y for x, y in free if x == widest and (-x, y) in free)
     if len(ys) < 2:
-        doubt = servo.doubt("case_holes_mm")
         raise BuildError(
-            f"{DRIVE_PLATE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
-            f"pairs of front holes at least {least:.2f} mm from its axis, beside the pulley"
+            f"{DRIVE_PLATE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{servo.doubt('case_holes_mm')}: "
+            f"{servo.name} needs two pairs of front holes at least {least:.2f} mm from its axis, beside the pulley"
         )
     return DrivePlate(
         stack=stack,

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.envelope import hub_height, lidar_pose, rows_of
+from scanwright.cad.layout.envelope import Envelope, hub_height, rows_of
 from scanwright.cad.layout.hub import CUP_HUB_WALL
 from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array
 from scanwright.design.scanner import Scanner
 
 CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it
@@ -20,19 +21,15 @@ FLOOR = 4.0  # on the horn
 OVER_BOSS = 2.0  # of the horn: play, and a floor that is no skin
 
 
-def cup_stack(scanner: Scanner) -> DirectStack:
-    """Lay out the stack of one scanner without a ring and a bearing.
-
-    Raises:
-        BuildError: the lidar would hang upside down.
-    """
-    servo, R = scanner.servo, lidar_pose(scanner)
+def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
+    """Lay out the stack of one scanner without a ring and a bearing; R is the laser in the rotation frame, (3, 3)."""
+    servo = scanner.servo
     floor = max(FLOOR, servo.horn_boss_height_mm + OVER_BOSS)
     bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].head_room
     diameter = float(math.ceil(bore + 2 * CUP_WALL))
     hub_radius = diameter / 2 + CUP_HUB_WALL
     return DirectStack(
-        h=hub_height(scanner.lidar, R, hub_radius, 0.0),
+        h=hub_height(envelope, R, hub_radius, 0.0),
         R_rot_laser=rows_of(R),
         ring_length=0.0,
         ring_radius=0.0,

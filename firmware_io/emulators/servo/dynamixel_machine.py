@@ -21,11 +21,11 @@ from scanwright.firmware_io.emulators.servo.memory import ACCESS, RANGE, Memory
 from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
-_BOOT_S = 0.5
+_BOOT_S = 0.5  # [assumed]
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32  # bits of both protocols
-_BAUDS_2 = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
-_BAUDS_1_FAST = {250: 2_250_000, 251: 2_500_000, 252: 3_000_000}
+_BAUDS_2 = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)  # e-manual, by count
+_BAUDS_1_FAST = {250: 2_250_000, 251: 2_500_000, 252: 3_000_000}  # e-manual of MX: by count
 _ERRORS_1 = {RANGE: 8, ACCESS: 8}  # the others of protocol 2.0 are instruction errors in 1.0
 
 

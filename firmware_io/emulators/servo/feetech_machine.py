@@ -2,7 +2,7 @@
 
 Not published by the maker and therefore assumed: how long a restart takes, that a damaged request is not answered, that
 values beyond their bounds are not taken, and that an overload, which leaves the torque of register 34, ends when the
-torque is taken.
+torque is taken. A goal turns the torque on: the examples of the maker's SDK move a servo without writing register 40.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ from scanwright.firmware_io.emulators.servo.memory import Memory, TableItem, ro,
 from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
-_BOOT_S = 0.5
+_BOOT_S = 0.5  # [assumed]
 _VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32
-_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
+_BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)  # memory table of the STS, by count
 _PING, _READ, _WRITE, _REG_WRITE, _ACTION, _SYNC_READ, _SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
 _ID, _BAUD, _DELAY, _LEVEL, _OFFSET, _MODE, _TORQUE, _LOCK, _PRESENT = 5, 6, 7, 8, 31, 33, 40, 55, 56
+_GOALS = 42, 46  # position, or speed of a wheel
 _TO_CENTRE = 128  # written to the torque: the horn stands at 2048 from now on
 
 _ITEMS: tuple[TableItem, ...] = (
@@ -204,6 +205,9 @@ class FeetechMachine:
         memory.data[address : address + len(data)] = data
         if not memory[_LOCK]:
             self._unsaved.clear()
+        last = address + len(data) - 1
+        if not was_on and not address <= _TORQUE <= last and address <= _GOALS[memory[_MODE] == 1] <= last:
+            memory[_TORQUE] = 1
         if memory[_TORQUE] == _TO_CENTRE:
             memory[_OFFSET] = _sized(round(self.axis.motion(now_ns).angle_rad / self.table.position.unit), 11)
             memory[_TORQUE] = was_on

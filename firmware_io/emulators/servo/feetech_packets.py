@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from scanwright.firmware_io.emulators.servo.machine import Request
 
-_LONGEST = 250
+_LONGEST = 250  # of the length byte; more is damage
 
 
 def take(buffer: bytearray) -> Request | None:

@@ -9,7 +9,7 @@ from typing import Protocol
 from scanwright.firmware_io.emulators.dynamics import HornMotion
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
-BROADCAST = 254
+BROADCAST = 254  # e-manual; memory table of the STS
 
 
 @dataclass(frozen=True, slots=True)

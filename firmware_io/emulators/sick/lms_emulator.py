@@ -12,13 +12,13 @@ import numpy as np
 from scanwright.design.catalogue.products import Lidar
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 
-_NEVER_NS = 1 << 62
+_NEVER_NS = 1 << 62  # 146 years
 _BOOT_NS = 1_000_000_000  # [assumed]; a real one takes up to a minute until its motor is steady
-_TURN_NS = 1e9 / 75
-_MODES = (0x24, 0x25, 0x40, 0x41, 0x42, 0x48)
-_BAUDS = {0x40: 38_400, 0x41: 19_200, 0x42: 9600, 0x48: 500_000}
+_TURN_NS = 1e9 / 75  # of its mirror
+_MODES = (0x24, 0x25, 0x40, 0x41, 0x42, 0x48)  # of the command 0x20 that it knows
+_BAUDS = {0x40: 38_400, 0x41: 19_200, 0x42: 9600, 0x48: 500_000}  # by mode
 _HEAD = 8  # bytes of a telegram before its ranges
-_NO_RANGE = 0x1FFF
+_NO_RANGE = 0x1FFF  # code: too far
 
 
 def remainder(data: bytes) -> int:

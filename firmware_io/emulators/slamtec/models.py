@@ -13,7 +13,7 @@ from typing import Literal
 STANDARD, EXPRESS, ULTRA, DENSE = 0x81, 0x82, 0x84, 0x85  # types of packets
 
 _COUNT, _SAMPLE_US, _MAX_DISTANCE, _ANSWER, _TYPICAL, _NAME = 0x70, 0x71, 0x74, 0x75, 0x7C, 0x7F  # keys of GET_CONF
-_DESIRED_SPEED = 0x01
+_DESIRED_SPEED = 0x01  # key of GET_CONF
 _RPM, _PWM = 600, 660  # [assumed]: the SDK's defaults
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 _PARTS = ((3328, 16_384, 4), (1792, 4096, 3), (1280, 2048, 2), (512, 512, 1), (0, 0, 0))
 """Parts of the scale of an ultra capsule's major range: first count, first millimetre, bits of a count."""
 _NONE = 0x200  # of the ten bits of a predicted range: no return
-_LAST_PREDICTED = 510
+_LAST_PREDICTED = 510  # steps; 511 and -512 mean no return
 
 
 def reply(kind: int, data: bytes) -> bytes:

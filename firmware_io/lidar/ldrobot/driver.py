@@ -10,7 +10,6 @@ import math
 import time
 from collections import deque
 from fractions import Fraction
-from types import TracebackType
 
 import numpy as np
 
@@ -20,12 +19,12 @@ from scanwright.design.errors import DeviceError, DeviceTimeoutError
 from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
 from scanwright.firmware_io.lidar.ldrobot import protocol
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import SensorLine, until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine, until_back
 from scanwright.firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 
 FAMILY = "ldrobot"
 
-_BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}
+_BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
 _FIRST_PACKETS_S = 0.5  # it talks hundreds of times a second
 _TURN_S = 1.0  # without a turn: five of the slowest
 _SILENCE_NS = 500_000_000  # after which the sensor may have restarted
@@ -76,7 +75,7 @@ class _PacketClock:
         return (sum(self._begin) / len(self._begin) + self._number * self._period_ms) * 1e6
 
 
-class LdrobotLidar:
+class LdrobotLidar(LineDriver):
     """An LDROBOT lidar; `LidarDriver` says what its methods promise.
 
     Attributes:
@@ -101,14 +100,6 @@ class LdrobotLidar:
         self._line = SensorLine(address, 2 * protocol.SIZE)
         self._lidar = self._recognised(model)
         self._begin_anew()
-
-    def __enter__(self) -> LdrobotLidar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._line.leave(self.stop, error)
 
     @property
     def model(self) -> str:

@@ -16,12 +16,12 @@ from numpy import ndarray
 from scanwright.design.arrays import Float32s
 from scanwright.design.errors import ProtocolError
 
-POINTS = 12
-SIZE = 47
-STAMP_WRAP_MS = 30_000
+POINTS = 12  # of a packet; LD19 development manual
+SIZE = 47  # bytes of a packet; the same
+STAMP_WRAP_MS = 30_000  # the same
 HEAD = b"\x54\x2c"
 _TURN = 36_000  # hundredths of a degree
-_POLYNOMIAL = 0x4D
+_POLYNOMIAL = 0x4D  # of the CRC-8; the same
 _POINT = np.dtype([("range_mm", "<u2"), ("intensity", "u1")])
 
 

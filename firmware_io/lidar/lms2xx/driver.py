@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -20,24 +18,24 @@ from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeou
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.lms2xx import protocol
 from scanwright.firmware_io.lidar.lms2xx.telegram_count import TelegramCount
-from scanwright.firmware_io.lidar.sensor_line import SensorLine, until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine, until_back
 from scanwright.firmware_io.samples import Scan
 
 FAMILY = "lms2xx"
 
-_ANSWER_S = 0.5
-_STREAM_S = 0.1
+_ANSWER_S = 0.5  # 15 times what the bytes of an answer take at 9600 baud
+_STREAM_S = 0.1  # several turns of its mirror
 _MODE_S = 3.0  # it stops its stream, or answers at its new speed, after some turns
-_SCAN_S = 1.0
-_TRIES = 2
+_SCAN_S = 1.0  # 37 scans
+_TRIES = 2  # the first may meet its stream
 _FAST_BAUD, _USUAL_BAUD = 500_000, 38_400
-_POWER_UP_BAUD = 9600
-_BAUDS = (_POWER_UP_BAUD, _FAST_BAUD, _USUAL_BAUD, 19_200)
+_POWER_UP_BAUD = 9600  # after each power-up
+_BAUDS = (_POWER_UP_BAUD, _FAST_BAUD, _USUAL_BAUD, 19_200)  # all that it has, the likeliest first
 _TURN_S = 1 / 75  # of its mirror
 _PATIENCE = 8  # telegrams: a fifth of a second
 
 
-class LmsLidar:
+class LmsLidar(LineDriver):
     """An LMS 2xx; `LidarDriver` says what its methods promise.
 
     Attributes:
@@ -63,14 +61,6 @@ class LmsLidar:
         self._count: TelegramCount | None = None
         self._line = SensorLine(address, 2 * protocol.LONGEST)
         self._recognise(model, _BAUDS)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._line.leave(self.stop, error)
 
     @property
     def model(self) -> str:

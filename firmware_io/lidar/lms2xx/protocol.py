@@ -19,16 +19,16 @@ from numpy import ndarray
 from scanwright.design.errors import ProtocolError
 
 MODE, TYPE, VARIANT = 0x20, 0x3A, 0x3B
-ANSWER = 0x80
-SCAN = 0xB0
+ANSWER = 0x80  # set in the command of an answer
+SCAN = 0xB0  # 0x30 | ANSWER
 STREAM, ON_REQUEST = 0x24, 0x25
-BAUD_MODES = {9600: 0x42, 19_200: 0x41, 38_400: 0x40, 500_000: 0x48}
+BAUD_MODES = {9600: 0x42, 19_200: 0x41, 38_400: 0x40, 500_000: 0x48}  # values of MODE
 ACKNOWLEDGED, REFUSED = 0x06, 0x15
 
-POLLUTED = 0x80
+POLLUTED = 0x80  # bit of the status
 FATAL = 3  # severity in the three lowest bits: 0 well, 1 information, 2 warning, 3 error, 4 fatal error
-LONGEST = 812
-_STX = 0x02
+LONGEST = 812  # bytes of a telegram; sicktoolbox
+_STX = 0x02  # begins a telegram
 _OVERHEAD = 6  # start, address, length, sum
 _FIRST_CODE = 0x1FF7  # what is not less is no range: too far, dazzled, too weak
 

@@ -15,7 +15,7 @@ from scanwright.firmware_io.lidar.sensor_line import SensorLine
 _ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
 _TRIES = 3  # a first request may be glued to what a client before us left half said, which is answered by a refusal
 _BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
-_FASTER_BAUDS = (250_000, 500_000, 750_000)
+_FASTER_BAUDS = (250_000, 500_000, 750_000)  # SCIP 2.0, request SS
 
 
 class ScipDialogue:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from types import TracebackType
 
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.device_ports import lidar_ports
@@ -19,16 +18,16 @@ from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
 from scanwright.firmware_io.lidar.scip.dialogue import ScipDialogue
 from scanwright.firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
-from scanwright.firmware_io.lidar.sensor_line import until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
 
 _SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
-_EXCHANGES = 60
+_EXCHANGES = 60  # a second or so of them
 # of its captures, and of firmware of the EW and UST; what else a sensor says of its state is trouble
 _WELL = ("sensor works well", "stable 000 no error", "sensor is working normally")
 _WRONG_TIMES = ("1.16.02(19/Jan./2010)",)  # this firmware of the UTM-30LX answers TM1 with times 23 ms off its stamps
 
 
-class ScipLidar:
+class ScipLidar(LineDriver):
     """A SCIP lidar, opened, its laser off. `with` leaves it with the laser off and the port closed.
 
     Attributes:
@@ -64,21 +63,14 @@ class ScipLidar:
         self._skip = 0
         self._stamp_ms = -1
         self._dialogue = ScipDialogue(address)
-        with self._dialogue.line.closed_on_error():
+        self._line = self._dialogue.line
+        with self._line.closed_on_error():
             self.parameters = parameters.parameters(self.information("PP"))
             version = self.information("VV")
             self.serial_number = version.get("SERI", "")
             self.firmware = version.get("FIRM", "")
             self.sync = self._synchronise()
             self._clock = self._new_clock()
-
-    def __enter__(self) -> ScipLidar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._dialogue.line.leave(self.stop, error)
 
     @property
     def model(self) -> str:
@@ -146,7 +138,7 @@ class ScipLidar:
             if reply.echo[:-2] != self._request[:-2] or reply.status == "00":
                 continue
             if reply.status.isdigit() and 50 <= int(reply.status) <= 97:
-                raise DeviceError(f"{self._dialogue.line.name}: status {reply.status}: {reply.meaning()}")
+                raise DeviceError(f"{self._line.name}: status {reply.status}: {reply.meaning()}")
             if measurement.is_scan(reply):
                 try:
                     return self._raw(measurement.measurement(reply), arrival_ns)
@@ -187,7 +179,7 @@ class ScipLidar:
     def _find_at(self, address: str) -> None:
         """Talk to this very sensor there, its clock learnt anew, and scan on if it did."""
         self._dialogue.reopen(address)
-        with self._dialogue.line.closed_on_error():
+        with self._line.closed_on_error():
             if self.information("VV").get("SERI") != self.serial_number:
                 raise DeviceError(f"{address}: another lidar answers")
             self._counter.restart()  # a sensor that takes its power from the port has begun anew

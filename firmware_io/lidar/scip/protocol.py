@@ -25,7 +25,7 @@ from scanwright.design.errors import ProtocolError
 Integers = NDArray[np.int32]
 
 SCIP_2 = b"SCIP2.0"
-LINE_CHARACTERS = 64
+LINE_CHARACTERS = 64  # of data in a line; SCIP 2.0
 LONGEST_REPLY = 1 << 16  # five times the longest one, range and intensity of 2161 steps
 _REQUEST = rb"(?:VV|PP|II|BM|QT|R[STB]|TM\d|SS\d{6}|CR\d\d|HS\d|DB\d\d|SCIP2\.0|%S[LT]|[GH][DSE]\d{10}|[MN][DSE]\d{13})"
 _ECHO = re.compile(_REQUEST + rb"(?:;[\w .+@]{0,16})?")

@@ -25,7 +25,7 @@ _START_B = b"\x02\x02\x02\x02"
 _STX, _ETX = 0x02, 0x03
 _WORDS = (b"sRN", b"sRA", b"sWN", b"sWA", b"sMN", b"sMA", b"sAN", b"sEN", b"sEA", b"sSN", b"sFA")
 
-ERRORS = {
+ERRORS = {  # telegram listing 8014631, codes of sFA
     0x01: "access denied: login required",
     0x02: "unknown method",
     0x03: "unknown variable",

@@ -22,11 +22,11 @@ from scanwright.firmware_io.lidar.sick.values import Reader
 
 T = TypeVar("T")
 
-POLL_S = 0.1
+POLL_S = 0.1  # between two questions for a state
 
-_ANSWER_S = 0.5
+_ANSWER_S = 0.5  # long for Ethernet [assumed]
 _BUSY, _CONDITION = 0x0D, 0x04
-_UNKNOWN = (0x02, 0x03, 0x0B, 0x0C)
+_UNKNOWN = (0x02, 0x03, 0x0B, 0x0C)  # codes of sFA: method, variable or command
 _ANSWERS = {b"sRN": b"sRA", b"sWN": b"sWA", b"sMN": b"sAN", b"sEN": b"sEA"}
 
 

@@ -6,8 +6,6 @@ Written from documents; no sensor has been at the other end yet.
 from __future__ import annotations
 
 import time
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -16,19 +14,19 @@ from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.lidar.device_clock import DeviceClock, StampCounter
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
 from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
 from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
 from scanwright.firmware_io.samples import Scan
 
-_SCAN_S = 1.0
+_SCAN_S = 1.0  # 15 scans of the slowest
 _READY_S = 30.0  # a motor that was off takes ten seconds
 _CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
-_STLMS_READY = 7
+_STLMS_READY = 7  # state of STlms; telegram listing 8014631
 
 
-class SickLidar:
+class SickLidar(LineDriver):
     """A SICK lidar, opened; `with` leaves it stopped and its port closed.
 
     Attributes:
@@ -56,7 +54,8 @@ class SickLidar:
         self._started: tuple[bool, int] | None = None
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
         self._dialogue = ColaDialogue(address)
-        with self._dialogue.line.closed_on_error():
+        self._line = self._dialogue.line
+        with self._line.closed_on_error():
             identity = self._identity()
             known = [lidar.name for lidar in load_catalogue() if isinstance(lidar, Lidar) and lidar.family == "sick"]
             if model is None and identity[0] not in known:
@@ -69,14 +68,6 @@ class SickLidar:
             self.serial_number = self._serial_number()
         self._product = load_catalogue().get(self.model, Lidar)
         self._forget()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._dialogue.line.leave(self.stop, error)
 
     @property
     def scan_rate_hz(self) -> float:
@@ -174,7 +165,7 @@ class SickLidar:
 
         def connect() -> None:
             self._dialogue.reopen()
-            with self._dialogue.line.closed_on_error():
+            with self._line.closed_on_error():
                 if self._serial_number() != self.serial_number:
                     raise DeviceError(f"{self._name}: it has another serial number")
                 self._forget()
@@ -276,7 +267,7 @@ class SickLidar:
 
     @property
     def _name(self) -> str:
-        return self._dialogue.line.name
+        return self._line.name
 
 
 def open_sick(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SickLidar:

@@ -16,16 +16,16 @@ from scanwright.design.errors import ProtocolError
 from scanwright.firmware_io.lidar.sick.cola import Telegram, Writer
 from scanwright.firmware_io.lidar.sick.values import Reader
 
-WRAP_US = 1 << 32
-_ANGLE_UNIT_DEG = 1e-4
+WRAP_US = 1 << 32  # 32 bits
+_ANGLE_UNIT_DEG = 1e-4  # telegram listing: angles in 1/10,000 deg
 _FRONT_DEG = 90.0  # the sensor's angle of straight ahead
-_MOST_CHANNELS = 16
-_MOST_ENCODERS = 4
-_NAME = 5
+_MOST_CHANNELS = 16  # more are damage: no sensor has half of them
+_MOST_ENCODERS = 4  # more are damage
+_NAME = 5  # bytes of a channel's name, such as DIST1
 
-DIRT_WARNING = 0x02
-FAULT = 0x01
-DIRT = 0x04
+DIRT_WARNING = 0x02  # bit of the device status
+FAULT = 0x01  # bit of the device status
+DIRT = 0x04  # bit of the device status
 
 
 @dataclass(frozen=True, slots=True, eq=False)

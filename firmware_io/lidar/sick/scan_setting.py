@@ -6,6 +6,7 @@ from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.lidar.sick.dialogue import ColaDialogue, RefusedError
 
+# answers of mLMPsetscancfg
 _SET_UP = {1: "its scan frequency", 2: "its resolution", 3: "its scan frequency and resolution", 4: "its scan area"}
 
 

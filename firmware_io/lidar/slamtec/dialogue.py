@@ -13,7 +13,7 @@ from scanwright.design.errors import DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.lidar.sensor_line import SensorLine
 from scanwright.firmware_io.lidar.slamtec import protocol
 
-_ANSWER_S = 0.5
+_ANSWER_S = 0.5  # the SDK waits 2 s, long for a silent port
 
 Answer = TypeVar("Answer")
 

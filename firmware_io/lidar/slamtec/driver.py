@@ -9,13 +9,12 @@ import struct
 import time
 from contextlib import suppress
 from dataclasses import replace
-from types import TracebackType
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
 from scanwright.firmware_io.lidar.slamtec import protocol
 from scanwright.firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
@@ -24,15 +23,15 @@ from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
 
 _TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time
-_TRIES = 3
-_SILENCE_NS = 500_000_000
+_TRIES = 3  # the first may meet its stream
+_SILENCE_NS = 500_000_000  # five turns: it may have restarted
 _PAUSE_S = 0.1  # of the reader: what is lost in less than a turn is told by the angles
 _BUFFER_BYTES = 4095  # of a terminal (Linux, n_tty.c): nothing is lost before it is full
 _PWM = 660  # the SDK's default
-_RPM = 600
+_RPM = 600  # the SDK's default
 
 
-class SlamtecLidar:
+class SlamtecLidar(LineDriver):
     """An RPLIDAR; `LidarDriver` says what its methods promise.
 
     Attributes:
@@ -58,14 +57,6 @@ class SlamtecLidar:
         self._dialogue = SlamtecDialogue(address)
         self._line = self._dialogue.line
         self._recognise(model)
-
-    def __enter__(self) -> SlamtecLidar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._line.leave(self.stop, error)
 
     @property
     def model(self) -> str:

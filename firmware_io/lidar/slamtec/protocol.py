@@ -41,10 +41,10 @@ CONF_ANSWER: Final = 0x75
 CONF_TYPICAL: Final = 0x7C
 
 _MARK = b"\xa5\x5a"
-_DESCRIPTOR_SIZE = 7
-_LONGEST_REPLY = 512
+_DESCRIPTOR_SIZE = 7  # rplidar_sdk 2.1
+_LONGEST_REPLY = 512  # beyond it a descriptor is damage
 _CAPSULE_SIZE, _ULTRA_SIZE = 84, 132
-_NODE_SIZE = 5
+_NODE_SIZE = 5  # rplidar_sdk 2.1
 SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, ULTRA: _ULTRA_SIZE, DENSE: _CAPSULE_SIZE}
 POINTS: Final = {NODES: 1, CAPSULES: 32, ULTRA: 96, DENSE: 40}
 _SCALE_COUNT = np.array([0, 512, 1280, 1792, 3328])  # of an ultra capsule: where each part of its scale begins,

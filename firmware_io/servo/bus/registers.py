@@ -13,7 +13,7 @@ from typing import Literal
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 
-RPM = 2 * math.pi / 60
+RPM = 2 * math.pi / 60  # rad/s of a turn in a minute
 
 Sign = Literal["none", "twos"] | int
 

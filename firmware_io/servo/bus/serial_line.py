@@ -7,9 +7,9 @@ import time
 from scanwright.design.errors import ProtocolError
 from scanwright.firmware_io.serial_port import open_serial_port
 
-_MANY = 4096
+_MANY = 4096  # bytes, more than come in a moment
 _MOST_LATE = 512  # bytes: several of the longest answers
-_OVERSLEPT_S = 0.02
+_OVERSLEPT_S = 0.02  # a waiting process wakes up within some ms unless the computer is busy
 _SLICE_S = 0.005  # of one wait for bytes: pyserial sets the port up anew whenever its time-out is changed
 
 

@@ -20,13 +20,13 @@ from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, S
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
 _PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
-_EVERYONE = 254
+_EVERYONE = 254  # broadcast id; e-manual, protocol 1.0 and 2.0
 _CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
-_CHECKSUM_1 = 0b0001_0000
+_CHECKSUM_1 = 0b0001_0000  # bit of the error byte: the request arrived damaged
 _REFUSALS_1 = {2: "an angle beyond its limits", 8: "a value out of range", 64: "an instruction it does not know"}
 _HEADER, _STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
-_ALERT_2 = 0x80
-_CRC_2 = 3
+_ALERT_2 = 0x80  # bit of the error byte: see hardware_error
+_CRC_2 = 3  # error number: the request arrived damaged
 _REFUSALS_2 = {
     1: "it could not carry it out",
     2: "an instruction it does not know",

@@ -18,7 +18,7 @@ _PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
 _HEADER = b"\xff\xff"
 _SHORTEST = 6  # header, id, length, status, sum
 _LAST_ID = b"\xfd"
-_LONGEST = 250
+_LONGEST = 250  # of the length byte; more is damage
 
 
 def checksum(body: bytes) -> int:

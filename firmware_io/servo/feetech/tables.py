@@ -15,7 +15,7 @@ import math
 from scanwright.firmware_io.servo.bus.registers import ControlTable, Register
 from scanwright.firmware_io.servo.feetech.packets import STS
 
-_STEP_RAD = 2 * math.pi / 4096
+_STEP_RAD = 2 * math.pi / 4096  # of its encoder
 _MODE = Register(33, 1, name="mode")
 _LOWEST, _HIGHEST = Register(9, 2, name="min_angle_limit"), Register(11, 2, name="max_angle_limit")
 

@@ -23,8 +23,8 @@ from scanwright.cad.checks.products import known_errors
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
 from scanwright.cad.geometry.print_pose import print_pose
-from scanwright.cad.layout.balance.imbalance import keeps_flank
-from scanwright.cad.layout.direct.sizing import direct_stack
+from scanwright.cad.layout.placement import drive_of, placement_of
+from scanwright.cad.layout.rotor.imbalance import keeps_flank
 from scanwright.cad.solids import box, location, upright
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -195,9 +195,9 @@ def bodies(mass, z):
 def test_loads_against_hand_calculation():
     scanner = scanner_for(0, 90, 30, -30)
     alone = replace(scanner, bearings=())
-    stack = direct_stack(alone)
+    stack = drive_of(alone).stack
     lever = -stack.horn / 1000 - 0.030
-    found = {c.code: c for c in mechanics_checks(alone, direct_stack(alone), bodies(0.5, -0.030))}
+    found = {c.code: c for c in mechanics_checks(placement_of(alone), bodies(0.5, -0.030))}
     weight = 0.5 * 9.80665
     assert found["tilt_moment"].value == pytest.approx(weight * lever, rel=1e-3)
     assert found["tilt_moment"].severity == "error"
@@ -205,26 +205,26 @@ def test_loads_against_hand_calculation():
     about_axis = 0.5 * (0.03**2 + 0.012**2)
     assert found["spin_up_torque"].value == pytest.approx(weight * 0.012 + about_axis * 2 * np.pi / 0.2, rel=1e-3)
     assert found["axial_load"].value == pytest.approx(0, abs=1e-6)
-    held = {c.code: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.5, -0.030))}
+    held = {c.code: c for c in mechanics_checks(placement_of(scanner), bodies(0.5, -0.030))}
     assert held["tilt_moment"].severity == "ok" and held["bearing_load"].value > weight
     upright = scanner_for(0, 0, 30, -30)
-    heavy = {c.code: c.severity for c in mechanics_checks(upright, direct_stack(upright), bodies(3.0, -0.030))}
+    heavy = {c.code: c.severity for c in mechanics_checks(placement_of(upright), bodies(3.0, -0.030))}
     assert heavy["axial_load"] == "error"
 
 
 def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
     scanner = scanner_for(0, 90, 30, -30)
-    found = {c.code: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.5, -0.030))}["flanks"]
+    found = {c.code: c for c in mechanics_checks(placement_of(scanner), bodies(0.5, -0.030))}["flanks"]
     assert (found.severity, found.value) == ("warning", pytest.approx(0.5 * 9.80665 * 0.012, rel=1e-3))
     grams, at, azimuth = (
         float(n) for n in re.search(r"(\d+) g at (\d+) mm from the axis, (\d+) deg", found.hint).groups()
     )
     assert grams * at == pytest.approx(500 * 12, rel=0.01) and azimuth == 180  # the imbalance is at +x
     upright = scanner_for(0, 0, 30, -30)
-    found = {c.code: c for c in mechanics_checks(upright, direct_stack(upright), bodies(0.5, -0.030))}["flanks"]
+    found = {c.code: c for c in mechanics_checks(placement_of(upright), bodies(0.5, -0.030))}["flanks"]
     assert found.severity == "ok"
     exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.01}))
-    found = {c.code: c for c in mechanics_checks(exact, direct_stack(exact), bodies(0.5, -0.03))}["flanks"]
+    found = {c.code: c for c in mechanics_checks(placement_of(exact), bodies(0.5, -0.03))}["flanks"]
     assert found.severity == "note"
 
 
@@ -236,7 +236,7 @@ def test_what_nobody_tells_of_a_lidars_weight_is_told_with_every_torque(monkeypa
 
     def found(x_m):
         given = {"rot": Inertial(0.1, np.array([x_m, 0.0, -0.03]), inertia), "laser": lidar}
-        return {c.code: c for c in mechanics_checks(scanner, direct_stack(scanner), given)}
+        return {c.code: c for c in mechanics_checks(placement_of(scanner), given)}
 
     # 0.4 kg that may be 2 mm off, across a level axis; of 0.5 kg that turn it is 1.6 mm
     static = found(0.001)["static_torque"]
@@ -279,7 +279,7 @@ def test_large_numbers_are_written_in_full():
 
 def test_a_servo_without_a_rating_is_noted_not_passed():
     scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
-    found = {c.code: c for c in mechanics_checks(scanner, direct_stack(scanner), bodies(0.3, -0.03))}
+    found = {c.code: c for c in mechanics_checks(placement_of(scanner), bodies(0.3, -0.03))}
     for kind in ("tilt_moment", "axial_load"):
         assert (found[kind].severity, found[kind].limit) == ("note", None)
         assert "unrated by its maker" in found[kind].message

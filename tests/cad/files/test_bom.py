@@ -15,7 +15,6 @@ from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
 from scanwright.cad.layout.layout import layout_of
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
@@ -53,6 +52,7 @@ def test_prices_are_the_catalogues_and_unknown_ones_stay_empty(rows, made):
     assert float(total["total_usd"]) == sum(float(row["total_usd"]) for row in bought.values() if row["total_usd"])
     without = sum(row["total_usd"] == "" for row in rows)
     assert f"{without} rows without a price" in total["note"]
+    assert total["quantity"] == ""
 
 
 def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range(rows):
@@ -212,7 +212,7 @@ def upright(made):
 def test_what_a_scanner_does_not_have_is_not_listed(upright):
     scanner = replace(upright, slip_ring=None, lidar=upright.lidar.model_copy(update={"price_usd": None}))
     assembly = make_parts(scanner)
-    joints = joints_of(assembly.layout)
+    joints = assembly.layout.joints
     masses = dict.fromkeys(assembly.made, 1.0)
     items = items_of(scanner, assembly, joints, masses, "0123456789ab")
     assert "slip ring" not in {item.part for item in items}
@@ -230,13 +230,13 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
     scanner = scanner_at(TILTED, printer="fdm-0.4-insert")
     assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
-    joints = joints_of(assembly.layout)
+    joints = assembly.layout.joints
     held = {(joint.part, joint.onto): joint for joint in joints if joint.inserts}
     cage = held.pop(("bearing_cage", "slip_ring_adapter"))
     assert not held and cage.count == 4
     seats = [hole for hole in rounds["slip_ring_adapter"] if hole.hole and hole.diameter == 4.0]
     assert len(seats) == 4 and min(hole.length for hole in seats) > INSERT_LENGTH
-    by_threads = {(joint.part, joint.onto) for joint in joints_of(made.result.assembly.layout)}
+    by_threads = {(joint.part, joint.onto) for joint in made.result.assembly.layout.joints}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 4)]

@@ -10,10 +10,9 @@ from quick_tests import samples
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.clearance import clearance_checks
 from scanwright.cad.checks.loads.retention import retention_checks
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.direct.sizing import direct_stack
-from scanwright.cad.layout.joints import held_in
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.layout.joints import fixing_in
+from scanwright.cad.layout.placement import drive_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import SCREWS
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -41,8 +40,8 @@ def scanner_for(servo, lidar, ring, angles=TILTED):
 @pytest.mark.parametrize("lidar", ["UST-10LX", "URG-04LX", "UTM-30LX"])
 @pytest.mark.parametrize("ring", [*RINGS, None])
 def test_an_xm430_is_laid_out_with_every_ring_and_every_hokuyo(ring, lidar):
-    layout = layout_of(scanner_for("XM430-W350", lidar, ring))
-    assert {joint.onto for joint in joints_of(layout)} >= {"lidar_body", "servo_case", "servo_horn"} - (
+    layout = laid_out(scanner_for("XM430-W350", lidar, ring))
+    assert {joint.onto for joint in layout.joints} >= {"lidar_body", "servo_case", "servo_horn"} - (
         {"servo_horn"} if layout.drive.shaft == "main_shaft" else set()
     )
 
@@ -53,7 +52,7 @@ CUPS = [("STS3215", "UST-10LX", (0, 0, 60, -30)), ("XL330-M288", "LD06", TILTED)
 @pytest.mark.parametrize(("servo", "lidar", "angles"), samples(CUPS, CUPS[:1]))
 def test_without_a_ring_every_horn_gets_a_printed_cup_around_the_heads_of_its_screws(servo, lidar, angles):
     scanner = scanner_for(servo, lidar, None, angles)
-    stack, screw = direct_stack(scanner), SCREWS[scanner.servo.horn_screw]
+    stack, screw = drive_of(scanner).stack, SCREWS[scanner.servo.horn_screw]
     assert stack.cup_bore >= scanner.servo.horn_circle_mm + screw.head_diameter  # the heads pass it
     assembly = make_parts(scanner)
     assert {part.process for part in assembly.parts.values()} == {"printed"} and "horn_cup" in assembly.parts
@@ -66,9 +65,9 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
     """Read from the solids: the hole that the joint tells is there, and behind it the nut's room or the wall."""
     scanner = scanner_for("XL430-W250", "STL27L", None, (0, 0, 0, 50))
     scanner = replace(scanner, printer=CATALOGUE.products[printer])
-    stack, assembly = direct_stack(scanner), make_parts(scanner)
-    joint = next(joint for joint in joints_of(layout_of(scanner)) if joint.onto == "horn_cup")
-    assert [printer, held_in(joint.thread), joint.inserts] in (
+    stack, assembly = drive_of(scanner).stack, make_parts(scanner)
+    joint = next(joint for joint in laid_out(scanner).joints if joint.onto == "horn_cup")
+    assert [printer, fixing_in(joint.thread), joint.inserts] in (
         ["fdm-0.4", "trap", False],
         ["fdm-0.4-insert", "thread", True],
     )
@@ -90,17 +89,17 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
 
 
 def test_a_ring_still_asks_for_a_turned_shaft():
-    stack = direct_stack(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S"))
+    stack = drive_of(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S")).stack
     assert stack.cup_bore == 0 and stack.shaft_diameter == 12.0 and stack.shaft == "servo_shaft"
 
 
 def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
     with pytest.raises(BuildError, match=r"a circle of 14 mm \(nobody has verified it: measure yours\) leave 4.25"):
-        layout_of(scanner_for("STS3215", "UTM-30LX", "UH1256-02-0610-06S"))
+        laid_out(scanner_for("STS3215", "UTM-30LX", "UH1256-02-0610-06S"))
     with pytest.raises(
         BuildError, match=r"-32.75\)\] \(nobody has verified it: measure yours\): STS3215 needs two pairs"
     ):
-        layout_of(scanner_for("STS3215", "UST-10LX", None))
+        laid_out(scanner_for("STS3215", "UST-10LX", None))
 
 
 @pytest.mark.parametrize(
@@ -117,4 +116,4 @@ def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
 def test_a_servo_that_the_parts_cannot_hold_is_refused_with_the_value_in_the_way(ring, changed, why):
     scanner = scanner_for("MX-64R", "LD06", ring)
     with pytest.raises(BuildError, match=why):
-        layout_of(replace(scanner, servo=scanner.servo.model_copy(update=changed)))
+        laid_out(replace(scanner, servo=scanner.servo.model_copy(update=changed)))

@@ -33,6 +33,7 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import homogeneity, log_density
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.search.search import search
@@ -199,7 +200,7 @@ def test_what_sees_nothing_is_blind_to_all_of_the_weight_and_no_more(ceiling, ro
 
 
 def test_what_j_alone_would_take_is_told_without_a_table():
-    optimum = find_optimum(load_task(Path("ground_ahead")), lambda _: None)
+    optimum = find_optimum(load_task(Path("ground_ahead")), no_progress)
     (first, *_), (alone, *_) = optimum.hole_lines(), optimum.hole_lines(tabled=False)
     assert first.endswith("would take the last row of the table")
     assert re.search(r"would take \(0, -5\d.*\) with J = -6\.12\d\d$", alone)

@@ -90,10 +90,10 @@ def stop_and_go():
     return JointLog(START + np.rint(seconds * 1e9).astype(np.int64), np.floor(seconds) * 0.1)
 
 
-def noise_about_a_corner():
+def slipped():
     log, _ = turning(20)
     position = log.position_rad.copy()
-    position[500] += 1.0  # one wrong reading
+    position[500:] += 0.3
     return JointLog(log.time_ns, position)
 
 
@@ -110,7 +110,7 @@ def stamped_when_received():
     [
         (turning(20)[0], True, "held during each scan"),
         (turning(20, duration_s=0.3)[0], False, "30 samples are too few"),
-        (noise_about_a_corner(), False, "they jump: one lies"),
+        (slipped(), False, "straight between samples ("),
         (stamped_when_received(), False, "rms off a smooth curve, more than their steps explain"),
         (stop_and_go(), False, "rests 1.1 s on each value: does the axis stop"),
     ],
@@ -119,6 +119,18 @@ def test_where_smoothing_would_invent_it_goes_straight_and_says_why(log, at_rest
     curve, said = axis_curve(log, at_rest=at_rest)
     assert says in said
     np.testing.assert_allclose(curve.angle_at(log.time_ns), log.position_rad, atol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [[500], [500, 501, 700], range(20, 980, 25)], ids=["one", "three", "every 25th"])
+def test_wrong_readings_are_rejected_and_named(wrong):
+    log, truth = turning(20)
+    position = log.position_rad.copy()
+    position[list(wrong)] = 3.0 * np.random.default_rng(0).choice([-1, 1], len(wrong))
+    spoilt = JointLog(log.time_ns, position)
+    curve, said = axis_curve(spoilt, at_rest=False)
+    assert off_rad(curve, log, truth) < 1.3 * off_rad(axis_curve(log, at_rest=False)[0], log, truth)
+    named = (log.time_ns[wrong[0]] - log.time_ns[0]) / 1e9
+    assert f"rejected {len(wrong)} of {log.time_ns.size} angles, at {named:.2f}" in said
 
 
 def test_a_gap_in_the_log_does_not_break_the_fit():

@@ -144,6 +144,6 @@ def test_a_moving_scanner_has_seen_each_point_from_where_it_was():
 def test_what_cannot_be_done_is_said_and_nothing_is_written(recording, tmp_path, options, says):
     with pytest.raises(RecordingError, match=says):
         api.assemble(recording, ANGLES, tmp_path / "c.ply", **options)
-    with pytest.raises(RecordingError, match="is no format of clouds"):
+    with pytest.raises(RecordingError, match="is not a format of clouds"):
         api.assemble(recording, ANGLES, tmp_path / "c.png")
     assert not list(tmp_path.iterdir())

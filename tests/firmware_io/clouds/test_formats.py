@@ -78,19 +78,19 @@ def test_clouds_are_flat_unless_their_format_says_what_rows_and_columns_are(tmp_
         assert said == []
         return
     assert (back.shape, back.valid.all(), len(back.points_m)) == ((1, 29), True, 29)
-    assert said[:2] == ["left out 6 rows without a point", "the shape 5 x 7 is lost (pcd, e57 and npz keep it)"]
+    assert said[:2] == ["dropped 6 rows without a point", "the shape 5 x 7 is lost (pcd, e57, npz keep it)"]
     if suffix in EXACT:
         same(back, cloud.flat())
     # rows without a point in a cloud without a shape say nothing in any format
     loose = Cloud(cloud.points_m, cloud.columns)
     back, said = through(tmp_path, loose, suffix)
-    assert (len(back.points_m), said[0]) == (29, "left out 6 rows without a point")
+    assert (len(back.points_m), said[0]) == (29, "dropped 6 rows without a point")
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_an_organised_cloud_is_refused_where_it_cannot_be(tmp_path, suffix):
     path = tmp_path / f"c.{suffix}"
-    says = "LAS holds points" if suffix in ("las", "laz") else "the cloud is flat"
+    says = "holds points, no rows and columns" if suffix in ("las", "laz") else "the cloud is flat"
     with pytest.raises(RecordingError, match=rf"c\.{suffix}: .*{says}"):
         write_clouds(path, [Cloud(np.ones((3, 3)))], organised=True)
     with pytest.raises(RecordingError, match=rf"c\.{suffix}: none of the 3 rows of cloud 1 is a point"):
@@ -360,5 +360,5 @@ def test_rubbish_is_one_line(tmp_path, suffix):
 
 
 def test_an_unknown_format_is_one_line(tmp_path):
-    with pytest.raises(RecordingError, match=r"'\.plyy' is no format of clouds; did you mean '\.ply'"):
+    with pytest.raises(RecordingError, match=r"'\.plyy' is not a format of clouds; did you mean 'ply'"):
         write_clouds(tmp_path / "c.plyy", [some_cloud()])

@@ -65,13 +65,16 @@ def good(tmp_path):
 
 BROKEN = {
     "not a PLY file": lambda data: b"hello\n" + data,
-    "format ascii": lambda data: data.replace(b"binary_little_endian", b"ascii"),
-    "'property list uchar int vertex_indices' in the header": lambda data: data.replace(
+    r"line 13: '.*': not numbers": lambda data: data.replace(b"binary_little_endian", b"ascii"),
+    "line 12: 'property float19 w': unknown type": lambda data: data.replace(
+        b"end_header", b"property float19 w\nend_header"
+    ),
+    "the properties of vertex are .* and no lists": lambda data: data.replace(
         b"end_header", b"property list uchar int vertex_indices\nend_header"
     ),
     "no 'end_header' in the first 4 bytes": lambda data: data[:4],
     "10 rows of 34 bytes announced": lambda data: data[:-1],
-    "0 rows of 34 bytes announced": lambda data: data.replace(b"vertex 10", b"vertex 0"),
+    "vertex has 0 rows": lambda data: data.replace(b"vertex 10", b"vertex 0"),
 }
 
 

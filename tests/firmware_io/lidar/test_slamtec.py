@@ -3,6 +3,7 @@
 import socket
 import time
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
-from scanwright.firmware_io.emulators.slamtec import machine
+from scanwright.firmware_io.emulators import world
 from scanwright.firmware_io.emulators.slamtec.machine import SlamtecEmulator
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import open_lidar
@@ -46,7 +47,7 @@ def patience(monkeypatch):
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
-    monkeypatch.setattr(machine, "_SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
+    monkeypatch.setattr(world, "SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
 
 
 def lidar(model):
@@ -87,6 +88,63 @@ def test_a_emulator_answers_published_requests_with_published_descriptors():
         assert told[:7] == bytes.fromhex(published[0]) and (len(told), rest) == (7 + size, b"")
     wrong, _ = emulator.machine.hear(bytes.fromhex("A5 82 05 00 00 00 00 00 23"), emulator.machine.began_ns)
     assert wrong == b""
+
+
+# What ultra_simple of rplidar_sdk 2.1 sends to an A1 and an S2, and the answers that it needs.
+SDK_DIALOGUES = {
+    "RPLIDAR A1": [
+        ("A5 50", "A5 5A 14 00 00 00 04 18 1D 01 07"),
+        ("A5 52", "A5 5A 03 00 00 00 06 00 00 00"),
+        ("A5 84 04 01 00 00 00 24", "A5 5A 08 00 00 00 20 01 00 00 00 58 02 94 02"),
+        ("A5 84 04 7C 00 00 00 59", "A5 5A 06 00 00 00 20 7C 00 00 00 03 00"),
+        ("A5 84 06 71 00 00 00 03 00 55", "A5 5A 08 00 00 00 20 71 00 00 00 00 7F 00 00"),
+        ("A5 84 06 74 00 00 00 03 00 50", "A5 5A 08 00 00 00 20 74 00 00 00 00 0C 00 00"),
+        ("A5 84 06 75 00 00 00 03 00 51", "A5 5A 05 00 00 00 20 75 00 00 00 84"),
+        ("A5 84 06 7F 00 00 00 03 00 5B", "A5 5A 10 00 00 00 20 7F 00 00 00" + b"Sensitivity\0".hex()),
+        ("A5 82 05 03 00 00 00 00 21", "A5 5A 84 00 00 40 84"),
+        ("A5 25", ""),
+        ("A5 21", "A5 5A 05 00 00 40 81"),
+    ],
+    "RPLIDAR S2": [
+        ("A5 84 04 7C 00 00 00 59", "A5 5A 06 00 00 00 20 7C 00 00 00 01 00"),
+        ("A5 84 06 71 00 00 00 01 00 57", "A5 5A 08 00 00 00 20 71 00 00 00 40 1F 00 00"),
+        ("A5 84 06 75 00 00 00 01 00 53", "A5 5A 05 00 00 00 20 75 00 00 00 85"),
+        ("A5 A8 02 58 02 55", ""),
+        ("A5 82 05 01 00 00 00 00 23", "A5 5A 54 00 00 40 85"),
+        ("A5 84 06 71 00 00 00 07 00 51", ""),
+    ],
+    "RPLIDAR A3": [("A5 FF 04 00 00 00 00 5E", "A5 5A 04 00 00 00 FF 01 00 00 00"), ("A5 F0 02 94 02 C1", "")],
+}
+
+
+@pytest.mark.parametrize("model", sorted(SDK_DIALOGUES))
+def test_an_emulator_answers_what_the_makers_program_asks(model):
+    emulator = SlamtecEmulator(lidar(model), ranging)
+    for request, answer in SDK_DIALOGUES[model]:
+        got, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
+        assert got[: len(bytes.fromhex(answer))] == bytes.fromhex(answer), request
+        assert bool(got) == bool(answer) and rest == b""
+
+
+def test_a_serial_line_sends_no_faster_than_it_can():
+    for model, identity in IDENTITIES.items():
+        emulator = SlamtecEmulator(lidar(model), ranging)
+        for number, mode in enumerate(identity.modes):
+            command = protocol.SCAN if mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
+            request = protocol.request(command, bytes([number, 0, 0, 0, 0]))
+            emulator.machine.hear(request, emulator.machine.began_ns)
+            sent = [one for _ in range(60) for one in emulator.machine.next_packets()]
+            bytes_s = sum(len(data) for _, data in sent[1:]) * 1e9 / (sent[-1][0] - sent[0][0])
+            assert bytes_s < 1.0001 * identity.baud / 10, (model, mode.name)
+
+
+def test_old_firmware_streams_express_capsules():
+    """Before 1.24 it does not answer GET_LIDAR_CONF; it states the time between two points instead."""
+    with SlamtecEmulator(lidar("RPLIDAR A1"), ranging) as emulator:
+        emulator.machine.identity = replace(IDENTITIES["RPLIDAR A1"], firmware=(1, 20), modes=())
+        with open_lidar(emulator.port, "RPLIDAR A1") as ours:
+            ours.start()
+            assert ours.firmware == "1.20" and 680 < ours.read().scan.range_m.size < 760
 
 
 def test_a_node_is_read_by_its_bits():

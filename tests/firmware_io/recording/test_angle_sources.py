@@ -149,14 +149,14 @@ def bag(tmp_path):
                     angle_min=-0.5,
                     angle_max=0.5,
                     angle_increment=0.5,
-                    time_increment=0.01,
+                    time_increment=0.05 / (2 * np.pi),
                     scan_time=0.1,
                     range_min=0.1,
                     range_max=9.0,
-                    ranges=np.ones(3, np.float32),
+                    ranges=np.array([0.5, 1.0, 2 + k / 100], np.float32),
                     intensities=np.empty(0, np.float32),
                 )
-                write("/scan", now + 1_000_000, scan)
+                write("/scan", now + 18_000_000, scan)
     return tmp_path / "in.bag"
 
 
@@ -182,7 +182,8 @@ def test_every_source_gives_the_same_log(bag, tmp_path, source):
         ("/scan", "/joints:pan_joynt", "rad", r"/joints: no joint 'pan_joynt'; did you mean 'pan_joint'"),
         ("/scan", "/tf:base:lasr", None, r"/tf:base:lasr: nothing usable: it has no such message"),
         ("/scan", "/joints:base:laser", None, r"/joints holds no transforms"),
-        ("/scan", "/joints", None, "angle unit: write deg or rad"),
+        ("/scan", "/joints:wheel", None, "angle_unit: write deg or rad"),
+        ("/scan", "/joints", "rad", "joints wheel, pan_joint: name one, such as /joints:pan_joint"),
         ("/scan", "absent.csv", "deg", r"absent\.csv: cannot read the angles"),
     ],
 )

@@ -67,6 +67,16 @@ def test_fractions_become_one_bar_with_the_time_that_is_left(screen):
     assert screen.lines() == ["  .. reading the task", "done", ""]
 
 
+def test_a_bar_that_begins_late_estimates_from_there_on(screen):
+    screen, clock = screen(), Clock()
+    progress = ConsoleProgress(clock)
+    for fraction in (0.5, 0.5, 0.75):
+        progress("writing", fraction)
+        assert fraction == 0.75 or " 50% -:--:-- writing" in screen.lines()[-1]
+        clock.now_s += 10
+    assert " 75% 0:00:20 writing" in screen.lines()[-1]
+
+
 def test_a_bar_begins_anew_with_other_work(screen):
     screen, clock = screen(), Clock()
     progress = ConsoleProgress(clock)

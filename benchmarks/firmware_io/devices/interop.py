@@ -1,0 +1,252 @@
+"""Other people's programs against the emulated devices: one row for each program and model.
+
+    python -m benchmarks.firmware_io.devices.interop [sdk=ULTRA_SIMPLE] [urg=SAMPLES] [ldlidar=SOURCES] [python=PYTHON]
+
+`sdk` is the program ultra_simple of rplidar_sdk, `urg` the folder samples/c of urg_library (both built), `ldlidar` the
+folder ldlidar_driver of ldlidar_stl_ros2 (compiled here, which needs g++), `python` an interpreter with the packages
+rplidar-roboticia, pyrplidar, lds2d, ftservo-python-sdk, rustypot and dynamixel-sdk. Each lidar stands before a wall
+whose distance is known in every direction; what a program prints is compared with that. Each servo is moved by half a
+radian. A row fails if a program prints too little or something else.
+"""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+
+import numpy as np
+
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import Lidar
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
+from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
+from scanwright.firmware_io.lidar.families import family_of
+
+_RUN_S = 10.0
+_FEWEST = 1000  # points
+_WITHIN_MM = 10.0  # of the wall, at the median
+_BAUDS = {"STS3215": 1_000_000, "AX-12A": 1_000_000}  # from the factory; the others have 57,600
+_SERVO_WITHIN_RAD = 0.03  # AX-12A: compliance of 1 step, and a load of none
+_RPLIDARS = tuple(IDENTITIES)
+
+_NO_DTR = "import sys, serial\nserial.Serial._update_dtr_state = lambda self: None  # a pseudo-terminal has none\n"
+_ROBOTICIA = """
+from rplidar import RPLidar
+lidar = RPLidar(sys.argv[1], int(sys.argv[2]))
+for _, _, angle, mm in lidar.iter_measures("KIND", max_buf_meas=False):
+    print(angle, mm, flush=True)
+"""
+_PYRPLIDAR = """
+from pyrplidar import PyRPlidar
+lidar = PyRPlidar()
+lidar.connect(sys.argv[1], int(sys.argv[2]))
+lidar.set_motor_pwm(660)
+lidar.get_scan_modes()
+mode = lidar.get_scan_mode_typical()
+scan = lidar.start_scan_express(mode) if mode else lidar.start_scan()
+for point in scan():
+    print(point.angle, point.distance, flush=True)
+"""
+_LDS2D = """
+from lds2d import Lidar
+with Lidar.open(sys.argv[3].replace(" ", "-"), sys.argv[1], int(sys.argv[2])) as lidar:
+    lidar.start()
+    for point in lidar.points():
+        print(point.angle_deg, point.dist_mm, flush=True)
+"""
+_FTSERVO = """
+from scservo_sdk import PortHandler, sms_sts
+port = PortHandler(sys.argv[1])
+port.openPort(), port.setBaudRate(int(sys.argv[2]))
+servo = sms_sts(port)
+before = servo.ReadPos(1)[0]
+servo.WritePosEx(1, before + 326, 2000, 50)
+time.sleep(2)
+print(servo.ReadPos(1)[0] - before)
+"""
+_RUSTYPOT = """
+import rustypot
+kind = {"STS3215": "Sts3215", "MX-64R": "Mx", "AX-12A": "Ax"}.get(sys.argv[3], "Xl430")
+servo = getattr(rustypot, kind + "PyController")(sys.argv[1], int(sys.argv[2]), 0.5)
+before = servo.sync_read_present_position([1])[0] if kind == "Xl430" else servo.read_present_position(1)
+before = before[0] if isinstance(before, list) else before
+servo.write_torque_enable(1, 1 if kind == "Xl430" else True)
+servo.write_goal_position(1, before + (326 if kind == "Xl430" else 0.5))  # one of them counts
+time.sleep(2)
+print(before)
+"""
+_DYNAMIXEL = """
+from dynamixel_sdk import PacketHandler, PortHandler
+port = PortHandler(sys.argv[1])
+port.openPort(), port.setBaudRate(int(sys.argv[2]))
+torque, goal, size = (24, 30, 2) if sys.argv[3] in ("MX-64R", "AX-12A") else (64, 116, 4)
+bus = PacketHandler(2.0 if size == 4 else 1.0)
+bus.write1ByteTxRx(port, 1, torque, 1)
+middle, step = (512, 0.00511) if sys.argv[3] == "AX-12A" else (2048, 0.001534)
+getattr(bus, f"write{size}ByteTxRx")(port, 1, goal, middle + round(0.5 / step))
+time.sleep(2)
+print(bus.ping(port, 1))
+"""
+_SERVOS = {
+    "ftservo-python-sdk": (_FTSERVO, ("STS3215",)),
+    "rustypot": (_RUSTYPOT, ("STS3215", "XM430-W350", "MX-64R", "AX-12A")),
+    "dynamixel-sdk": (_DYNAMIXEL, ("XM430-W350", "MX-64R", "AX-12A")),
+}
+_LDLIDAR = """
+#include <chrono>
+#include <cstdio>
+#include <thread>
+#include "ldlidar_driver.h"
+int main(int, char **argv) {
+  ldlidar::LDLidarDriver driver;
+  driver.RegisterGetTimestampFunctional([] {
+    return (uint64_t)std::chrono::steady_clock::now().time_since_epoch().count();
+  });
+  driver.EnableFilterAlgorithnmProcess(false);
+  if (!driver.Start(ldlidar::LDType::LD_19, argv[1], atoi(argv[2]))) return 1;
+  for (;;) {
+    ldlidar::Points2D points;
+    if (driver.GetLaserScanData(points, 1500) == ldlidar::LidarStatus::NORMAL)
+      for (auto &point : points) printf("%f %d\\n", point.angle, point.distance);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Client:
+    """A program.
+
+    Attributes:
+        name: of it.
+        models: that it should run with.
+        command: its arguments, in which PORT, BAUD and MODEL stand for those of an emulator.
+        pattern: matches angle [deg] and distance [mm] in what it prints, or a distance straight ahead.
+    """
+
+    name: str
+    models: tuple[str, ...]
+    command: tuple[str, ...]
+    pattern: str = r"^(-?[\d.]+) ([\d.]+)$"
+
+
+def wall_mm(bearing_rad: Floats) -> Floats:
+    """Distance of the wall."""
+    return 2000.0 + 1000.0 * np.sin(bearing_rad)
+
+
+def _ranging(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
+    return wall_mm(bearing_rad) / 1e3, np.full(time_ns.size, 200.0)
+
+
+def _baud(model: str) -> int:
+    return IDENTITIES[model].baud if model in IDENTITIES else 921_600 if model == "STL27L" else 230_400
+
+
+def clients(paths: dict[str, str], folder: Path) -> Iterator[Client]:
+    """Return the programs at the paths that are given; `folder` is for what must be compiled."""
+    if program := paths.get("sdk"):
+        pattern = r"theta: ([\d.]+) Dist: ([\d.]+)"
+        yield Client("rplidar_sdk", _RPLIDARS, (program, "--channel", "--serial", "PORT", "BAUD"), pattern)
+    if python := paths.get("python"):
+        scripts = {
+            "rplidar-roboticia, normal": (_ROBOTICIA.replace("KIND", "normal"), _RPLIDARS),
+            "rplidar-roboticia, express": (_ROBOTICIA.replace("KIND", "express"), _RPLIDARS[:4]),
+            "pyrplidar": (_PYRPLIDAR, (*_RPLIDARS[:3], "RPLIDAR C1")),  # 0.1.2 swaps the bytes of dense capsules
+            "lds2d": (_LDS2D, ("LD06", "LD19", "RPLIDAR A1", "RPLIDAR C1")),
+        }
+        for name, (script, models) in scripts.items():
+            yield Client(name, models, (python, "-c", _NO_DTR + script, "PORT", "BAUD", "MODEL"))
+    if samples := paths.get("urg"):
+        usb, ahead = ("URG-04LX", "URG-04LX-UG01", "UTM-30LX"), r"^()(\d+) \[mm\]"
+        for name in ("get_distance", "get_distance_handshake", "sync_time_stamp"):
+            pattern = ahead if name != "sync_time_stamp" else r"^()()\d+"
+            yield Client(f"urg_library, {name}", usb, (str(Path(samples, name)), "-s", "PORT"), pattern)
+    if sources := paths.get("ldlidar"):
+        (folder / "main.cpp").write_text(_LDLIDAR)
+        includes = [f"-I{path}" for path in Path(sources, "include").iterdir()]
+        units = [str(path) for path in Path(sources, "src").rglob("*.cpp")]
+        program = str(folder / "ldlidar")
+        subprocess.run(
+            ["g++", "-O1", "-pthread", "-include", "pthread.h", *includes, folder / "main.cpp", *units, "-o", program],
+            check=True,
+        )
+        yield Client("ldlidar", ("LD06", "LD19"), (program, "PORT", "BAUD"))
+
+
+def result(client: Client, model: str, folder: Path) -> tuple[bool, str]:
+    """Run a program against a model; whether it works, and a note."""
+    lidar, log = load_catalogue().get(model, Lidar), folder / "log"
+    emulator = resolve_name(family_of(model).emulator)(lidar, _ranging, 0)
+    with emulator, log.open("w") as out:
+        values = {"PORT": emulator.port, "BAUD": str(_baud(model)), "MODEL": model}
+        command = ["stdbuf", "-oL", *(values.get(part, part) for part in client.command)]
+        program = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, cwd=folder)
+        with suppress(subprocess.TimeoutExpired):
+            program.wait(_RUN_S)
+        program.send_signal(signal.SIGINT)
+        with suppress(subprocess.TimeoutExpired):
+            program.wait(5.0)
+        program.kill()
+        program.wait()
+    text = log.read_text(errors="replace")
+    found = re.findall(client.pattern, text, re.MULTILINE)
+    last = (text.strip().splitlines() or ["nothing printed"])[-1][:60]
+    if found and not found[0][1]:
+        return len(found) > 3, f"{len(found)} answers"
+    points = np.array([(float(angle or 0), float(mm)) for angle, mm in found]).reshape(-1, 2)
+    points = points[points[:, 1] > 0]
+    if found and not found[0][0]:
+        off_mm = float(np.abs(points[:, 1] - wall_mm(np.zeros(1))).max())
+        return off_mm < _WITHIN_MM and len(points) > 3, f"{len(points)} scans, {off_mm:.0f} mm off the wall at most"
+    if len(points) < _FEWEST:
+        return False, f"{len(points)} points: {last}"
+    off = [np.median(np.abs(points[:, 1] - wall_mm(sign * np.radians(points[:, 0])))) for sign in (-1, 1)]
+    return min(off) < _WITHIN_MM, f"{len(points):,} points, {min(off):.1f} mm off the wall at the median"
+
+
+def moved(python: str, script: str, model: str) -> tuple[bool, str]:
+    """Let a program move an emulated servo by half a radian; whether it did, and a note."""
+    with ServoEmulator(model) as servo:
+        baud = str(_BAUDS.get(model, 57_600))
+        command = [python, "-c", "import sys, time" + script, servo.port, baud, model]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        turned_rad = abs(servo.axis.motion(time.monotonic_ns()).angle_rad)
+    note = f"the horn turned by {turned_rad:.3f} rad"
+    if ended.returncode:
+        note = (ended.stderr.strip().splitlines() or ["it failed"])[-1][:60]
+    return ended.returncode == 0 and abs(turned_rad - 0.5) < _SERVO_WITHIN_RAD, note
+
+
+def main() -> int:
+    """Run every program whose path is given, and print a table."""
+    paths = dict(argument.split("=", 1) for argument in sys.argv[1:])
+    failed = False
+    print("| program | model | works | in 10 s |\n| --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as folder:
+        for client in clients(paths, Path(folder)):
+            for model in client.models:
+                works, note = result(client, model, Path(folder))
+                failed |= not works
+                print(f"| {client.name} | {model} | {'yes' if works else 'no'} | {note} |", flush=True)
+    for name, (script, models) in _SERVOS.items() if "python" in paths else ():
+        for model in models:
+            works, note = moved(paths["python"], script, model)
+            failed |= not works
+            print(f"| {name} | {model} | {'yes' if works else 'no'} | {note} |", flush=True)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

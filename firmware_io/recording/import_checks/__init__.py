@@ -1,0 +1,1 @@
+"""Checks of other people's recordings at import, and the corrections that they offer."""

@@ -1,0 +1,118 @@
+"""Angles of the axis: values that no axis can have between its neighbours, and repeated stamps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
+
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.findings import Finding
+from scanwright.firmware_io.recording.import_checks.headers import AT_M
+from scanwright.firmware_io.samples import JointLog
+
+_REACH = 4  # neighbours on each side
+_FAR_SHARE = 0.85  # of the neighbours: at a step of an axis that stops half of them are far
+_LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are smaller
+_STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
+_SIGMAS = 8.0  # of the differences to the neighbours: noise alone never gets there
+_MOVING_RAD_S = math.radians(1.0)  # slower than any sweep
+_FASTEST = 4.0  # times the usual speed: no servo jumps to it for one sample
+
+
+def usual_speed_rad_s(log: JointLog) -> float:
+    """Return the usual speed of the axis while it moves; 0 if it never does."""
+    seconds = np.diff(log.time_ns) / 1e9
+    speed = np.abs(np.diff(log.position_rad)) / seconds
+    moving = speed > _MOVING_RAD_S
+    return float(np.median(speed[moving])) if moving.any() else 0.0
+
+
+def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
+    """Return which positions lie far off their neighbours, and by how much [rad], shape (n,) each.
+
+    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near.
+    """
+    count = position_rad.size
+    wrong, off = np.zeros(count, bool), np.zeros(count)
+    if count <= 2 * _REACH:
+        return wrong, off
+    inner = np.arange(_REACH, count - _REACH)
+    near = [k for k in range(-_REACH, _REACH + 1) if k]
+    apart = np.stack([_wrapped(position_rad[inner + k] - position_rad[inner]) for k in near])
+    off[inner] = np.abs(np.median(apart, axis=0))
+    usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
+    limit = max(_LEAST_RAD, _STEPS * usual, _SIGMAS * 1.4826 * float(np.median(off[inner])))
+    wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)
+    return wrong, off
+
+
+def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed: bool) -> Iterator[Finding]:
+    """Check the angles in the order of their times.
+
+    Args:
+        time_ns: shape (n,).
+        position_rad: shape (n,).
+        dropped: outliers are dropped.
+        timed: the times are exact enough to judge speeds by.
+    """
+    wrong, off = outliers(position_rad)
+    if wrong.any():
+        cost_mm = 1000 * AT_M * float(np.sin(min(off[wrong].max(), math.pi / 2)))
+        share = np.mean(wrong)
+        yield Finding(
+            "angle_outliers",
+            "note" if dropped else "warning",
+            "angle",
+            f"{np.sum(wrong):,} angles ({share:.2%}) lie up to {math.degrees(off[wrong].max()):.3g} deg off both "
+            f"neighbours{': dropped' if dropped else f', {cost_mm:,.0f} mm at {AT_M:g} m'}",
+            float(share),
+            hint="" if dropped else "drop_outliers = true drops them",
+        )
+    if timed:
+        yield from _jumps(time_ns, position_rad, wrong)
+    again = np.diff(time_ns) == 0
+    apart = np.abs(_wrapped(np.diff(position_rad)))[again]
+    if apart.size and apart.max() > _LEAST_RAD / 10:
+        yield Finding(
+            "angle_stamps_repeat",
+            "warning",
+            "angle",
+            f"{apart.size:,} angles have the time of another one, and differ from it by up to "
+            f"{math.degrees(apart.max()):.3g} deg",
+            float(apart.size),
+            hint="check for two publishers, or a clock of low resolution",
+        )
+
+
+def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> Iterator[Finding]:
+    """Report steps that are faster than the axis: the angle rested or was lost before."""
+    keep = np.flatnonzero(~wrong)
+    step_rad, seconds = np.abs(_wrapped(np.diff(position_rad[keep]))), np.diff(time_ns[keep]) / 1e9
+    timed = seconds > 0
+    step_rad, seconds = step_rad[timed], seconds[timed]
+    speed = step_rad / seconds
+    moving = speed > _MOVING_RAD_S
+    if not moving.any():
+        return
+    far = step_rad > max(_LEAST_RAD, _FASTEST * float(np.median(step_rad[moving])))
+    jump = far & (speed > _FASTEST * np.median(speed[moving]))
+    if jump.any():
+        worst_rad = float(step_rad[jump].max())
+        yield Finding(
+            "angle_jumps",
+            "warning",
+            "angle",
+            f"{np.sum(jump):,} steps between angles are faster than {_FASTEST:g} times the usual speed, up to "
+            f"{math.degrees(worst_rad):.3g} deg: the angle rested, or the axis slipped; "
+            f"{1000 * AT_M * math.sin(min(worst_rad, math.pi / 2)):,.0f} mm at {AT_M:g} m",
+            float(np.sum(jump)),
+            hint="check the source of the angle around these times",
+        )
+
+
+def _wrapped(angle_rad: Floats) -> Floats:
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi

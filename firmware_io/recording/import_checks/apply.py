@@ -1,0 +1,43 @@
+"""Apply corrections to angles and scans."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scanwright.design.arrays import Floats
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections
+from scanwright.firmware_io.samples import Scan
+
+
+def joint_positions(angle: Floats, unit_rad: float, corrections: Corrections) -> Floats:
+    """Return joint positions [rad] of angles in the order of their times, turns counted, shape (n,).
+
+    Args:
+        angle: in its unit, shape (n,).
+        unit_rad: radians of that unit.
+        corrections: scale and zero.
+    """
+    return corrections.angle_scale * np.unwrap((angle - corrections.angle_zero) * unit_rad)
+
+
+def corrected_scan(
+    scan: Scan, corrections: Corrections, time_increment_s: float | None, limits_rad: tuple[float, float]
+) -> Scan:
+    """Return a scan with its header and ranges corrected.
+
+    Args:
+        scan: as received.
+        corrections: of bearings and ranges.
+        time_increment_s: to use; None for that of the scan.
+        limits_rad: angle_min and angle_max of its header.
+    """
+    if time_increment_s is not None:
+        scan = replace(scan, time_increment_s=time_increment_s)
+    if corrections.bearings == "limits" and scan.range_m.size > 1:
+        scan = replace(scan, angle_increment_rad=(limits_rad[1] - limits_rad[0]) / (scan.range_m.size - 1))
+    if corrections.no_return_from_m is not None:
+        far = scan.range_m >= np.float32(corrections.no_return_from_m)
+        scan = replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))
+    return scan

@@ -1,0 +1,211 @@
+"""Headers of scans: do bearings, times between beams and ranges mean what ROS says they mean?"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from scanwright.design.arrays import Floats, Ints, Times
+from scanwright.design.findings import Finding
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections
+
+AT_M = 5.0  # range at which a finding states its cost
+_LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
+_SPAN_STEPS = 1.6  # headers of real bags state n - 1 or n steps between angle_min and angle_max
+_TIME_ERROR = 0.1  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
+_TURN_ERROR = 0.03  # how near to an integer the turns between two scans are that a driver dropped
+_SAME_RANGE = 0.01  # share of the beams with the longest range: no scene puts so many at one distance
+_FEWEST = 20  # beams
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Headers:
+    """Headers of the usable scans, shape (n,) each.
+
+    Attributes:
+        stamp_ns: of the scan.
+        beams: number of ranges.
+        step_rad: angle_increment.
+        span_rad: angle_max - angle_min.
+        time_increment_s: of the header.
+        scan_time_s: of the header.
+        range_max_m: of the header.
+        longest: longest range -> number of beams that have it, over all scans.
+        unequal_intensities: number of scans with another number of intensities than ranges.
+    """
+
+    stamp_ns: Times
+    beams: Ints
+    step_rad: Floats
+    span_rad: Floats
+    time_increment_s: Floats
+    scan_time_s: Floats
+    range_max_m: Floats
+    longest: Counter[float]
+    unequal_intensities: int
+
+    @classmethod
+    def of(cls, rows: list[tuple[Any, ...]], longest: Counter[float]) -> Headers:
+        """Make the record of `header_of` each scan."""
+        stamps, beams, steps, spans, increments, scan_times, limits, unequal = map(np.array, zip(*rows, strict=True))
+        return cls(stamps, beams, steps, spans, increments, scan_times, limits, longest, int(np.sum(unequal)))
+
+    def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
+        """Return the headers as they are after corrections."""
+        changed = self
+        if time_increment_s is not None:
+            changed = replace(changed, time_increment_s=np.full(self.beams.size, time_increment_s))
+        if corrections.bearings == "limits":
+            changed = replace(changed, step_rad=self.span_rad / np.maximum(self.beams - 1, 1))
+        if corrections.no_return_from_m is not None:
+            changed = replace(changed, longest=Counter[float]())
+        return changed
+
+    @property
+    def mirror_turn_s(self) -> float:
+        """Time of a mirror turn: scan_time if scans are whole multiples of it apart, else the usual time between scans.
+
+        0 if there is only one scan.
+        """
+        if self.stamp_ns.size < 2:
+            return 0.0
+        usual_s = float(np.median(np.diff(np.sort(self.stamp_ns)))) / 1e9
+        scan_s = float(np.median(self.scan_time_s))
+        turns = usual_s / scan_s if scan_s > 0 else 0.0
+        return scan_s if turns > 0.5 and abs(turns - round(turns)) < _TURN_ERROR * turns else usual_s
+
+    @property
+    def time_increment_from_turn_s(self) -> float:
+        """Time from beam to beam of a mirror that turns evenly: the step's share of a mirror turn."""
+        return float(np.median(np.abs(self.step_rad))) / (2 * math.pi) * self.mirror_turn_s
+
+    @property
+    def arc_ns(self) -> Times:
+        """Time from the first to the last beam of each scan, by the mirror turn if it is known, shape (n,)."""
+        even_s = self.time_increment_from_turn_s
+        increment_s = np.full(self.beams.size, even_s) if even_s else self.time_increment_s
+        return np.rint(1e9 * increment_s * (self.beams - 1)).astype(np.int64)
+
+
+def header_of(scan: Any, stamp_ns: int, longest: Counter[float]) -> tuple[Any, ...]:
+    """Return the row of one LaserScan for `Headers.of`, and count its longest range."""
+    ranges = np.asarray(scan.ranges, np.float32)
+    finite = ranges[np.isfinite(ranges)]
+    if finite.size:
+        longest[float(finite.max())] += int(np.sum(finite == finite.max()))
+    unequal = len(scan.intensities) not in (0, ranges.size)
+    span = float(scan.angle_max) - float(scan.angle_min)
+    times = float(scan.time_increment), float(scan.scan_time)
+    return stamp_ns, ranges.size, float(scan.angle_increment), span, *times, float(scan.range_max), unequal
+
+
+def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
+    """Check the headers of the scans.
+
+    Args:
+        headers: of the scans.
+        speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
+    """
+    yield from _bearings(headers)
+    yield from _time_increment(headers, speed_rad_s)
+    yield from _longest_range(headers)
+    if headers.unequal_intensities:
+        yield Finding(
+            "intensities_unequal",
+            "note",
+            "intensities",
+            f"{headers.unequal_intensities} scans have another number of intensities than ranges: dropped",
+            headers.unequal_intensities,
+        )
+
+
+def _bearings(headers: Headers) -> Iterator[Finding]:
+    several = headers.beams > 1
+    if not several.any():
+        return
+    step, span, beams = headers.step_rad[several], headers.span_rad[several], headers.beams[several]
+    off_steps = np.abs(span / np.where(step == 0, np.nan, step) - (beams - 1))
+    wrong = ~(off_steps <= _SPAN_STEPS)
+    if not wrong.any():
+        return
+    k = int(np.flatnonzero(wrong)[0])
+    cost_mm = 1000 * AT_M * float(np.max(np.abs(span[wrong] - step[wrong] * (beams[wrong] - 1))))
+    yield Finding(
+        "bearings_disagree",
+        "warning",
+        "angle_increment",
+        f"{np.sum(wrong)} scans: {beams[k]} beams at angle_increment {math.degrees(step[k]):.4g} deg span "
+        f"{math.degrees(step[k] * (beams[k] - 1)):.4g} deg, angle_max - angle_min is {math.degrees(span[k]):.4g} deg: "
+        f"one of them is wrong, by up to {_mm(cost_mm)} at {AT_M:g} m",
+        cost_mm,
+        unit="mm",
+        hint='bearings = "limits" spreads the beams from angle_min to angle_max',
+    )
+
+
+def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
+    even_s, stated_s = headers.time_increment_from_turn_s, headers.time_increment_s
+    arc = np.maximum(headers.beams - 1, 0)
+    cost_mm = 1000 * AT_M * speed_rad_s * float(np.median(np.abs(stated_s - even_s) * arc))
+    hint = f'time_increment = "auto" uses {even_s:.4g} s'
+    if not stated_s.any():
+        cost = f", off by up to {_mm(cost_mm)} at {AT_M:g} m at this speed" if cost_mm >= _LEAST_MM else ""
+        text = f"the time increment is 0: every beam takes the time of its scan's stamp, not its own{cost}"
+        yield Finding("time_increment_zero", "warning", "time_increment", text, cost_mm, unit="mm", hint=hint)
+        return
+    if not even_s:
+        return
+    ratio = float(np.median(stated_s)) / even_s
+    if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _LEAST_MM:
+        yield Finding(
+            "time_increment_off",
+            "warning",
+            "time_increment",
+            f"the time increment is {ratio:.3g} times the step's share of a turn of {headers.mirror_turn_s:.4g} s: "
+            f"beams are up to {_mm(cost_mm)} off at {AT_M:g} m at this speed",
+            ratio,
+            1.0,
+            "times",
+            hint,
+        )
+    wander = np.abs(stated_s / np.median(stated_s) - 1) > _TIME_ERROR if np.median(stated_s) else np.zeros(0, bool)
+    if wander.any():
+        worst_mm = 1000 * AT_M * speed_rad_s * float(np.max(np.abs(stated_s - np.median(stated_s)) * arc))
+        if worst_mm >= _LEAST_MM:
+            yield Finding(
+                "time_increment_changes",
+                "warning",
+                "time_increment",
+                f"{np.sum(wander)} scans have another time increment than most: beams are up to {_mm(worst_mm)} off at "
+                f"{AT_M:g} m at this speed",
+                float(np.sum(wander)),
+                hint=hint,
+            )
+
+
+def _longest_range(headers: Headers) -> Iterator[Finding]:
+    if not headers.longest:
+        return
+    longest_m = max(headers.longest)
+    count = headers.longest[longest_m]
+    if count >= max(_FEWEST, _SAME_RANGE * headers.beams.sum()):
+        limit = float(np.max(headers.range_max_m))
+        what = "range_max" if longest_m >= np.float32(limit) else "one and the same range, the longest"
+        yield Finding(
+            "longest_range_repeats",
+            "warning",
+            "ranges",
+            f"{count:,} beams have {what}, {longest_m:.6g} m: probably no returns, which become points there",
+            longest_m,
+            unit="m",
+            hint=f"no_return_from_m = {longest_m:.6g} drops them",
+        )
+
+
+def _mm(value: float) -> str:
+    return f"{value:,.0f} mm"

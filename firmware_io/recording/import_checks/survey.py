@@ -1,0 +1,123 @@
+"""First pass over somebody's bag: times, headers and angles of all usable messages."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scanwright.design.arrays import Floats, Times
+from scanwright.design.errors import RecordingError, suggest
+from scanwright.firmware_io.recording.angle_sources import FrameSource, angles_in, turned_rad
+from scanwright.firmware_io.recording.bag_clocks import Stamps, times
+from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, scan_fault
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections
+from scanwright.firmware_io.recording.import_checks.headers import Headers, header_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Survey:
+    """Scans and angles of a bag; arrays of scans have one entry per usable scan, those of angles one per usable angle.
+
+    Attributes:
+        scan_stamps: times of the scans.
+        headers: of the scans.
+        endless: scans without a longest range.
+        angle_stamps: times of the angles.
+        angle: in its unit.
+        turned: the angles come from quaternions, in radians.
+        angle_note: what a person must know of the angles; empty if nothing.
+        left_out: reason -> number of messages.
+    """
+
+    scan_stamps: Stamps
+    headers: Headers
+    endless: int
+    angle_stamps: Stamps
+    angle: Floats
+    turned: bool
+    angle_note: str
+    left_out: Counter[str]
+
+
+def survey_bag(
+    bag: Bag,
+    scan_source: Source,
+    angle_source: Source | FrameSource | None,
+    table: tuple[Times, Floats] | None,
+    corrections: Corrections,
+) -> Survey:
+    """Read all scans and angles.
+
+    Args:
+        bag: open.
+        scan_source: of the scans.
+        angle_source: of the angles; None if they are in a table.
+        table: times and angles.
+        corrections: which echo to use.
+
+    Raises:
+        RecordingError: there is no usable scan or angle.
+    """
+    left_out: Counter[str] = Counter()
+    scans: list[tuple[int, int, bool]] = []
+    rows: list[tuple[Any, ...]] = []
+    longest: Counter[float] = Counter()
+    angles: list[tuple[int, int, tuple[float, ...]]] = []
+    joints: set[str] = set()
+    if table is not None:
+        angles = [(when, when, (value,)) for when, value in zip(*(part.tolist() for part in table), strict=True)]
+    topics = {scan_source.topic, *([] if angle_source is None else [angle_source.topic])}
+    for message in bag.messages(topics):
+        scan_stamp_ns = 0
+        if message.topic == scan_source.topic:
+            laser_scan, scan_stamp_ns = laser_scan_at(message.body, scan_source, bag.path, corrections.echo)
+            fault = scan_fault(laser_scan)
+            if fault:
+                left_out[fault] += 1
+            else:
+                scans.append((scan_stamp_ns, message.receive_ns, endless(laser_scan)))
+                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns, longest))
+        if angle_source is not None and message.topic == angle_source.topic:
+            values = angles_in(message.body, angle_source, bag.path)
+            if not values and isinstance(angle_source, Source):
+                left_out["message_without_the_joint"] += 1
+                joints.update(message.body.name)
+            for value, angle_stamp_ns in values:
+                if all(map(math.isfinite, value)) and (len(value) == 1 or any(value)):
+                    angles.append((angle_stamp_ns or scan_stamp_ns, message.receive_ns, value))
+                else:
+                    left_out["angle_not_a_number"] += 1
+    for source, samples in ((scan_source, scans), (angle_source, angles)):
+        if not samples:
+            why = ", ".join(f"{count} {reason}" for reason, count in left_out.items()) or "it has no such message"
+            if source is angle_source and isinstance(source, Source) and joints and source.field not in joints:
+                why = f"no joint '{source.field}'{suggest(source.field, joints)}; known: {', '.join(sorted(joints))}"
+                raise RecordingError(f"{bag.path}: {source.topic}: {why}")
+            raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
+    stamps, receives, without_end = zip(*scans, strict=True)
+    angle_stamps, angle_receives, values_of = zip(*angles, strict=True)
+    numbers, note = np.array(values_of, dtype=float), ""
+    turned = numbers.shape[1] == 4 and angle_source is not None
+    if turned and angle_source is not None:
+        angle, note = turned_rad(numbers, angle_source)
+    else:
+        angle = numbers[:, 0]
+    return Survey(
+        scan_stamps=Stamps(times(stamps), times(receives)),
+        headers=Headers.of(rows, longest),
+        endless=sum(without_end),
+        angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
+        angle=angle,
+        turned=turned,
+        angle_note=note,
+        left_out=left_out,
+    )
+
+
+def endless(laser_scan: Any) -> bool:
+    """Return whether a scan states no longest range: some drivers leave it 0."""
+    return not laser_scan.range_max > laser_scan.range_min

@@ -1,0 +1,148 @@
+"""Faults of other people's recordings are reported, harmless ones are not, and corrections correct."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.firmware_io.recordings.import_mutations import AT_M, FAULTS, errors_mm, good, sample, write
+from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.import_checks.angles import outliers
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
+from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.firmware_io.recording.recording import open_recording
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_that_matters_is_reported_and_another_is_not(fault, tmp_path):
+    one = sample(list(FAULTS).index(fault), tmp_path)
+    assert not one.missed, one
+    assert not one.false_alarm, one
+
+
+def made(fault, tmp_path, seed=3, **corrections):
+    rng = np.random.default_rng(seed)
+    one = FAULTS[fault](good(rng), rng)
+    write(one, tmp_path / "in.bag")
+    return one, brought(tmp_path, **corrections)
+
+
+def brought(tmp_path, angle="/joint:pan", angle_unit="rad", **corrections):
+    return import_bag(
+        tmp_path / "in.bag",
+        tmp_path / "out.mcap",
+        scan="/scan",
+        angle=angle,
+        angle_unit=angle_unit,
+        hold=False,
+        corrections=Corrections(**corrections),
+    )
+
+
+CORRECTED = {
+    "time_increment off": {"time_increment": "auto"},
+    "time_increment 0": {"time_increment": "auto"},
+    "stamp of the last beam": {"stamp": "last"},
+    "increment negative": {"bearings": "limits"},
+    "angle outliers": {"drop_outliers": True},
+    "angle 0 now and then": {"drop_outliers": True},
+}
+
+
+@pytest.mark.parametrize("fault", CORRECTED)
+def test_a_correction_corrects(fault, tmp_path):
+    one, summary = made(fault, tmp_path, **CORRECTED[fault])
+    assert np.quantile(errors_mm(one, tmp_path / "out.mcap"), 0.99) < 5
+    assert summary.warnings == ()
+
+
+def test_a_finding_states_what_it_costs_and_what_corrects_it(tmp_path):
+    one, summary = made("stamp of the last beam", tmp_path)
+    (finding,) = [finding for finding in summary.findings if finding.code == "scan_stamp_not_first_beam"]
+    assert finding.hint.startswith('stamp = "last"')
+    stated_mm = float(finding.message.split(", ")[-1].split(" mm")[0].replace(",", ""))
+    speed = np.median(np.abs(np.gradient(one.angle_rad, one.angle_ns / 1e9)))
+    late_s = one.true_time_increment * (one.beams - 1)
+    assert stated_mm == pytest.approx(1000 * AT_M * speed * late_s, rel=0.05)
+
+
+def test_ranges_that_mean_no_return_become_none(tmp_path):
+    one, summary = made("no return is far", tmp_path)
+    (finding,) = [finding for finding in summary.findings if finding.code == "longest_range_repeats"]
+    brought(tmp_path, no_return_from_m=finding.value)
+    ranges = np.concatenate([scan.range_m for scan in open_recording(tmp_path / "out.mcap").scans()])
+    np.testing.assert_array_equal(np.isinf(ranges), one.ranges.ravel() >= np.float32(finding.value))
+
+
+@pytest.mark.parametrize(
+    ("scale", "zero", "unit"), [(-1.0, 0.0, "rad"), (0.75, 0.1, "rad"), (1.0, 30.0, "deg"), (-0.5, 100.0, "4096/turn")]
+)
+def test_angles_of_a_motor_become_angles_of_the_axis(tmp_path, scale, zero, unit):
+    one = good(np.random.default_rng(8))
+    motor = one.angle_rad / scale / radians_per(unit) + zero
+    turn = 2 * math.pi / radians_per(unit)
+    wrapped = motor % turn if scale == int(scale) else motor
+    write(replace(one, angle_rad=wrapped), tmp_path / "in.bag")
+    brought(tmp_path, angle_unit=unit, angle_scale=scale, angle_zero=zero)
+    log = open_recording(tmp_path / "out.mcap").joint_log
+    off = log.position_rad - one.angle_rad
+    np.testing.assert_allclose(off - off[0], 0, atol=1e-6)
+    assert math.sin(off[0]) == pytest.approx(0, abs=1e-6)
+
+
+def test_the_parts_of_a_split_recording_are_one(tmp_path):
+    one = good(np.random.default_rng(4))
+    half = one.scan_receive_ns[40]
+    for name, early in (("a.bag", True), ("b.bag", False)):
+        scans = (one.scan_receive_ns < half) == early
+        angles = (one.angle_receive_ns < half) == early
+        part = replace(
+            one,
+            **{
+                key: getattr(one, key)[scans]
+                for key in ("scan_ns", "scan_receive_ns", "time_increment", "ranges", "true_ns")
+            },
+            **{key: getattr(one, key)[angles] for key in ("angle_ns", "angle_receive_ns", "angle_rad")},
+        )
+        write(part, tmp_path / name)
+    parts = [tmp_path / "b.bag", tmp_path / "a.bag"]
+    summary = import_bag(parts, tmp_path / "out.mcap", scan="/scan", angle="/joint", angle_unit="rad", hold=False)
+    assert (summary.scans, summary.warnings) == (80, ())
+    assert errors_mm(one, tmp_path / "out.mcap").max() < 5
+
+
+def test_a_joint_that_is_not_there_is_one_line_with_the_others(tmp_path):
+    write(good(np.random.default_rng(1)), tmp_path / "in.bag")
+    with pytest.raises(RecordingError, match=r"/joint: no joint 'pann'; did you mean 'pan'\?; known: pan$"):
+        brought(tmp_path, angle="/joint:pann")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"angle_scale": 0.0}, "angle_scale = 0"),
+        ({"angle_zero": math.nan}, "angle_zero = nan"),
+        ({"time_increment": 2.0}, "time_increment = 2"),
+        ({"no_return_from_m": -1.0}, "no_return_from_m = -1"),
+    ],
+)
+def test_corrections_out_of_bounds_are_one_line(wrong, says):
+    with pytest.raises(RecordingError, match=says):
+        Corrections(**wrong)
+
+
+@pytest.mark.parametrize("unit", ["grad", "0/turn", "/turn", "4096"])
+def test_a_unit_that_is_none_is_one_line(unit):
+    with pytest.raises(RecordingError, match="write deg or rad, or counts"):
+        radians_per(unit)
+
+
+def test_outliers_are_neither_turning_points_nor_steps_of_an_axis_that_stops():
+    back_and_forth = np.abs(np.arange(400) % 80 - 40) * 0.06
+    stops = np.repeat(np.arange(30) * 0.4, 12)
+    for angle in (back_and_forth, stops, np.arange(300) * 0.06, np.cumsum(np.linspace(0, 0.1, 200))):
+        assert not outliers(angle)[0].any()
+        spiked = angle.copy()
+        spiked[[50, 51, 90]] += [1.0, 1.0, -2.0]
+        assert {50, 51, 90} >= set(np.flatnonzero(outliers(spiked)[0]).tolist()) >= {90}
