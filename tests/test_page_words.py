@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent / "house"))
+sys.path.insert(0, str(Path(__file__).parent))
 from page_words import DIALECT, blocks, count_words, median_sentence, sentences, strange, words
 
 ROOT = Path(__file__).parent.parent
