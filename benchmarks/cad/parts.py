@@ -46,10 +46,10 @@ Products = tuple[str, str, str]
 BORE, BORE_TOO, CAPSULE = "UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"
 COMBINATIONS: tuple[Products, ...] = (
     ("UTM-30LX", "MX-64R", BORE),
-    ("UST-10LX", "XM430-W350", BORE_TOO),
+    ("UST-10LX", "MX-106", BORE_TOO),
     ("URG-04LX", "AX-12A", BORE),
-    ("LD19", "XL430-W250", BORE),
-    ("UTM-30LX", "XM540-W270", CAPSULE),
+    ("LD19", "MX-28", BORE),
+    ("UTM-30LX", "MX-106", CAPSULE),
     ("UST-10LX", "MX-28", CAPSULE),
 )
 SLICED = 25  # one setting of so many of each combination

@@ -211,10 +211,11 @@ Each picture shows the scanner on the left, and one full scan of a simulated wor
 the data sheet. The red ball is the scanner, larger than in reality. `python -m benchmarks.scanwright.gallery` makes
 this page: tasks, parts, scans, pictures and figures.
 
-**Do not print these parts.** For most lidars, servos and slip rings of this page the catalogue has hole patterns or
-lengths that the real devices do not have, so the parts do not fit. Of the 16 screws that fix lidar and servo of
-`low_cost` and of the shelf below, 12 find no thread. `build` prints a warning for each such product, and
-`scanwright catalogue NAME` has the reasons. Angles, densities and scans do not depend on it.
+**Do not print the parts with a slip ring of Senring.** The real UH1256 is longer than that of the catalogue, and its
+leads are thicker. `build` prints a warning for each such product, and `scanwright catalogue NAME` has the reasons.
+Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real
+devices have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and
+scans do not depend on the holes.
 """
 
 

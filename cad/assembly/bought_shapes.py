@@ -29,9 +29,12 @@ STUB = 0.4  # between the stub of a capsule's rotor and its body
 def lidar_body(lidar: Lidar) -> cq.Solid:
     """Below the window, with its threaded holes."""
     half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
-    radius = SCREWS[lidar.mount_screw].nominal / 2
-    threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.mount_holes_mm]
-    return solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low)).cut(*threads).Solids()[0]
+    radius = SCREWS[lidar.base.screw].nominal / 2
+    threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.base.places]
+    body: cq.Shape = solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low))
+    if lidar.ears_mm:
+        body = body.fuse(*(solids.box(*ear) for ear in lidar.ears_mm)).clean()
+    return body.cut(*threads).Solids()[0]
 
 
 def lidar_window(lidar: Lidar) -> cq.Solid:
@@ -53,13 +56,8 @@ def lidar_cable(lidar: Lidar, y: float) -> cq.Solid:
 def servo_case(servo: Servo, z: float) -> cq.Solid:
     """The case, its horn face at height z, with recesses down to the planes of its front and rear holes."""
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
-    recesses = [
-        solids.upright(EAR_ROOM, z + servo.case_holes_z_mm, z + z1 + 1.0, *hole) for hole in servo.case_holes_mm
-    ]
-    recesses += [
-        solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.case_rear_holes_z_mm, *hole)
-        for hole in servo.case_rear_holes_mm
-    ]
+    recesses = [solids.upright(EAR_ROOM, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
+    recesses += [solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
     return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.cable_instructions import cables_text, leads_text
 from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.names import DECK, FIXED_CABLES, ROTOR_LEADS, SERVO, SERVO_CASE
+from scanwright.cad.layout.names import DECK, FIXED_CABLES, ROTOR_LEADS, SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.parts.part_spec import Step
 
 ON_DECK = Step(
@@ -14,6 +14,12 @@ ON_DECK = Step(
     f"{screws(SERVO_CASE, DECK)} Leave room for the plugs.",
     "the horn turns freely, and the case lies flat on the deck",
     (SERVO,),
+)
+FRAME_ON_DECK = Step(
+    "Frame on the deck",
+    "The axis stands upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
+    f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame.",
+    "the horn turns freely, and the frame does not rock on its four feet",
 )
 LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
@@ -35,5 +41,5 @@ def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
     if any(cable.path is not None for cable in layout.cables):
         steps[FIXED_CABLES] = Step(CABLES_TITLE, cables_text(layout), CABLES_CHECK)
     if layout.deck.flat:
-        steps[DECK] = ON_DECK
+        steps[DECK] = ON_DECK if layout.drive.mounted.onto == SERVO_CASE else FRAME_ON_DECK
     return sorted(steps.items(), key=lambda item: layout.drive.built.index(item[0]))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE
 from scanwright.cad.screws import passing_hole
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.findings import Finding
@@ -48,9 +48,10 @@ def _turn_from_metal(part: str, why: str) -> Finding:
 
 def _screwed_to_deck(scanner: Scanner, mounted: Mounted) -> Finding:
     hole = passing_hole(mounted.screw, scanner.printer)
+    what = f"{scanner.servo.name} by its rear holes" if mounted.onto == SERVO_CASE else f"{mounted.onto} by its feet"
     places = ", ".join(f"({x:g}, {y:g})" for x, y in mounted.holes)
     hint = (
-        f"hold {scanner.servo.name} by its rear holes with 4 x {mounted.screw.name} from below through the deck, "
-        f"{hole:g} mm holes at {places} mm from the axis; leave room for the plugs"
+        f"hold {what} with 4 x {mounted.screw.name} from below through the deck, {hole:g} mm "
+        f"holes at {places} mm from the axis; leave room for the plugs"
     )
     return Finding("servo_on_deck", "note", BASE_MOUNT, f"{BASE_MOUNT}: not included, the axis is upright", hint=hint)

@@ -15,7 +15,7 @@ import numpy as np
 
 from scanwright.cad import outlines
 from scanwright.cad.layout.drive import DriveLayout, Mounted
-from scanwright.cad.layout.joints import CASE_EAR, DECK_MM, Joint, triple, upright_axes
+from scanwright.cad.layout.joints import DECK_MM, Joint, triple, upright_axes
 from scanwright.cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
 from scanwright.cad.layout.names import BASE_MOUNT, DECK
 from scanwright.cad.layout.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
@@ -114,7 +114,7 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
 
 def _on_flat_deck(mounted: Mounted) -> Joint:
     axes = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0)
-    return Joint(DECK, mounted.onto, "nut", mounted.screw, axes, grip_mm=DECK_MM, thread_mm=CASE_EAR)
+    return Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=mounted.thread_mm)
 
 
 def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.joints import Fixing
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.layout.tie_seat import TieSeat
@@ -100,6 +101,7 @@ class Mounted:
         ears: height of the faces around its holes.
         screw: that goes through the mount into them.
         holes: x and y of the four.
+        fixing: what the screws hold in: a nut behind the holes, or their thread.
         corners: of boxes around all that does not turn, shape (n, 3).
         discs: radius and height of what else must stay clear of the deck, round about the axis.
         on_flat_deck: whether it may be screwed to a flat deck without a mount if the axis is upright.
@@ -112,6 +114,7 @@ class Mounted:
     ears: float
     screw: Screw
     holes: tuple[tuple[float, float], ...]
+    fixing: Fixing
     corners: Array
     discs: tuple[tuple[float, float], ...]
     on_flat_deck: bool

@@ -50,15 +50,15 @@ class Envelope:
 
     def plate(self, sub_plate: Axis | None) -> Box:
         """Plate of the linkage, with a sub-plate if there is one."""
-        (x, y, _), seat = self.lidar.body_mm, -self.lidar.optical_height_mm
+        (x, y), seat = self.lidar.half_mm, -self.lidar.optical_height_mm
         lower = seat - (0.0 if sub_plate is None else SUB_PLATE_THICKNESS) - PLATE_THICKNESS
-        return (-x / 2, -y / 2, lower), (x / 2, y / 2, seat)
+        return (-x, -y, lower), (x, y, seat)
 
     def under(self, sub_plate: Axis | None) -> Box:
         """Heads of the lidar's screws below the plate, or the ears of the sub-plate."""
         (x0, y0, lower), (x1, y1, seat) = self.plate(sub_plate)
         if sub_plate is None:
-            return (x0, y0, lower - SCREWS[self.lidar.mount_screw].head_height - 0.5), (x1, y1, lower)
+            return (x0, y0, lower - SCREWS[self.lidar.base.screw].head_height - 0.5), (x1, y1, lower)
         x, y = ear_corner(self.lidar, sub_plate)
         return (-x, -y, lower), (x, y, seat)
 
@@ -106,14 +106,14 @@ def screw_travel_mm(lidar: Lidar) -> float:
 
     Slots along such lines take another pitch, and still hold the lidar in the middle, unless all are one line.
     """
-    lines = {round(math.atan2(y, x) % math.pi, 2) for x, y in lidar.mount_holes_mm}
-    if "mount_holes_mm" not in lidar.unverified() or len(lines) == 1:
+    lines = {round(math.atan2(y, x) % math.pi, 2) for x, y in lidar.base.places}
+    if "holes" not in lidar.unverified() or len(lines) < 2:
         return 0.0
-    hole = SCREWS[lidar.mount_screw].nominal + 0.4
+    hole = SCREWS[lidar.base.screw].nominal + 0.4
     rooms = [
         (half - abs(at) - hole / 2 - SLOT_WALL) * math.hypot(*place) / abs(at)
-        for place in lidar.mount_holes_mm
-        for half, at in zip((lidar.body_mm[0] / 2, lidar.body_mm[1] / 2), place, strict=True)
+        for place in lidar.base.places
+        for half, at in zip(lidar.half_mm, place, strict=True)
         if abs(at) > 1e-6
     ]
     return max(0.0, min(SLOT_TRAVEL, *rooms))
@@ -128,18 +128,18 @@ def slot_ends(place: tuple[float, float], travel: float) -> tuple[tuple[float, f
 
 
 def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
-    """Which of the lidar's screws (index into `mount_holes_mm`) the hub hides from a driver below the plate."""
+    """Which of the lidar's screws (index into `base.places`) the hub hides from a driver below the plate."""
     travel = screw_travel_mm(lidar)
     return [
         i
-        for i, place in enumerate(lidar.mount_holes_mm)
+        for i, place in enumerate(lidar.base.places)
         if not all(_driver_passes(lidar, stack, end) for end in slot_ends(place, travel))
     ]
 
 
 def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     """Whether the driver's way misses hub and journal, or takes no more than the hub's rim."""
-    R, room = stack.R(), SCREWS[lidar.mount_screw].head_room
+    R, room = stack.R(), SCREWS[lidar.base.screw].head_room
     depth = np.linspace(0.0, 150.0, 601)
     line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
     reach = np.hypot(line[:, 0], line[:, 1]) - room
@@ -151,7 +151,7 @@ def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
 
 def envelope_of(lidar: Lidar) -> Envelope:
     """The boxes of one lidar (origin at the optical centre)."""
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    half_x, half_y = lidar.half_mm
     seat = -lidar.optical_height_mm
     room = lidar.cable_diameter_mm / 2 + 2.0
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
@@ -168,7 +168,7 @@ def envelope_of(lidar: Lidar) -> Envelope:
 
 def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
     """Half extents of the strip that holds the two ears of a sub-plate."""
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    half_x, half_y = lidar.half_mm
     if sub_plate == "x":
         return half_x + EAR_REACH, EAR_HALF_WIDTH
     return EAR_HALF_WIDTH, half_y + EAR_REACH
@@ -176,7 +176,7 @@ def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
 
 def ear_screws(lidar: Lidar, axis: Axis) -> tuple[tuple[float, float], ...]:
     """Centres of the ears' screws: their heads stand clear of the lidar's body."""
-    half = (lidar.body_mm[0] if axis == "x" else lidar.body_mm[1]) / 2
+    half = lidar.half_mm[0 if axis == "x" else 1]
     away = half + BODY_GAP + EAR_SCREW.head_room + 0.5
     along = [(sign * away, side * EAR_SCREW_OFFSET) for sign in (1, -1) for side in (1, -1)]
     return tuple(along if axis == "x" else [(y, x) for x, y in along])

@@ -12,6 +12,8 @@ from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
+RUBS_NM = (5e-3, 5e-3)  # of bearings, and of a ring whose friction is not in the catalogue: assumed
+NEAR_MM = 500.0
 FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of the ranges
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
@@ -87,6 +89,13 @@ def rated_moment_nm(scanner: Scanner) -> float | None:
     return None if rated is None else rated * RATED_AT_MM / 1000
 
 
+def friction_nm(scanner: Scanner) -> tuple[float, float]:
+    """Least and most torque that ring and bearings rub with."""
+    ring = scanner.slip_ring
+    return RUBS_NM if ring is None or ring.friction_nm is None else ring.friction_nm
+
+
 def noise_deg(scanner: Scanner) -> float:
-    """Angle that puts a point at FAR_MM off by the noise of the lidar's ranges."""
-    return math.degrees(math.atan(scanner.lidar.range_sigma_mm / FAR_MM))
+    """Largest angle that moves no point within FAR_MM by more than the noise of the lidar's ranges."""
+    range_mm = np.linspace(NEAR_MM, FAR_MM, 96)
+    return math.degrees(math.atan(float((scanner.lidar.sigma_mm(range_mm) / range_mm).min())))

@@ -60,8 +60,8 @@ OF_LIDAR = (
     "lidar.body_mm",
     "lidar.optical_height_mm",
     "lidar.window_z_mm",
-    "lidar.mount_screw",
-    "lidar.mount_holes_mm",
+    "lidar.holes",
+    "lidar.ears_mm",
     "lidar.cable_y_mm",
     "lidar.cable_z_mm",
     "lidar.cable_diameter_mm",
@@ -82,7 +82,7 @@ def linkage_spec(place: Placement) -> PartSpec:
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
         slots = f"the slots of {ALIGNMENT_LINKAGE}, where a screw may sit {p.screw_travel:.2g} mm nearer or farther"
-        shapes["lidar.mount_holes_mm"] = slots
+        shapes["lidar.holes"] = slots
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
         turns=True,

@@ -16,6 +16,7 @@ from scanwright.cad.parts.journal_sleeve import sleeve_spec
 from scanwright.cad.parts.main_shaft import main_shaft_spec
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from scanwright.cad.parts.servo_frame import frame_spec
 from scanwright.cad.parts.servo_shaft import servo_shaft_spec
 from scanwright.cad.parts.shaft_ring import shaft_ring_spec
 from scanwright.cad.parts.slip_ring_adapter import adapter_spec
@@ -25,6 +26,7 @@ from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 SPECS = (
+    frame_spec,
     servo_shaft_spec,
     adapter_spec,
     base_spec,

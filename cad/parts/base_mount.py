@@ -32,7 +32,7 @@ from scanwright.cad.layout.deck import (
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
-from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
+from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.linkage_hub import tie_slots
 from scanwright.cad.parts.part_spec import PartSpec, Step
@@ -55,30 +55,37 @@ TOWER_STEP = Step(
     f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot where cables leave. {screws(DECK)}",
     check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
 )
+FRAME_STEP = Step(
+    "Frame on the mount",
+    f"Put the frame on the rails of the base mount. {screws(SERVO_FRAME)} Connect the servo's cable now, and lay a "
+    f"cable tie into the slots of the foot where it leaves. {screws(DECK)}",
+    check="the frame does not rock on its four feet, nor the mount on the deck",
+)
 RAIL_HALF = 5.0  # of the mount's rails, at most
 OF_SERVO = (
     "servo.case_min_mm",
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_rear_holes_mm",
-    "servo.case_rear_holes_z_mm",
+    "servo.holes",
 )
 RAIL_HALF_WIDTH = 4.0  # least
 FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
 
 
+STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_STEP}
+
+
 def mount_spec(place: Placement) -> PartSpec | LeftOut:
     """The mount of one scanner, or why the servo is screwed to the deck."""
     if place.deck.flat:
         return LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts")
-    on_tower = place.drive.mounted.thread is not None
+    onto = place.drive.mounted.onto
     return PartSpec(
         name=BASE_MOUNT,
         turns=False,
         make=partial(base_mount, place),
-        step=TOWER_STEP if on_tower else SERVO_STEP,
-        shaped_by=() if on_tower else OF_SERVO,
+        step=STEPS[onto],
+        shaped_by=OF_SERVO if onto == SERVO_CASE else (),
         angles="rot",
         joints=tuple(_joints(place)),
         avoid=tuple(_around(place.deck, place.drive.mounted)),
@@ -91,7 +98,7 @@ def _joints(place: Placement) -> Iterator[Joint]:
     yield Joint(
         BASE_MOUNT,
         mounted.onto,
-        "nut" if mounted.thread is None else fixing_in(mounted.thread),
+        mounted.fixing if mounted.thread is None else fixing_in(mounted.thread),
         mounted.screw,
         upright_axes(mounted.holes, mounted.ears - UNDER_MOUNT_HEAD, 1.0),
         grip_mm=UNDER_MOUNT_HEAD,

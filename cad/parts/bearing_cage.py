@@ -39,9 +39,9 @@ from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import (
     ALL_SCREWS,
-    CASE_EAR,
     Joint,
     fixing_in,
+    fixing_of,
     inward_axes,
     round_wall_mm,
     screws,
@@ -111,21 +111,29 @@ def base_spec(place: Placement) -> PartSpec | None:
             "the shaft turns a whole turn without touching the base",
         ),
         shaped_by=ON_CASE,
-        joints=(on_ears(p.stack, p.ears, CAGE_BASE),),
+        joints=(on_ears(place.scanner.servo, p.stack, p.ears, CAGE_BASE),),
         avoid=(around_base(place.scanner.servo, p),),
     )
 
 
-def on_ears(stack: DirectStack, ears: Ears, part: str) -> Joint:
+def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
     """A plate on the front of the servo's case."""
     heads = stack.horn + ears.front + SEAT_GAP + UNDER_HEAD
     axes, grip = upright_axes(ears.holes, heads, -1.0), heads - (stack.horn + ears.seats)
-    return Joint(part, SERVO_CASE, "nut", ears.screw, axes, grip_mm=grip, thread_mm=CASE_EAR)
+    return Joint(
+        part,
+        SERVO_CASE,
+        fixing_of(servo.front),
+        ears.screw,
+        axes,
+        grip_mm=grip,
+        thread_mm=servo.front.depth_mm,
+    )
 
 
 def around_base(servo: Servo, p: BearingCage) -> Shape:
     """What the base fills beside the bell."""
-    wide, back = plate_half_x(servo, SCREWS[servo.case_screw]), servo.case_min_mm[1]
+    wide, back = plate_half_x(servo, SCREWS[servo.front.screw]), servo.case_min_mm[1]
     return shape_of(box_corners(((-wide, back, p.low), (wide, 0.0, p.stack.ring_bottom))))
 
 
@@ -173,7 +181,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
     stack, ears = p.stack, p.ears
     seats = stack.horn + ears.seats
     last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
-    with building(CAGE_BASE, "plate and boss", "case_holes_mm", ears.holes) as checked:
+    with building(CAGE_BASE, "plate and boss", "holes", ears.holes) as checked:
         reaches_out = -last > stack.cage_outer + ROOM + 2 * FOOT_RADIUS
         tail = solids.box((-ears.half_x, last, p.low), (ears.half_x, 0.0, p.high if reaches_out else p.foot))
         around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
@@ -181,7 +189,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
         body = body.cut(solids.upright(ears.opening, p.low - 1.0, p.high + 1.0))
         body = checked(body)
-    with building(CAGE_BASE, "feet and screw holes", "case_holes_mm", ears.holes) as checked:
+    with building(CAGE_BASE, "feet and screw holes", "holes", ears.holes) as checked:
         feet = [solids.upright(FOOT_RADIUS, seats, p.low + 1.0, x, y) for x, y in ears.holes]
         body = body.fuse(*feet)
         cuts: list[cq.Shape] = [solids.upright(ears.opening, stack.horn + ears.front, p.high + 1.0)]

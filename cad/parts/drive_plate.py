@@ -19,19 +19,18 @@ from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHE
 from scanwright.cad.layout.belt.tower import BearingTower
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.envelope import box_corners
-from scanwright.cad.layout.joints import CASE_EAR, Joint, fixing_in, placed_axes, screws, triple, upright_axes
+from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, placed_axes, screws, triple, upright_axes
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO_CASE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.fits import OnSheet
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import Thread
 from scanwright.cad.solids import building
+from scanwright.design.catalogue.products import Servo
 
 OF_SERVO = (
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_holes_mm",
-    "servo.case_holes_z_mm",
+    "servo.holes",
     "servo.horn_diameter_mm",
 )
 FOOT_RADIUS = 3.0
@@ -55,17 +54,25 @@ def plate_spec(place: Placement) -> PartSpec | None:
         sheet=OnSheet(axis=stack.horn_axis),
         shaped_by=OF_SERVO,
         shapes={"belt.teeth": "where the servo stands"},
-        joints=tuple(_joints(p, tower.plate)),
+        joints=tuple(_joints(place.scanner.servo, p, tower.plate)),
         avoid=(_around(stack),),
     )
 
 
-def _joints(p: DrivePlate, thread: Thread) -> Iterator[Joint]:
+def _joints(servo: Servo, p: DrivePlate, thread: Thread) -> Iterator[Joint]:
     """The plate on the servo, and on the tower."""
     stack = p.stack
     R, t, heads = stack.turn(), stack.beside() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_HEAD
     axes, grip = placed_axes(upright_axes(p.holes, heads, -1.0), R, t), heads - p.ears
-    yield Joint(DRIVE_PLATE, SERVO_CASE, "nut", p.screw, axes, grip_mm=grip, thread_mm=CASE_EAR)
+    yield Joint(
+        DRIVE_PLATE,
+        SERVO_CASE,
+        fixing_of(servo.front),
+        p.screw,
+        axes,
+        grip_mm=grip,
+        thread_mm=servo.front.depth_mm,
+    )
     slots = [(x, y) for x in (-stack.slot_x, stack.slot_x) for _, y in stack.arms_y]
     yield Joint(
         DRIVE_PLATE,
@@ -97,11 +104,11 @@ def drive_plate(p: DrivePlate) -> cq.Solid:
     stack = p.stack
     low, high = stack.tower_top, stack.tower_top + PLATE
     y0, y1 = stack.plate_y
-    with building(DRIVE_PLATE, "plate and feet", "case_holes_mm", p.holes) as checked:
+    with building(DRIVE_PLATE, "plate and feet", "holes", p.holes) as checked:
         plate = solids.prism(outlines.octagon(stack.plate_x, (y1 - y0) / 2, 3.0, (y0 + y1) / 2), low, high)
         feet = [solids.upright(FOOT_RADIUS, p.ears, low + 1.0, x, y) for x, y in p.holes]
         body = checked(plate.fuse(*feet))
-    with building(DRIVE_PLATE, "opening, holes and slots", "case_holes_mm", p.holes) as checked:
+    with building(DRIVE_PLATE, "opening, holes and slots", "holes", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.ears - 1.0, high + 1.0)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, high + 1.0, x, y))

@@ -61,14 +61,19 @@ def horn_cup(p: AlignmentLinkage, stack: DirectStack, servo: Servo, printer: Pri
         BuildError: a step did not give one valid solid.
     """
     horn, floor, top = stack.horn, stack.horn + stack.flange_thickness, stack.spigot_top
-    radius, bore = stack.shaft_diameter / 2, stack.cup_bore / 2
+    radius, bore, seat = stack.shaft_diameter / 2, stack.cup_bore / 2, horn + stack.horn_grip
     with building(HORN_CUP, "floor and wall", "horn_circle_mm", servo.horn_circle_mm) as checked:
-        body = solids.upright(stack.flange_radius, horn, floor).fuse(solids.upright(radius, horn, top))
-        body = checked(body.cut(solids.upright(bore, floor, top + 1.0)))
+        if stack.foot_radius > 0:
+            foot, low = stack.foot_radius, horn + stack.foot_height
+            outline = [(0.0, horn), (foot, horn), (foot, low), (radius, low + radius - foot), (radius, top), (0.0, top)]
+            body: cq.Shape = solids.lathe(outline)
+        else:
+            body = solids.upright(stack.flange_radius, horn, floor).fuse(solids.upright(radius, horn, top))
+        body = checked(body.cut(solids.upright(bore, seat, top + 1.0)))
     with building(HORN_CUP, "holes, flat and marks", "horn_circle_mm", servo.horn_circle_mm) as checked:
         hole, boss = passing_hole(SCREWS[servo.horn_screw], printer) / 2, servo.horn_boss_diameter_mm / 2
         cuts = [solids.box((-2 * radius, stack.flat, floor), (2 * radius, 2 * radius, top + 1.0))]
-        cuts += [solids.upright(hole, horn - 1.0, floor + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
+        cuts += [solids.upright(hole, horn - 1.0, seat + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
         cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, floor + 1.0))  # index groove
         if boss > 0:
             cuts.append(solids.upright(boss + AROUND_BOSS, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))

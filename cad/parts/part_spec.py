@@ -28,9 +28,7 @@ HORN = (
 )
 ON_CASE = (
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_holes_mm",
-    "servo.case_holes_z_mm",
+    "servo.holes",
     "servo.horn_diameter_mm",
     "servo.horn_thickness_mm",
 )

@@ -63,7 +63,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
 
 def on_horn(servo: Servo, stack: DirectStack, part: str) -> Joint:
     """What is on the axis of the servo on its horn."""
-    return horn_joint(servo, part, SERVO_HORN, stack.horn + stack.flange_thickness, stack.flange_thickness)
+    return horn_joint(servo, part, SERVO_HORN, stack.horn + stack.horn_grip, stack.horn_grip)
 
 
 def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:

@@ -56,7 +56,7 @@ def adapter_spec(place: Placement) -> PartSpec | None:
             "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a whole turn without touching"
         ),
         shaped_by=(*ON_CASE, *OF_RING),
-        joints=(on_ears(p.stack, ears, SLIP_RING_ADAPTER),),
+        joints=(on_ears(place.scanner.servo, p.stack, ears, SLIP_RING_ADAPTER),),
         avoid=tuple(_around(place.scanner.servo, p)) if cage is None else (around_base(place.scanner.servo, cage),),
         rows=(Row("wiring", "cable tie", "cable tie around the ring's stator", "groove of the adapter"), CRIMPS),
         steps={RING: RING_STEP},
@@ -66,7 +66,7 @@ def adapter_spec(place: Placement) -> PartSpec | None:
 def _around(servo: Servo, p: SlipRingAdapter) -> Iterator[Shape]:
     """Arms and fork."""
     stack, front = p.stack, p.stack.horn + servo.case_max_mm[2] + SEAT_GAP
-    outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo, SCREWS[servo.case_screw]))
+    outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo, SCREWS[servo.front.screw]))
     yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
     yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + PLATE))))
 
@@ -109,7 +109,7 @@ def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5
-    with building(SLIP_RING_ADAPTER, "fork", "case_holes_mm", p.holes) as checked:
+    with building(SLIP_RING_ADAPTER, "fork", "holes", p.holes) as checked:
         tail = solids.box((-p.half_x, last, low), (p.half_x, first, top))
         prongs = solids.box((-outer, min(first, slot_end - 12.0), low), (outer, ARM_HALF_WIDTH, top))
         feet = [solids.upright(FOOT_RADIUS, seats, low + 1.0, x, y) for x, y in p.holes]

@@ -24,7 +24,7 @@ from scanwright.cad.layout.envelope import (
     slot_ends,
 )
 from scanwright.cad.layout.hub import Axis, Hub
-from scanwright.cad.layout.joints import Joint, fixing_in, lidar_thread_mm, placed_axes, screws, upright_axes
+from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, lidar_thread_mm, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR_BODY, SUB_PLATE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
@@ -64,8 +64,18 @@ def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
     p = place.linkage
     axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), p.stack.R())
     slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
-    deep = lidar_thread_mm(place.scanner.lidar)
-    return Joint(part, LIDAR_BODY, "thread", p.screw, axes, grip_mm=grip, thread_mm=deep, slot_mm=slot)
+    lidar = place.scanner.lidar
+    return Joint(
+        part,
+        LIDAR_BODY,
+        fixing_of(lidar.base),
+        p.screw,
+        axes,
+        grip_mm=grip,
+        thread_mm=lidar_thread_mm(lidar),
+        slot_mm=slot,
+        heel_mm=min(lidar.half_mm) if len(p.holes) == 2 else None,
+    )
 
 
 def _ears_joint(p: AlignmentLinkage) -> Joint:
@@ -90,13 +100,13 @@ def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
         BuildError: a step did not give one valid solid.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    half_x, half_y = lidar.half_mm
     low, high = -lidar.optical_height_mm - SUB_PLATE_THICKNESS, -lidar.optical_height_mm
-    hole, ear_hole = passing_hole(SCREWS[lidar.mount_screw], printer) / 2, passing_hole(EAR_SCREW, printer) / 2
+    hole, ear_hole = passing_hole(SCREWS[lidar.base.screw], printer) / 2, passing_hole(EAR_SCREW, printer) / 2
     with building(SUB_PLATE, "plate and holes", "ears along", axis) as checked:
         body: cq.Shape = solids.prism(outlines.octagon(half_x, half_y, CHAMFER), low, high)
         body = body.fuse(solids.prism(outlines.octagon(*ear_corner(lidar, axis), CHAMFER), low, high))
-        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.mount_holes_mm]
+        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.base.places]
         cuts = [solids.slot(hole, *each, low - 1.0, high + 1.0) for each in ends]
         cuts += [solids.upright(ear_hole, low - 1.0, high + 1.0, *at) for at in ear_screws(lidar, axis)]
         front = front_mark(half_x + (EAR_REACH if axis == "x" else 0.0))

@@ -16,7 +16,7 @@ from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.world import spun_up, turned_deg
 
-BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
+BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
 _POINTS = 12  # LD19 development manual
 _BYTES = 47  # LD19 development manual
 _BACKLOG = 1 << 10  # bytes [assumed]: some packets

@@ -33,14 +33,14 @@ class RangeModel:
     """How a sensor turns a distance into a range.
 
     Attributes:
-        sigma_m: standard deviation of the noise.
+        sigma_m: standard deviation of the noise, or that at ranges in metres.
         quantum_m: step of the ranges that it sends.
         range_min_m: nothing nearer is measured.
         range_max_m: nothing farther comes back.
         incidence_max_rad: a surface that is met at a flatter angle (from its normal) sends nothing back.
     """
 
-    sigma_m: float
+    sigma_m: float | Callable[[Floats], Floats]
     quantum_m: float
     range_min_m: float
     range_max_m: float
@@ -71,7 +71,7 @@ def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
     if sigma_mm is not None and not 0 <= sigma_mm <= _MOST_NOISE_MM:
         raise TaskError(f"noise {sigma_mm} mm: 0 to {_MOST_NOISE_MM:g}")
     return RangeModel(
-        sigma_m=(lidar.range_sigma_mm if sigma_mm is None else sigma_mm) / 1000,
+        sigma_m=(lambda range_m: lidar.sigma_mm(1000 * range_m) / 1000) if sigma_mm is None else sigma_mm / 1000,
         quantum_m=0.001,
         range_min_m=lidar.range_min_mm / 1000,
         range_max_m=lidar.range_max_mm / 1000,
@@ -98,7 +98,8 @@ def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> M
 
     The intensity falls with the cosine of incidence and with range: plausible, but no model of a certain sensor.
     """
-    noise_m = model.sigma_m * rng.standard_normal(hits.range_m.size)
+    sigma_m = model.sigma_m(hits.range_m) if callable(model.sigma_m) else model.sigma_m
+    noise_m = sigma_m * rng.standard_normal(hits.range_m.size)
     range_m = np.rint((hits.range_m + noise_m) / model.quantum_m) * model.quantum_m
     lost = ~(hits.incidence_rad <= model.incidence_max_rad) | (range_m > model.range_max_m)
     near = ~lost & (range_m < model.range_min_m)

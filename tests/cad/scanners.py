@@ -1,5 +1,7 @@
 """Scanners that tests of several files take: of equal ones the fixture `parts_of` makes the parts once."""
 
+from dataclasses import replace
+
 from scanwright.cad.layout import layout
 from scanwright.cad.layout.deck import deck_of
 from scanwright.cad.layout.placement import drive_of
@@ -15,9 +17,16 @@ TILTED = (0, 35, -20, -70)
 
 
 def scanner_at(
-    setting_deg, *, sensor="UTM-30LX", servo="MX-64R", slip_ring=RING, printer="fdm-0.4", modules=NO_MODULES
+    setting_deg,
+    *,
+    friction_nm=None,
+    sensor="UTM-30LX",
+    servo="MX-64R",
+    slip_ring=RING,
+    printer="fdm-0.4",
+    modules=NO_MODULES,
 ):
-    """The scanner of products by their names at four angles."""
+    """The scanner of products by their names at four angles; without friction a counterweight balances its rotor."""
     names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
     angles = AngleSet(
         task="test",
@@ -27,7 +36,10 @@ def scanner_at(
         slip_ring=slip_ring,
         motion={"mode": "spin", "period_s": 18.0},
     )
-    return scanner_of(angles, printer, load_catalogue(), modules=modules)
+    scanner = scanner_of(angles, printer, load_catalogue(), modules=modules)
+    if scanner.slip_ring is None:
+        return scanner
+    return replace(scanner, slip_ring=scanner.slip_ring.model_copy(update={"friction_nm": friction_nm}))
 
 
 def digest_of(scanner):

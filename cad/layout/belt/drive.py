@@ -178,6 +178,7 @@ def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
         ears=stack.tower_bottom,
         screw=FOOT_SCREW,
         holes=tuple((a * FOOT_HOLE, b * FOOT_HOLE) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
+        fixing="nut",
         corners=np.concatenate([drive_corners(stack), np.array(foot)]),
         discs=((stack.wide_radius, stack.tower_bottom), (stack.wide_radius, stack.tower_top)),
         on_flat_deck=False,

@@ -130,7 +130,7 @@ def _check_horn(stack: BeltStack) -> None:
     if stack.horn > stack.teeth_low:
         servo = stack.servo
         raise BuildError(
-            f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.doubt('case_max_mm')}: the horn of "
+            f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.caution('case_max_mm')}: the horn of "
             f"{servo.name} stands {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
             "servo whose horn lies lower"
         )

@@ -38,16 +38,17 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter | None:
     if stack.bearing is not None:
         return SlipRingAdapter(stack=stack, fork=None)
     servo = scanner.servo
-    screw = SCREWS[servo.case_screw]
+    screw = SCREWS[servo.front.screw]
     holes = fork_holes(servo, stack)
     if not holes:
+        doubt = servo.caution("holes")
         raise BuildError(
-            f"{SLIP_RING_ADAPTER}: fork: case_holes_mm = {list(servo.case_holes_mm)}{servo.doubt('case_holes_mm')}: "
-            f"{servo.name} needs two pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
+            f"{SLIP_RING_ADAPTER}: fork: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
+            f"pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
         )
     fork = Ears(
         front=servo.case_max_mm[2],
-        seats=servo.case_holes_z_mm,
+        seats=servo.front.z_mm,
         opening=_opening(stack),
         half_x=plate_half_x(servo, screw),
         screw=screw,
@@ -64,8 +65,8 @@ def arm_top(p: SlipRingAdapter) -> float:
 
 def fork_holes(servo: Servo, stack: DirectStack) -> tuple[tuple[float, float], ...]:
     """The nearest and the furthest pair of front holes behind the turning flange; none if there are no two pairs."""
-    behind = sorted({y for _, y in servo.case_holes_mm if y < _behind(stack)}, reverse=True)
-    rows = [sorted(hole for hole in servo.case_holes_mm if hole[1] == y) for y in behind]
+    behind = sorted({y for _, y in servo.front.places if y < _behind(stack)}, reverse=True)
+    rows = [sorted(hole for hole in servo.front.places if hole[1] == y) for y in behind]
     widest = max((row[-1][0] for row in rows), default=0.0)
     rows = [row for row in rows if len(row) == 2 and row[-1][0] == widest]
     return (*rows[0], *rows[-1]) if len(rows) > 1 else ()

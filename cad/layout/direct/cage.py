@@ -79,22 +79,22 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
         BuildError: the case has no four holes beside the turning flange.
     """
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.case_screw]
+    screw = SCREWS[servo.front.screw]
     hole = passing_hole(screw, printer)
     opening = stack.flange_radius + 1.0
     least = opening + hole / 2 + printer.min_wall_mm
-    free = [(x, y) for x, y in servo.case_holes_mm if math.hypot(x, y) >= least]
+    free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
     if len(holes) < 4:
+        doubt = servo.caution("holes")
         raise BuildError(
-            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{servo.doubt('case_holes_mm')}: "
-            f"{servo.name} needs two pairs of front holes at least {least:.2f} mm from the axis, outside the turning "
-            "flange"
+            f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
+            f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
     return Ears(
         front=servo.case_max_mm[2],
-        seats=servo.case_holes_z_mm,
+        seats=servo.front.z_mm,
         opening=opening,
         half_x=plate_half_x(servo, screw),
         screw=screw,
@@ -124,7 +124,7 @@ def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | N
 
 def plate_half_x(servo: Servo, screw: Screw) -> float:
     """Half width of a plate on the servo's front: that of the case, or what the heads of the ears' screws need."""
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.case_holes_mm) + screw.head_room + HEAD_WALL)
+    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.head_room + HEAD_WALL)
 
 
 def _base_low(stack: DirectStack, ears: Ears) -> float:

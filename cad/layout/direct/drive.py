@@ -10,21 +10,22 @@ import numpy as np
 from scanwright.cad.layout import names
 from scanwright.cad.layout.direct.adapter import adapter_of
 from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
+from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, frame_of, needs_frame, no_rear_holes
 from scanwright.cad.layout.direct.leads import lead_exits, stator_exit
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station
 from scanwright.cad.layout.envelope import Envelope
-from scanwright.cad.layout.joints import CASE_EAR
+from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.products import Servo
-from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 # The order that always works: what comes over the shaft follows what carries it.
 BUILT = (
+    names.SERVO_FRAME,
     names.BASE_MOUNT,
     names.TRIPOD_FOOT,
     names.DECK,
@@ -53,7 +54,8 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         BuildError: it cannot be laid out.
     """
     stack, ears = direct_stack(scanner, envelope)
-    mounted = _mounted(scanner.servo, stack)
+    frame = frame_of(scanner, stack) if needs_frame(scanner.servo) else None
+    mounted = _mounted(scanner.servo, stack, frame)
     adapter = adapter_of(scanner, stack)
     cage = None if ears is None else cage_of(scanner, stack, ears)
     leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
@@ -62,8 +64,8 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     return DriveLayout(
         envelope=envelope,
         stack=stack,
-        stations=tuple(_stations(scanner, stack, cage)),
-        records=tuple(record for record in (stack, adapter, cage) if record is not None),
+        stations=tuple(_stations(scanner, stack, frame, cage)),
+        records=tuple(record for record in (stack, frame, adapter, cage) if record is not None),
         shaft=stack.shaft,
         bend=shaft_bend(stack, shaft_modulus_pa(scanner, stack), cage_n_per_m),
         mounted=mounted,
@@ -82,7 +84,9 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     )
 
 
-def _stations(scanner: Scanner, stack: DirectStack, cage: BearingCage | None) -> Iterator[Station]:
+def _stations(
+    scanner: Scanner, stack: DirectStack, frame: ServoFrame | None, cage: BearingCage | None
+) -> Iterator[Station]:
     servo, ring, bearing = scanner.servo, scanner.slip_ring, stack.bearing
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
     low, half_x = (x0, y0, stack.horn + z0), max(-x0, x1)
@@ -96,6 +100,8 @@ def _stations(scanner: Scanner, stack: DirectStack, cage: BearingCage | None) ->
         box=Cuboid(low, (x1, y1, stack.horn)),  # with its horn
         shape=case,
     )
+    if frame is not None:
+        yield Station(name=names.SERVO_FRAME, body="base", z_mm=(frame.low, frame.high), radius_mm=frame.reach_x)
     yield Station(
         name=stack.shaft, body="servo_horn", z_mm=(stack.horn, stack.spigot_top), radius_mm=stack.flange_radius
     )
@@ -141,39 +147,52 @@ def _bears(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> 
     return horn_bears_balanced(scanner, stack, bar_g, bar_z)
 
 
-def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
-    """The servo's case.
+def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Mounted:
+    """The servo's case, or the frame that holds it.
 
     Raises:
-        BuildError: it has no holes on its back.
+        BuildError: it has no holes that may carry it.
     """
-    holes = servo.case_rear_holes_mm
-    if len(holes) < 4:
-        doubt = servo.doubt("case_rear_holes_mm")
-        raise BuildError(
-            f"{names.BASE_MOUNT}: deck: case_rear_holes_mm = {list(holes)}{doubt}: {servo.name} has no "
-            "four holes on its back to stand on; take a capsule ring, whose plate holds its front, or another servo"
-        )
+    if len(servo.rear.places) < 4 and frame is None:
+        raise no_rear_holes(servo)
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
         around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
+    discs = ((around, stack.horn), (around, top))
+    if frame is not None:
+        x, z = frame.reach_x, (frame.low, frame.high)
+        return Mounted(
+            onto=names.SERVO_FRAME,
+            rear=frame.low,
+            ears=frame.low,
+            screw=FOOT_SCREW,
+            holes=frame.feet,
+            fixing="nut",
+            corners=np.array([(sign * x, y, height) for sign in (-1, 1) for y in frame.ends_y for height in z]),
+            discs=discs,
+            on_flat_deck=True,
+            thread_mm=FOOT,
+        )
     return Mounted(
         onto=names.SERVO_CASE,
         rear=stack.horn + servo.case_min_mm[2],
-        ears=stack.horn + servo.case_rear_holes_z_mm,
-        screw=SCREWS[servo.case_screw],
-        holes=_corner_holes(holes),
+        ears=stack.horn + servo.rear.z_mm,
+        screw=SCREWS[servo.rear.screw],
+        holes=_corner_holes(servo.rear.places),
+        fixing=fixing_of(servo.rear),
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
-        discs=((around, stack.horn), (around, top)),
+        discs=discs,
         on_flat_deck=True,
-        thread_mm=CASE_EAR,
+        thread_mm=servo.rear.depth_mm,
     )
 
 
 def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
     if scanner.slip_ring is None:
         yield LeftOut(names.SLIP_RING_ADAPTER, "this scanner has no slip ring", 1, "parts")
+    if not needs_frame(scanner.servo):
+        yield LeftOut(names.SERVO_FRAME, f"{scanner.servo.name} is held by the holes in its rear", 1, "parts")
     if stack.bearing is None:
         servo = scanner.servo
         why = f"the horn of {servo.name} carries an axis this upright alone"

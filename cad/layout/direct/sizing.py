@@ -124,7 +124,7 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     room, boss = _room_on_horn(servo), servo.horn_boss_diameter_mm / 2
     collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(room, boss + COLLAR_WALL_MIN)))
     if collar > room:
-        doubt = servo.doubt("horn_circle_mm")
+        doubt = servo.caution("horn_circle_mm")
         raise BuildError(
             f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
             f"{servo.horn_circle_mm:g} mm{doubt} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"

@@ -18,7 +18,7 @@ import numpy as np
 from scanwright.cad.layout.deck import FOOT_THICKNESS, FREE, Deck
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM
-from scanwright.cad.layout.loads import STEEL_G_CM3, tilt_sine
+from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
@@ -51,7 +51,6 @@ SECTIONS = (
     (40, 30),
 )
 SCREW = SCREWS["M4"]
-RUBS_NM = 5e-3  # what bearing and ring rub with at least: assumed, no data sheet of theirs says it
 UPRIGHT = 1e-6  # sine of the tilt
 EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_SCREW.head_room + 0.5  # clear of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
@@ -124,8 +123,9 @@ def counterweight_of(
     if tilt_sine(scanner) < UPRIGHT:
         return _without("gravity does not turn an upright axis")
     moment = estimated_moment(scanner, linkage, neck)
-    if torque_nm(scanner, float(np.linalg.norm(moment))) <= RUBS_NM:
-        return _without(f"gravity turns the rotor with no more than bearing and ring rub with, {RUBS_NM:g} N m")
+    least, _ = friction_nm(scanner)
+    if torque_nm(scanner, float(np.linalg.norm(moment))) <= least:
+        return _without(f"gravity turns the rotor with no more than the friction of bearing and ring, {least:g} N m")
     if keeps_flank(scanner, moment):
         return _without("all over the sweep gravity keeps the gears on one flank")
     azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))

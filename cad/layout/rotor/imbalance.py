@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from scanwright.cad.layout.envelope import PLATE_THICKNESS
-from scanwright.cad.layout.loads import FAR_MM, tilt_sine
+from scanwright.cad.layout.loads import noise_deg, tilt_sine
 from scanwright.cad.layout.rotor.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.linkage import LinkageBody
 from scanwright.design.arrays import Array
@@ -78,4 +78,4 @@ def keeps_flank(scanner: Scanner, moment: Array, doubt: float = 0.0) -> bool:
 def play_matters(scanner: Scanner) -> bool:
     """Whether the play of the servo's gears shows in a cloud; where nobody tells it, it does."""
     play = scanner.servo.backlash_deg
-    return play is None or math.radians(play) * FAR_MM > scanner.lidar.range_sigma_mm
+    return play is None or play > noise_deg(scanner)

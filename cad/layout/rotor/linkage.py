@@ -26,6 +26,7 @@ from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
@@ -104,15 +105,20 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
         BuildError: the screw holes come too near to the plate's edge.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    screw = SCREWS[lidar.mount_screw]
+    screw = SCREWS[lidar.base.screw]
     hole = passing_hole(screw, printer)
     half_x, half_y, _ = envelope.plate(stack.sub_plate)[1]
+    if len(lidar.base.places) < 2:
+        raise BuildError(
+            f"{ALIGNMENT_LINKAGE}: seat: holes: {lidar.name} has fewer than two equal threads or through holes in its "
+            f"base ({what_holds(lidar.holes)}): this linkage carries a lidar from below; take another one"
+        )
     travel = screw_travel_mm(lidar)
-    outermost = [slot_ends(place, travel)[1] for place in lidar.mount_holes_mm]
+    outermost = [slot_ends(place, travel)[1] for place in lidar.base.places]
     edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in outermost) - hole / 2
     if edge < printer.min_wall_mm:
         raise BuildError(
-            f"{ALIGNMENT_LINKAGE}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm "
+            f"{ALIGNMENT_LINKAGE}: seat: holes at {list(lidar.base.places)}: leaves a wall of {edge:.2f} mm "
             f"at the edge of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
@@ -135,7 +141,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
         fan=_free_bearings(stack, lidar.bearings_rad()),
         screw=screw,
         screw_hole=hole,
-        holes=lidar.mount_holes_mm,
+        holes=lidar.base.places,
         screw_travel=travel,
         fit=printer.fit_clearance_mm,
         cross_hole=passing_hole(CROSS_SCREW, printer),

@@ -68,32 +68,32 @@ def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_asse
 
 def test_what_gives_way_fails_and_what_has_little_to_spare_warns(scanner_and_assembly, monkeypatch):
     scanner, assembly = scanner_and_assembly
-    margin = min(c.value for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None)
+    margin = min(c.value for c in retention_checks(scanner, assembly) if c.code == "retention" and c.value is not None)
     for over, severity in ((0.4 * margin, "ok"), (0.7 * margin, "warning"), (1.3 * margin, "error")):
         with monkeypatch.context() as shaken:
             shaken.setattr(room, "SHOCK_G", 5.0 * over)
-            checks = [c for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None]
+            checks = [c for c in retention_checks(scanner, assembly) if c.code == "retention" and c.value is not None]
         weakest = min(checks, key=lambda check: check.value)
         assert (weakest.severity, weakest.value) == (severity, pytest.approx(margin / over, rel=0.02))
 
 
-def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly, monkeypatch):
+def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly):
     scanner, assembly = scanner_and_assembly
     joints = assembly.layout.joints
     hub = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
-    _instead(monkeypatch, joints, hub, replace(hub, fixing="grub"))
-    assert [check.subject for check in retention_checks(scanner, assembly) if check.severity == "error"] == [
+    loose = _instead(assembly, hub, replace(hub, fixing="grub"))
+    assert [check.subject for check in retention_checks(scanner, loose) if check.severity == "error"] == [
         f"{hub.part} and {hub.onto}"
     ]
     for nuts in (joint for joint in joints if joint.onto == "bearing_tower" and joint.part == "base_mount"):
-        _instead(monkeypatch, joints, nuts, replace(nuts, fixing="thread", thread=None))
-        failed = [check.message for check in retention_checks(scanner, assembly) if check.severity == "error"]
+        bare = _instead(assembly, nuts, replace(nuts, fixing="thread", thread=None))
+        failed = [check.message for check in retention_checks(scanner, bare) if check.severity == "error"]
         assert any("threads in bare plastic" in message for message in failed)
 
 
-def _instead(monkeypatch, joints, joint, other):
-    changed = [other if each == joint else each for each in joints]
-    monkeypatch.setattr(room, "joints_of", lambda _: changed)
+def _instead(assembly, joint, other):
+    changed = tuple(other if each == joint else each for each in assembly.layout.joints)
+    return replace(assembly, layout=replace(assembly.layout, joints=changed))
 
 
 def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
@@ -116,7 +116,7 @@ def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
         pull = max(pull, np.abs(axial).max())
         push = max(push, np.linalg.norm(shares - axial[:, None] * along, axis=1).max())
     assert worst_shares(joint, centre) == pytest.approx((pull, push), rel=5e-3)
-    assert scanner.lidar.mount_screw == joint.screw.name
+    assert scanner.lidar.base.screw == joint.screw.name
 
 
 def test_torque_and_strength_against_hand_calculation():

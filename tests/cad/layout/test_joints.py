@@ -18,8 +18,9 @@ from quick_tests import samples
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
 from scanwright.cad.geometry.holes import Piercing, rounds_of
-from scanwright.cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
+from scanwright.cad.layout.joints import DECK_MM, shank_mm
 from scanwright.cad.screws import SCREWS, thread_hole, trap_of
+from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.deck_holes import Rectangle
 from scanwright.design.scanner import Modules
 
@@ -116,7 +117,7 @@ def partner_of(part, hole, screw, rounds, printer):
             sizes = (screw.nominal, *holding_holes(screw, printer))
             threaded = min(abs(other.diameter - size) for size in sizes) < 0.01
             fixing = "trap" if is_trap(other, screw, printer) else "thread" if threaded else "nut"
-            depth = CASE_EAR if fixing == "nut" and name == "servo_case" else free_length(other, others, screw, low)
+            depth = CASE_EAR_MM if fixing == "nut" and name == "servo_case" else free_length(other, others, screw, low)
             order = (not threaded, round(abs(gap), 3))
             if best is None or order < best[0]:
                 best = order, Behind(name, fixing, depth, 1 if gaps[0] > gaps[1] else -1)

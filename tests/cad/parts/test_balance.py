@@ -18,7 +18,8 @@ from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.geometry.inertia import of_line, of_solid
 from scanwright.cad.layout.cables.leads import SAMPLE
-from scanwright.cad.layout.rotor.counterweight import RUBS_NM, SAW, SECTIONS, TRIM, Counterweight
+from scanwright.cad.layout.loads import RUBS_NM
+from scanwright.cad.layout.rotor.counterweight import SAW, SECTIONS, TRIM, Counterweight
 from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, torque_nm
 from scanwright.cad.layout.rotor.linkage import Ear, neck_corners
 from scanwright.cad.parts.all_parts import laid_out
@@ -61,8 +62,15 @@ def test_the_rotor_is_balanced_by_its_meshes(made):
     without = (
         moment - STEEL * (bar := meshes(assembly, ["counterweight"])["counterweight"]).volume * bar.center_mass[:2]
     )
-    assert torque_nm(scanner, np.linalg.norm(without)) > 10 * RUBS_NM
-    assert torque_nm(scanner, np.linalg.norm(moment)) < RUBS_NM
+    assert torque_nm(scanner, np.linalg.norm(without)) > 10 * RUBS_NM[0]
+    assert torque_nm(scanner, np.linalg.norm(moment)) < RUBS_NM[0]
+
+
+def test_the_friction_of_a_ring_makes_a_counterweight_needless():
+    left_out = found_for(scanner_at(GROUND_AHEAD, friction_nm=(0.16, 0.2)))
+    assert isinstance(left_out, LeftOut) and "friction of bearing and ring, 0.16 N m" in left_out.why
+    light = found_for(scanner_at(GROUND_AHEAD, friction_nm=(0.006, 0.2)))
+    assert not isinstance(light, LeftOut)
 
 
 def test_leads_weigh_what_their_wires_do(made):

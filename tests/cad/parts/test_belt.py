@@ -38,6 +38,7 @@ from scanwright.cad.parts.bearing_tower import bearing_tower
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import prism, upright
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Servo, SlipRing
 from scanwright.design.errors import BuildError
 
@@ -437,8 +438,9 @@ def test_what_else_cannot_be_built_is_refused():
     with pytest.raises(BuildError, match=r"drive_pulley: heads: horn_circle_mm = 46: .*teeth of a pulley of 80"):
         parts_of(laid_out(replace(scanner, servo=wide)))
     holes = ((9.0, 0.0), (-9.0, 0.0), (9.0, -3.0), (-9.0, -3.0))
-    bare = Servo.model_validate(scanner.servo.model_dump() | {"case_holes_mm": holes})
-    with pytest.raises(BuildError, match=r"drive_plate: ears: case_holes_mm"):
+    ears = tuple(Hole(at_mm=(x, y, -6.5), axis="+z", kind="through", size="M2.5", depth_mm=2.0) for x, y in holes)
+    bare = scanner.servo.model_copy(update={"holes": ears})
+    with pytest.raises(BuildError, match=r"drive_plate: ears: holes"):
         parts_of(laid_out(replace(scanner, servo=bare)))
 
 
@@ -446,9 +448,9 @@ def test_what_else_cannot_be_built_is_refused():
     ("change", "words"),
     [
         ({"flange": None}, "bore_mm = 0 is a capsule: tell its flange and rotor"),
-        ({"length_mm": 7.0}, "below_top_mm 5 lies beyond length_mm"),
+        ({"length_mm": 2.0}, "below_top_mm 0 lies beyond length_mm"),
         ({"outer_diameter_mm": 30.0}, "circle_mm 35 puts its holes into outer_diameter_mm"),
-        ({"outer_diameter_mm": 9.0}, "rotor.diameter_mm 10 is not below"),
+        ({"outer_diameter_mm": 7.0}, "rotor.diameter_mm 7.8 is not below"),
     ],
 )
 def test_a_capsule_that_contradicts_itself_is_refused(change, words):

@@ -34,6 +34,7 @@ from scanwright.cad.parts.sub_plate import sub_plate
 from scanwright.cad.solids import box, building
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Provenance, SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
@@ -144,7 +145,7 @@ def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha,
     half = scanner.lidar.body_mm[0] / 2
     np.testing.assert_allclose(mesh["plate"].bounds[:, 2], [-4, 0], atol=1e-4)
     down = np.array([[0.0, 0.0, -1.0]])
-    for x, y in scanner.lidar.mount_holes_mm:  # on the bench: from below through the plate alone
+    for x, y in scanner.lidar.base.places:  # on the bench: from below through the plate alone
         assert len(mesh["plate"].ray.intersects_location([[x, y, 1]], down)[0]) == 0
         pocket = mesh["linkage"].ray.intersects_location([[x, y, 1]], down)[0][:, 2].max()
         assert pocket == pytest.approx(-4 - 3.5, abs=1e-3)  # a head of 3
@@ -219,11 +220,15 @@ def test_an_upside_down_lidar_is_refused():
         drive_of(scanner_for(120, 0))
 
 
+def threads(*places):
+    return tuple(Hole(at_mm=(*place, 0.0), axis="-z", kind="tapped", size="M3", depth_mm=5.0) for place in places)
+
+
 def test_holes_outside_the_plate_are_refused():
     scanner = scanner_for(0, 0)
-    lidar = scanner.lidar.model_copy(update={"mount_holes_mm": ((29, 0.0), (-29, 0.0), (0.0, 29))})
+    lidar = scanner.lidar.model_copy(update={"holes": threads((29, 0.0), (-29, 0.0), (0.0, 29))})
     wrong = replace(scanner, lidar=lidar)
-    with pytest.raises(BuildError, match="alignment_linkage: seat: mount_holes_mm"):
+    with pytest.raises(BuildError, match="alignment_linkage: seat: holes at"):
         bare_linkage(wrong)
 
 
@@ -248,7 +253,7 @@ def test_the_mount_offset_needs_no_kernel():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-SLOTTED = [("UST-10LX", (5, 0)), ("RPLIDAR A1", (60, 60)), ("URG-04LX", (-80, 75))]
+SLOTTED = [("RPLIDAR S2", (5, 0)), ("RPLIDAR A1", (60, 60)), ("RPLIDAR S1", (-80, 75))]
 
 
 @pytest.mark.parametrize(("name", "at"), samples(SLOTTED, SLOTTED[:2]))
@@ -266,7 +271,7 @@ def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, a
     def bites(travel, x=0.0, y=0.0):
         """Volume that the shanks of a lidar's screws take from the part, its pitch another, or itself moved."""
         met = 0.0
-        for place in np.array(lidar.mount_holes_mm):
+        for place in np.array(lidar.base.places):
             at = place * (1 + travel / np.hypot(*place)) + [x, y]
             shank = manifold3d.Manifold.cylinder(9.0, p.screw.nominal / 2 * 0.99, circular_segments=48)
             met += (shank.translate((*at, low)).transform(T) ^ body).volume()
@@ -278,18 +283,18 @@ def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, a
 
 
 def test_a_lidar_whose_holes_somebody_verified_gets_round_ones():
-    measured = scanner_for(5, 0, lidar="UST-10LX")
+    measured = scanner_for(5, 0, lidar="RPLIDAR S2")
     lidar = measured.lidar.model_copy()
-    lidar._provenance = lidar.provenance() | {"mount_holes_mm": Provenance(source="calliper", verified=True)}
+    lidar._provenance = lidar.provenance() | {"holes": Provenance(source="calliper", verified=True)}
     verified = replace(measured, lidar=lidar)
     assert (laid_out(measured).linkage.screw_travel > 0, laid_out(verified).linkage.screw_travel) == (True, 0)
     assert digest_of(measured) != digest_of(verified)
 
 
 def test_slots_need_lines_that_cross():
-    lidar = scanner_for(5, 0, lidar="UST-10LX").lidar
-    centred = lidar.model_copy(update={"mount_holes_mm": ((0.0, 0.0), (20.0, 20.0), (-20.0, 20.0))})
-    in_line = lidar.model_copy(update={"mount_holes_mm": ((0.0, 15.0), (0.0, -15.0), (0.0, 8.0))})
+    lidar = scanner_for(5, 0, lidar="RPLIDAR S2").lidar
+    centred = lidar.model_copy(update={"holes": threads((0.0, 0.0), (20.0, 20.0), (-20.0, 20.0))})
+    in_line = lidar.model_copy(update={"holes": threads((0.0, 15.0), (0.0, -15.0), (0.0, 8.0))})
     assert screw_travel_mm(centred) > 1.5 and screw_travel_mm(in_line) == 0
     assert slot_ends((0.0, 0.0), 1.8) == ((0.0, 0.0), (0.0, 0.0))
     for at in ((3.0, 4.0), (20.0, -20.0)):

@@ -220,7 +220,7 @@ def test_the_cheap_scanner_stands_beside_with_what_a_dollar_sees(ceiling, rows):
     cheap = load_task(Path("low_cost"))
     assert row.time_s == cheap.task.motion.duration_s
     assert row.cost_usd == cheap.lidar.price_usd + cheap.servo.price_usd
-    assert (row.range_stated_m, row.range_practical_m, row.range_sigma_mm) == (25, 25, 10)
+    assert (row.range_stated_m, row.range_practical_m, row.range_sigma_mm) == (25, 10, 15)
     assert (rows[0].range_stated_m, rows[0].range_practical_m) == (30, 15), "what its maker states, what users get"
     assert row.beams_per_ball == pytest.approx(np.exp(-row.J) - 1)
     assert row.beams_per_ball_per_usd == pytest.approx(row.beams_per_ball / row.cost_usd)

@@ -453,7 +453,7 @@ def test_only_scans_at_rest_are_taken_at_stops(out, emulators):
     summary = run(out, emulators)
     recording = open_recording(recorded(out))
     assert summary.left_out["scans between two stops"] > 10
-    assert recording.held
+    assert recording.at_rest
     for scan in recording.scans():
         assert np.ptp(recording.joint_log.angle_at(scan.time_ns)) < math.radians(0.2)
 

@@ -28,8 +28,10 @@ def bought(low_cost):
 def test_all_that_is_made_is_printed(low_cost):
     parts = low_cost.assembly.parts
     assert {name: parts[name].process for name in low_cost.assembly.made} == {
+        "servo_frame": "printed",
         "horn_cup": "printed",
         "alignment_linkage": "printed",
+        "sub_plate": "printed",
     }
 
 
