@@ -85,8 +85,8 @@ ENTRIES = (
         (-3.6, -3.4, 3.0),
         (1.6, 0, 0.1),
         34,
-        "The mount with the lowest J alone is blind in a cone of 0.58 deg in the middle of the region. The best mount"
-        " without a blind spot costs 0.086 % of the beams per ball (`scanwright optimise ground_ahead`). Hanging and "
+        "The mount with the lowest J alone is blind in a cone of 0.47 deg in the middle of the region. The best mount"
+        " without a blind spot costs 0.097 % of the beams per ball (`scanwright optimise ground_ahead`). Hanging and "
         "upright builds have the same J; the build is the one whose parts block fewer beams.",
     ),
     Entry(
