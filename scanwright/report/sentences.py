@@ -52,11 +52,11 @@ def _sees(answer: BuildAnswer, ball_m: float, planes: Sequence[PlaneFigures]) ->
     if blind := answer.as_built.own.blind:
         return [*text, f"It is {'; and '.join(blind)}."]
     if planes:
-        return [*text, "No direction that counts is left out."]
+        return [*text, "No direction of the region is blind."]
     width_cm = 100 * ball_m * AT_M
     return [
-        f"Wherever it counts, a disc {rounded(width_cm)} cm wide, {AT_M:g} m away and facing the scanner, gets "
-        f"{answer.as_built.own.least:,} of them or more."
+        f"Each disc of the region {rounded(width_cm)} cm wide, {AT_M:g} m away and facing the scanner gets "
+        f"{answer.as_built.own.least:,} beams or more."
     ]
 
 
@@ -64,10 +64,10 @@ def _is_worth(answer: BuildAnswer) -> list[str]:
     first, *others = (mount.gain for mount in answer.as_built.mounts)
     if first.factor is None:
         return []
-    rest = "; ".join(f"{gain.factor:.2f} times as with {_named(gain)}" for gain in others)
+    rest = ", ".join(f"{gain.factor:.2f} ({_named(gain)})" for gain in others)
     return [
-        f"Where it counts there are {first.factor:.2f} times as many beams, {answer.as_built.parts}, as with the best "
-        f"simple mount, {_named(first)} (geometric mean, mounts without parts); {rest}.",
+        f"In the region the scanner has {first.factor:.2f} times the beams of the best simple mount ({_named(first)}), "
+        f"{answer.as_built.parts} (geometric mean, mounts without parts). Factors against the others: {rest}.",
         *(f"{_capital(sentence)}." for sentence in answer.as_built.verdict()),
     ]
 

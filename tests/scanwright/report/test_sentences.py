@@ -31,10 +31,10 @@ def test_what_it_is_what_it_sees_and_what_that_is_worth(found):
     is_, sees, worth, verdict = sentences(ANGLES, found, 0.07, ())
     assert is_.endswith("once around in 18 s, sends 778,320 beams: 720 lines of 1,081.")
     own, mounts = found.as_built.own, found.as_built.mounts
-    assert sees.startswith("Wherever it counts, a disc 21 cm wide, 3 m away") and f"gets {own.least}" in sees
+    assert sees.startswith("Each disc of the region 21 cm wide, 3 m away") and f"gets {own.least}" in sees
     factor, name = min((each.factor, each.name) for each in mounts)
-    assert f"{factor:.2f} times as many beams, without parts, as with the best simple mount, {name}" in worth
-    assert all(f"{each.factor:.2f} times as with {each.name}" in worth for each in mounts[1:])
+    assert f"{factor:.2f} times the beams of the best simple mount ({name}), without parts" in worth
+    assert all(f"{each.factor:.2f} ({each.name})" in worth for each in mounts[1:])
     assert verdict == f"{name} (180, 45, 90, -59.4) is better ({1 / factor:.2f} times the beams)."
 
 
@@ -54,7 +54,7 @@ def test_planes_are_told_in_metres(found):
     planes = on_planes(loaded, problem_as_built(loaded, ANGLES), mounting_rad(ANGLES))
     said = sentences(ANGLES, found, 0.07, planes)
     assert said[1].startswith("Ground 0.5 to 3 m ahead: ") and "points per m2" in said[1]
-    assert said[2] == "No direction that counts is left out."
+    assert said[2] == "No direction of the region is blind."
 
 
 def test_every_motion_has_its_words():
