@@ -266,7 +266,7 @@ def residuals_m(cloud, angles, scene):
         there = origins_m + near.range_m[:, None] * others
         here = origins_m + hits.range_m[:, None] * directions
         clear &= np.abs(np.einsum("ij,ij->i", there - here, normals)) < 1e-6  # still on the same plane
-    return (range_m - hits.range_m)[clear], clear.mean()
+    return (range_m - hits.range_m)[clear], hits.range_m[clear], clear.mean()
 
 
 SWEEP = {"mode": "sweep", "limits_deg": [-45, 45], "period_s": 6.0}  # at 30.6 deg/s, 1.05 steps of 0.293 deg in 10 ms
@@ -291,7 +291,7 @@ SCANNERS = [  # every family of lidars and of servos
 def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
     out, angles = tmp_path, angle_set(**scanner)
     (out / "angles.json").write_text(angles.to_json())
-    sigma_m = math.hypot(load_catalogue().get(angles.sensor, Lidar).range_sigma_mm / 1000, 0.001 / math.sqrt(12))
+    lidar = load_catalogue().get(angles.sensor, Lidar)
     # A busy computer blurs the times of some beams, and emulators leave scans out; what is systematic shows in all
     # runs, and in the middle of all beams.
     with emulating(out, "--seed", 1):
@@ -300,17 +300,17 @@ def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
             with program("scan", out, "--turns", turns, "-o", recording) as process:
                 said, complaints = process.communicate(timeout=600)
             assert process.returncode == 0, complaints
-            error_m, share = residuals_m(read_ply(recording.with_suffix(".ply")), angles, room(None))
-            median_m = np.median(error_m)
-            spread = abs(np.median(np.abs(error_m - median_m)) / 0.67449 / sigma_m - 1)  # of a normal distribution
-            bias = abs(median_m) / sigma_m
+            error_m, range_m, share = residuals_m(read_ply(recording.with_suffix(".ply")), angles, room(None))
+            sigmas = error_m / np.hypot(lidar.sigma_mm(1000 * range_m) / 1000, 0.001 / math.sqrt(12))
+            bias = abs(np.median(sigmas))
+            spread = abs(np.median(np.abs(sigmas - np.median(sigmas))) / 0.67449 - 1)  # of a normal distribution
             if spread < 0.02 and bias < 0.1:
                 break
-    assert error_m.size > points
+    assert sigmas.size > points
     assert share > 0.8
     assert spread < 0.02
     assert bias < 0.1
-    assert np.mean(np.abs(error_m) > 6 * sigma_m) < 0.01
+    assert np.mean(np.abs(sigmas) > 6) < 0.01
     assert "timestamp uncertainty: " in said
 
 
