@@ -22,6 +22,7 @@ import matplotlib
 import numpy as np
 import trimesh
 from PIL import Image
+from scanwright.report.sentences import sentences
 
 import scanwright as sw
 from benchmarks.scanwright import gallery_worlds as worlds
@@ -35,7 +36,6 @@ from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.firmware_io.emulators.simulated import simulated_recording
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
-from scanwright.report.sentences import sentences
 
 DOCS = Path(__file__).parents[2] / "docs"
 OUT = Path("out")
