@@ -29,6 +29,7 @@ from scanwright.report.data_uri import png_uri
 
 STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
 FEWEST, MOST_BANDS = 5, 8  # beams at the lowest edge of a band, and bands
+DENSEST = 0.98  # of the sphere is not denser than the highest edge or twice of it: the rest lies about the axis
 WORST = 0.9  # quantile of the axes: the worst ones would use most of the shades
 # the palette: shades of the map, then what is no shade
 SHADES = 250
@@ -139,12 +140,13 @@ def density_sphere(
     densities = {own: mean_density_at(problem, setting, directions, shadow)}
     for mount in mounts:
         densities[f"{mount.name}, without parts"] = mean_density_at(problem, mount.angles_rad, directions)
-    bands = bands_to(max(float(density.max()) for density in densities.values()))
+    area, order = np.sqrt(1 - directions[:, 2] ** 2), densities[own].argsort()
+    bands = bands_to(densities[own][order][np.searchsorted(area[order].cumsum(), DENSEST * area.sum())])
     maps = _drawn(densities, bands, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))
     axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
-    counts = weight.ravel() * np.sqrt(1 - directions[:, 2] ** 2)
+    counts = weight.ravel() * area
     middle = counts @ directions / max(float(counts.sum()), 1e-12)
     length = float(np.linalg.norm(middle))
     middle *= (length > NOWHERE) / max(length, NOWHERE)

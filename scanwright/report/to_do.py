@@ -69,7 +69,7 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
     how = "Copy its catalogue file, change the values, name the copy in task.toml under catalogue, build again."
     if wrong := [each for each in findings if each.code == "known_error" and each.severity == "warning"]:
         text = f"Parts made with these values do not fit the real devices. {how}"
-        todo.append(ToDo(f"Correct {count(len(wrong), 'wrong value')}", text, (), wrong))
+        todo.append(ToDo(f"Correct {count(len(wrong), 'wrong value')}", text, ("#checks", "task.toml")))
     if unverified := tuple(each for each in findings if each.code == "unverified"):
         text = f"These values are not from a drawing. A wrong one makes a part that does not fit. {how}"
         todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("task.toml",), unverified))
