@@ -2,7 +2,9 @@
 
     python -m benchmarks.cad.combinations [ALPHA_ROT BETA_ROT ALPHA_LASER BETA_LASER]
 
-Every triple is laid out with all its parts and joints, without the CAD kernel: what cannot be made is refused there.
+Every lidar and servo, with every ring and without one, is laid out with all its parts and joints, without the CAD
+kernel: what cannot be made is rejected there. Of those that are accepted, each screw into a lidar or a servo's case
+must meet a usable hole of its record and end in it; exit code 1 if one does not.
 """
 
 from __future__ import annotations
@@ -11,41 +13,55 @@ import itertools
 import re
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.layout import layout_of
-from scanwright.cad.parts.all_parts import parts_of
+import numpy as np
+
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.names import LIDAR_BODY, SERVO_CASE
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.arrays import Array
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
+from scanwright.design.catalogue.holes import USABLE, Hole
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
 
 TILTED = (0.0, 31.0, 6.0, 15.0)
+SAME_MM = 2.1  # slots take a screw this far from its place
 
 
 def main(angles: tuple[float, ...] = TILTED) -> None:
-    """Lay out all of them, and print what goes with what."""
+    """Lay out all of them, and print what goes with what, and the screws that meet no hole."""
     catalogue = load_catalogue()
-    kinds = [[one.name for one in catalogue if isinstance(one, kind)] for kind in (Lidar, Servo, SlipRing)]
-    laid_out: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
-    refused: Counter[str] = Counter()
-    for lidar, servo, ring in itertools.product(*kinds):
-        reason = _refusal(catalogue, angles, lidar, servo, ring)
-        if reason is None:
-            laid_out[servo, ring].append(lidar)
+    lidars = [one.name for one in catalogue if isinstance(one, Lidar)]
+    servos = [one.name for one in catalogue if isinstance(one, Servo)]
+    rings = [None, *(one.name for one in catalogue if isinstance(one, SlipRing))]
+    laid_out: defaultdict[tuple[str, str | None], list[str]] = defaultdict(list)
+    refused, misses = Counter[str](), Counter[str]()
+    for lidar, servo, ring in itertools.product(lidars, servos, rings):
+        try:
+            layout = _layout(catalogue, angles, lidar, servo, ring)
+            misses.update(screws_without_a_hole(layout))
+        except BuildError as error:
+            refused[f"{servo} with {ring}: {_general(str(error), lidar)}"] += 1
         else:
-            refused[f"{servo} with {ring}: {_general(reason, lidar)}"] += 1
-    total = len(kinds[0]) * len(kinds[1]) * len(kinds[2])
-    print(f"{sum(map(len, laid_out.values()))} of {total} laid out, at {angles}")
+            laid_out[servo, ring].append(lidar)
+    accepted = sum(map(len, laid_out.values()))
+    print(f"{accepted} of {accepted + refused.total()} laid out, at {angles}; {misses.total()} screws meet no hole")
     for (servo, ring), lidars in laid_out.items():
-        named = "every lidar" if len(lidars) == len(kinds[0]) else ", ".join(lidars)
+        named = "every lidar" if len(lidars) == len(lidars) else ", ".join(lidars)
         print(f"  {servo} with {ring}: {len(lidars)}: {named}")
     for reason, count in refused.most_common():
         print(f"  refused {count}: {reason}")
+    for miss, count in misses.most_common():
+        print(f"  no hole {count}: {miss}")
+    sys.exit(bool(misses))
 
 
-def _refusal(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, servo: str, ring: str) -> str | None:
+def _layout(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, servo: str, ring: str | None) -> Layout:
     names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
     chosen = AngleSet(
         task="combinations",
@@ -54,13 +70,30 @@ def _refusal(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, servo:
         servo=servo,
         slip_ring=ring,
     )
-    try:
-        layout = layout_of(scanner_of(chosen, "fdm-0.4", catalogue))
-        parts_of(layout)
-        list(joints_of(layout))
-    except BuildError as error:
-        return str(error)
-    return None
+    return laid_out(scanner_of(chosen, "fdm-0.4", catalogue))
+
+
+def screws_without_a_hole(layout: Layout) -> Iterator[str]:
+    """Yield a line for each screw into a lidar or a servo's case that no usable hole of its record takes."""
+    lidar, servo, (R, t) = layout.scanner.lidar, layout.scanner.servo, layout.drive.servo_pose
+    for joint in layout.joints:
+        start = np.array([axis.start for axis in joint.axes])
+        if joint.onto == LIDAR_BODY:
+            yield from _misses(joint, start @ layout.stack.R(), [hole for hole in lidar.holes if hole.axis == "-z"])
+        elif joint.onto == SERVO_CASE:
+            face = "-z" if joint.axes[0].along[2] > 0 else "+z"
+            holes = [hole for hole in servo.holes if hole.axis == face]
+            yield from _misses(joint, (start - t * [1.0, 1.0, 0.0]) @ R, holes)
+
+
+def _misses(joint: Joint, start: Array, holes: list[Hole]) -> Iterator[str]:
+    fit = [hole for hole in holes if hole.kind in USABLE and hole.size == joint.screw.name]
+    for x, y, _ in start:
+        near = [hole for hole in fit if np.hypot(x - hole.at_mm[0], y - hole.at_mm[1]) < SAME_MM]
+        if not near:
+            yield f"{joint.part} on {joint.onto}: no hole for {joint.screw.name} at ({x:.1f}, {y:.1f})"
+        elif near[0].kind != "through" and joint.length_mm - joint.grip_mm > near[0].depth_mm:
+            yield f"{joint.part} on {joint.onto}: {joint.number} is longer than the thread of {near[0].depth_mm:g} mm"
 
 
 def _general(reason: str, lidar: str) -> str:

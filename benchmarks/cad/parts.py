@@ -46,10 +46,10 @@ Products = tuple[str, str, str]
 BORE, BORE_TOO, CAPSULE = "UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"
 COMBINATIONS: tuple[Products, ...] = (
     ("UTM-30LX", "MX-64R", BORE),
-    ("UST-10LX", "XM430-W350", BORE_TOO),
+    ("UST-10LX", "MX-106", BORE_TOO),
     ("URG-04LX", "AX-12A", BORE),
-    ("LD19", "XL430-W250", BORE),
-    ("UTM-30LX", "XM540-W270", CAPSULE),
+    ("LD19", "MX-28", BORE),
+    ("UTM-30LX", "MX-106", CAPSULE),
     ("UST-10LX", "MX-28", CAPSULE),
 )
 SLICED = 25  # one setting of so many of each combination
@@ -183,8 +183,8 @@ def _values(scanner: Scanner, assembly: Assembly, checks: list[Finding]) -> dict
         "bearing": float(assembly.layout.stack.bearing is not None),
         "sub_plate": float(assembly.layout.stack.sub_plate is not None),
         "counterweight": float("counterweight" in assembly.made),
-        "leads": float(len(assembly.leads)),
-        "leads_laid": float(sum(lead.path is not None for lead in assembly.leads)),
+        "leads": float(len(assembly.layout.leads)),
+        "leads_laid": float(sum(lead.path is not None for lead in assembly.layout.leads)),
         **({"horn_share": max(horn)} if horn else {}),
         **found,
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import process_time
 
 import numpy as np
 from scipy.optimize import differential_evolution
@@ -27,7 +28,7 @@ from scanwright.design.task.task import Limits, LoadedTask
 LOOKS = ((120, 1000), (1215, 30))  # quadrature nodes, and how many of the settings are looked at again
 GENERATIONS = 40
 POPULATION = 15  # of the evolution, times the angles that are free
-EVALUATIONS = 500  # of the evolution against a random task
+MOST_GENERATIONS = 100_000  # of the evolution against a random task, which ends by its processor time
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +52,13 @@ class Contest:
         return max((own.J - own.J_error - rival.J - rival.J_error for _, rival in self.rivals.values()), default=0.0)
 
 
-def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int, seed: int) -> Contest:
-    """The search of a task against settings drawn at random, if any are, and against evolution."""
+def contest(
+    problem: Problem, ranges: AngleRanges, draws: int, generations: int, seed: int, budget_s: float = np.inf
+) -> Contest:
+    """Search a task, and compare the optimum with random settings, if any, and with differential evolution.
+
+    The evolution ends after a number of generations or after `budget_s` seconds of processor time.
+    """
     found = search(problem, ranges)
     low, high = np.array([ranges.limits(name) for name in NAMES]).T
     free = high > low
@@ -64,8 +70,16 @@ def contest(problem: Problem, ranges: AngleRanges, draws: int, generations: int,
         return required.J(setting, LOOKS[0][0])
 
     bounds = np.column_stack([low, high])[free]
+    end = process_time() + budget_s
     evolved = differential_evolution(
-        J, bounds, maxiter=generations, popsize=POPULATION, tol=1e-6, polish=False, rng=seed
+        J,
+        bounds,
+        maxiter=generations,
+        popsize=POPULATION,
+        tol=1e-6,
+        polish=False,
+        rng=seed,
+        callback=lambda *_: process_time() > end,
     )
     setting = low.copy()
     setting[free] = evolved.x
@@ -110,16 +124,15 @@ def print_contest(loaded: LoadedTask, draws: int, seed: int) -> None:
         )
 
 
-def print_evolution(tasks: range, seed: int) -> None:
-    """Random tasks whose optimum evolution beats, with all that repeats them, then how many."""
+def print_evolution(tasks: range, seed: int, budget_s: float) -> None:
+    """Print random tasks whose optimum evolution beats, with all that repeats them, then how many."""
     beaten = refused = 0
     for i in tasks:
         rng = np.random.default_rng([seed, i])
-        generations = EVALUATIONS // (POPULATION * len(NAMES)) - 1
         with TemporaryDirectory() as folder:
             loaded = random_task(rng, Path(folder)).loaded
         try:
-            result = contest(problem_of(loaded), loaded.task.angles, 0, generations, i)
+            result = contest(problem_of(loaded), loaded.task.angles, 0, MOST_GENERATIONS, i, budget_s)
         except TaskError as error:
             refused += 1
             print(f"task {i} refused: {error}", flush=True)
@@ -129,9 +142,9 @@ def print_evolution(tasks: range, seed: int) -> None:
         best, task = result.best.score, loaded.task
         print(
             f"task {i}, {task.motion.mode}, {task.density.objective}: "
-            f"{best.J:.5f} +- {error_words(best.J, best.J_error)} {word}",
+            f"{best.J:.5f} +- {error_words(best.J, best.J_error)} {word} {list(result.rivals)}",
             flush=True,
         )
         if result.beaten_by > 0:
             print(f"  {result} {task.model_dump(mode='json')}", flush=True)
-    print(f"evolution of {EVALUATIONS} settings beats the optimum of {beaten} of {len(tasks) - refused} random tasks")
+    print(f"evolution for {budget_s:g} s beats the optimum of {beaten} of {len(tasks) - refused} random tasks")

@@ -25,7 +25,7 @@ from scanwright.design.objective.ball_search import scan_tree
 from scanwright.design.objective.named_objectives import Moment, log_density
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import score
-from scanwright.design.search.plane_axis_product import BothWays, both_ways
+from scanwright.design.search.plane_axis_product import BothOrientations, both_orientations
 from scanwright.design.search.search import search
 from scanwright.design.sphere.directions import equal_angle_grid, weighted_samples
 from scanwright.design.task.task import load_task
@@ -42,9 +42,9 @@ class Products:
     seconds: float = 0.0
     largest: tuple[int, int, int] = (0, 0, 0)
 
-    def counting(self, moment: Moment, g: Array, weights: Array) -> BothWays:
-        """As `both_ways`, each product counted and timed."""
-        pair = both_ways(moment, g, weights)
+    def counting(self, moment: Moment, g: Array, weights: Array) -> BothOrientations:
+        """As `both_orientations`, each product counted and timed."""
+        pair = both_orientations(moment, g, weights)
         nodes = weights.shape[1]
 
         def counted(piece: slice, part: slice) -> tuple[Array, Array]:
@@ -84,7 +84,7 @@ def main() -> None:
     mapped = planes * (build + whole) + covered * per_sum
 
     products = Products()
-    with patch("scanwright.design.search.coarse.both_ways", products.counting):
+    with patch("scanwright.design.search.coarse.both_orientations", products.counting):
         counted = search(problem, ranges).seconds
     machine = plain_matmul(products.largest)
     reached = products.flops / products.seconds

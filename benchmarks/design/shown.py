@@ -4,7 +4,7 @@
 
 Random tasks of `random_tasks` at random settings, two of five at whole 15, 45 or 90 deg, go through what stands behind
 `evaluate`, `compare`, the report and the studio. A message that refuses a task is right, anything else that is raised
-is a fault. One of fifty is compared in full, which searches mounts, and drawn in its room: that takes a second or more.
+is a fault. One of 25 is compared in full, which searches mounts, and its pictures are drawn: that takes seconds.
 A seed of 0 is a new one every time.
 """
 
@@ -51,7 +51,7 @@ from scanwright.studio.state import Setting
 from scanwright.studio.view.coloured_sphere import density_colours, edges, hexagons, highest_density
 
 TOLERANCE = 0.1  # of J: what is shown of it is looked at, not how exact it is
-FULL_COMPARISONS = 50  # one of so many tasks
+FULL = 25  # one of so many tasks
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def shown(drawn: RandomTask, folder: Path, *, full: bool = False) -> tuple[list[
     Args:
         drawn: the task and its setting; beams that are missing stand for those that parts block.
         folder: where the files of the task are.
-        full: whether other mounts and scanners are searched as `compare` does it, and the report's room is drawn.
+        full: whether other mounts and scanners are searched as `compare` does it, and the report's pictures are drawn.
     """
     commands: dict[str, Callable[[RandomTask, Path], None]] = {
         "evaluate": _evaluate,
@@ -144,10 +144,10 @@ def _report(drawn: RandomTask, folder: Path, picture: bool) -> None:
     json.dumps(sphere.data())
     if picture:
         room_picture(loaded.task, folder, problem, setting, sphere, [], shadow)
+        landscape(planes[:, :3], PLANE, angles, "J")
+        landscape(axes, AXIS, angles, "J")
     cards(angles, found, on_planes(loaded, problem, setting, shadow), None)
     other_mounts(problem, loaded.task, setting, planes)
-    landscape(planes[:, :3], PLANE, angles, "J")
-    landscape(axes, AXIS, angles, "J")
     found.as_built.lines()
     if shadow is not None:
         hidden_by(shadow)
@@ -181,7 +181,7 @@ def main() -> None:
     for i in tasks:
         with TemporaryDirectory() as folder:
             drawn = shown_task(np.random.default_rng([seed, i]), Path(folder))
-            failures, refused = shown(drawn, Path(folder), full=i % FULL_COMPARISONS == 0)
+            failures, refused = shown(drawn, Path(folder), full=i % FULL == 0)
         failed += bool(failures)
         refusals.update(message.split(":")[0] for message in refused)
         for failure in failures:

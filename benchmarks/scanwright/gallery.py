@@ -210,10 +210,11 @@ Eight tasks from eight worlds. Left the scanner that was built, right one full s
 noise of the data sheet included; the red ball is the scanner, larger than it is. All of this page is made by
 `python -m benchmarks.scanwright.gallery`: tasks, parts, scans, pictures and figures.
 
-**Do not print these parts yet.** For most lidars, servos and slip rings of this page the catalogue has hole patterns or
-lengths that the real devices do not have, so the parts do not fit: of the 16 screws that hold lidar and servo of
-`low_cost` and of the shelf below, 12 find no thread. `build` prints a warning for each such product,
-`scanwright catalogue NAME` has the reasons. Angles, densities and scans do not depend on it.
+**Do not print the parts with a slip ring of Senring yet.** The real UH1256 is longer than that of the catalogue, and
+its leads are thicker. `build` prints a warning for each such product, `scanwright catalogue NAME` has the reasons.
+Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real devices
+have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and scans do not
+depend on the holes.
 """
 
 

@@ -11,8 +11,6 @@ from scanwright.cad.assembly.bought import BodySpec
 from scanwright.cad.geometry.inertia import Inertial, of_solid
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
 from scanwright.cad.geometry.print_pose import PrintPose, print_pose
-from scanwright.cad.layout.cables.leads import RotorLead
-from scanwright.cad.layout.cables.standing import StandingLead
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.parts.part_spec import Colour, PartSpec
 
@@ -27,8 +25,6 @@ class Assembly:
         bodies: what is known of the bought ones.
         made: parts of this project.
         bought: bodies of bought products.
-        leads: between lidar and ring, as they were laid out.
-        standing: cables between devices and deck, likewise.
     """
 
     layout: Layout
@@ -36,8 +32,6 @@ class Assembly:
     bodies: dict[str, BodySpec]
     made: dict[str, cq.Solid]
     bought: dict[str, cq.Solid]
-    leads: tuple[RotorLead, ...] = ()
-    standing: tuple[StandingLead, ...] = ()
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
     _inertials: dict[str, Inertial] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -54,8 +48,8 @@ class Assembly:
         """Names of all parts and bodies that turn about the axis."""
         return frozenset(name for name in (*self.made, *self.bought) if self.spec(name).turns)
 
-    def standing_parts(self) -> list[str]:
-        """Names of the made parts that stand still."""
+    def fixed_parts(self) -> list[str]:
+        """Names of the made parts that do not turn."""
         return [name for name in self.made if not self.parts[name].turns]
 
     def turning_parts(self) -> list[str]:

@@ -12,24 +12,25 @@ from functools import partial
 from typing import Literal
 
 import cadquery as cq
+import numpy as np
 
 from scanwright.cad import solids
 from scanwright.cad.assembly import bought_shapes as draw
-from scanwright.cad.assembly.tube import LEAD_CHORDS, lead_solid, standing_solid
+from scanwright.cad.assembly.tube import LEAD_CHORDS, cable_solid, lead_solid
 from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.cables.fixed import FixedCable
 from scanwright.cad.layout.cables.leads import RotorLead
-from scanwright.cad.layout.cables.standing import StandingLead
-from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import DriveLayout, Station
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.parts.part_spec import STEEL, Colour
-from scanwright.design.catalogue.products import Bearing
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Bearing, Belt, Servo, SlipRing
 
 CASE, RING, LIDAR, RUBBER = (0.16, 0.16, 0.19), (0.72, 0.58, 0.20), (0.20, 0.23, 0.27), (0.10, 0.10, 0.11)
 WINDOW = (0.35, 0.05, 0.08)
 LEAD = (0.62, 0.12, 0.10)
-LOWER = "_lower"
 
 
 Frame = Literal["servo", "rot", "laser"]
@@ -67,43 +68,50 @@ class BodySpec:
         return self.frame != "servo"
 
 
-def bought_of(layout: Layout, leads: Sequence[RotorLead] = (), standing: Sequence[StandingLead] = ()) -> list[BodySpec]:
+def bought_of(layout: Layout) -> list[BodySpec]:
     """The bodies of everything that one scanner is bought with, of the leads on the rotor, and of the other cables."""
-    stack = layout.stack
-    drive = _of_belt(stack) if isinstance(stack, BeltStack) else _of_direct(layout, stack)
-    return [*drive, *_of_lidar(layout), *_of_leads(leads), *_of_standing(standing)]
+    drawn = [body for station in layout.drive.stations for body in _of_station(layout.drive, station)]
+    drawn.sort(key=lambda body: body.product != names.SERVO)
+    return [*drawn, *_of_lidar(layout), *_of_leads(layout.leads), *_of_cables(layout.cables)]
 
 
-def _of_direct(layout: Layout, stack: DirectStack) -> Iterator[BodySpec]:
-    """Servo, ring and bearing."""
-    servo = layout.scanner.servo
-    case, horn = partial(draw.servo_case, servo, stack.horn), partial(draw.servo_horn, servo, stack.horn)
-    yield _servo(names.SERVO_CASE, "servo", case, meets=names.SERVO_HORN)
-    yield _servo(names.SERVO_HORN, "rot", horn)
-    if layout.scanner.slip_ring is not None:
-        yield _ring(names.RING_STATOR, "servo", partial(draw.ring_stator, stack), meets=names.RING_ROTOR)
-        yield _ring(names.RING_ROTOR, "rot", partial(draw.ring_rotor, stack))
-    if stack.bearing is not None:
-        yield from _bearing(stack.bearing, stack.bearing_top, "")
+def _of_station(drive: DriveLayout, station: Station) -> Iterator[BodySpec]:
+    product, (low, high) = station.product, station.z_mm
+    if isinstance(product, Servo):
+        yield from _of_servo(drive, product)
+    elif isinstance(product, Bearing):
+        yield from _bearing(product, high, station.place)
+    elif isinstance(product, SlipRing):
+        stator = partial(draw.ring_stator, product, low, high)
+        rotor = partial(draw.ring_rotor, product, low, high)
+        if product.bore_mm == 0:
+            stator = partial(draw.capsule, product, low, high, drive.servo_pose[0])
+            rotor = partial(draw.capsule_rotor, product, high)
+        yield _ring(names.RING_STATOR, "servo", stator, meets=names.RING_ROTOR)
+        yield _ring(names.RING_ROTOR, "rot", rotor)
+    elif isinstance(product, Belt):
+        stack = drive.of(BeltStack)
+        assert stack is not None  # what a belt is laid out by
+        yield BodySpec(
+            name=names.BELT,
+            product=names.BELT,
+            frame="servo",
+            colour=RUBBER,
+            make=partial(draw.belt, stack),
+            meets=names.SHAFT_PULLEY,
+        )
 
 
-def _of_belt(stack: BeltStack) -> Iterator[BodySpec]:
-    """Servo, bearings, capsule and belt."""
-    case, horn = partial(draw.servo_case, stack.servo, stack.horn), partial(draw.servo_horn, stack.servo, stack.horn)
-    yield _servo(names.SERVO_CASE, "servo", partial(_beside, stack, case))
-    yield _servo(names.SERVO_OUTPUT, "servo", partial(_beside, stack, horn))
-    yield from _bearing(stack.carrier, stack.tower_top, "_upper")
-    yield from _bearing(stack.carrier, stack.lower_bottom + stack.carrier.width_mm, LOWER)
-    yield _ring(names.RING_STATOR, "servo", partial(draw.capsule, stack), meets=names.RING_ROTOR)
-    yield _ring(names.RING_ROTOR, "rot", partial(draw.capsule_rotor, stack))
-    yield BodySpec(
-        name=names.BELT,
-        product=names.BELT,
-        frame="servo",
-        colour=RUBBER,
-        make=partial(draw.belt, stack),
-        meets=names.SHAFT_PULLEY,
-    )
+def _of_servo(drive: DriveLayout, servo: Servo) -> Iterator[BodySpec]:
+    """Case and horn, which turns with the rotor if it is on its axis."""
+    R, t = drive.servo_pose
+    case, horn = partial(draw.servo_case, servo, t[2]), partial(draw.servo_horn, servo, t[2])
+    if not np.any(t[:2]):
+        yield _servo(names.SERVO_CASE, "servo", case, meets=names.SERVO_HORN)
+        yield _servo(names.SERVO_HORN, "rot", horn)
+        return
+    yield _servo(names.SERVO_CASE, "servo", partial(_moved, R, t, case))
+    yield _servo(names.SERVO_OUTPUT, "servo", partial(_moved, R, t, horn))
 
 
 def _servo(name: str, frame: Frame, make: Callable[[], cq.Solid], meets: str = "") -> BodySpec:
@@ -117,7 +125,7 @@ def _ring(name: str, frame: Frame, make: Callable[[], cq.Solid], meets: str = ""
 def _bearing(bearing: Bearing, top: float, place: str) -> Iterator[BodySpec]:
     inner, outer = f"{names.BEARING}_inner{place}", f"{names.BEARING}_outer{place}"
     make = partial(draw.bearing_inner, bearing, top)
-    low = place == LOWER
+    low = place == "_lower"
     yield BodySpec(name=inner, product=names.BEARING, frame="rot", colour=STEEL, make=make, from_below=low)
     make = partial(draw.bearing_outer, bearing, top)
     yield BodySpec(
@@ -149,7 +157,7 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
 
 
 def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
-    """Those that have a way."""
+    """Those that have a path."""
     for i, lead in enumerate(leads, start=1):
         if lead.path is not None:
             yield BodySpec(
@@ -162,23 +170,23 @@ def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
             )
 
 
-def _of_standing(leads: Sequence[StandingLead]) -> Iterator[BodySpec]:
-    """Those that have a way."""
-    for lead in leads:
-        if lead.path is not None:
+def _of_cables(cables: Sequence[FixedCable]) -> Iterator[BodySpec]:
+    """Those that have a path."""
+    for cable in cables:
+        if cable.path is not None:
             yield BodySpec(
-                name=lead.name,
-                product=names.STANDING_LEADS,
+                name=cable.name,
+                product=names.FIXED_CABLES,
                 frame="servo",
                 colour=LEAD,
-                make=partial(standing_solid, lead),
+                make=partial(cable_solid, cable),
                 chords=LEAD_CHORDS,
             )
 
 
-def _beside(stack: BeltStack, make: Callable[[], cq.Solid]) -> cq.Solid:
-    """A body of the servo where it stands beside the axis."""
-    return make().moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
+def _moved(R: Array, t: Array, make: Callable[[], cq.Solid]) -> cq.Solid:
+    """A body of a servo that is not on the axis."""
+    return make().moved(solids.location(R, t * [1.0, 1.0, 0.0]))
 
 
 def _on_axis(layout: Layout, make: Callable[[], cq.Solid]) -> cq.Solid:

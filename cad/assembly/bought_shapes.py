@@ -12,12 +12,12 @@ import cadquery as cq
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
-from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
 from scanwright.cad.layout.names import BELT, RING_STATOR
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Bearing, Lidar, Servo
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Bearing, Lidar, Servo, SlipRing
 
 CAP_INSET = 1.5
 CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide
@@ -29,9 +29,12 @@ STUB = 0.4  # between the stub of a capsule's rotor and its body
 def lidar_body(lidar: Lidar) -> cq.Solid:
     """Below the window, with its threaded holes."""
     half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
-    radius = SCREWS[lidar.mount_screw].nominal / 2
-    threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.mount_holes_mm]
-    return solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low)).cut(*threads).Solids()[0]
+    radius = SCREWS[lidar.base.screw].nominal / 2
+    threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.base.places]
+    body: cq.Shape = solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low))
+    if lidar.ears_mm:
+        body = body.fuse(*(solids.box(*ear) for ear in lidar.ears_mm)).clean()
+    return body.cut(*threads).Solids()[0]
 
 
 def lidar_window(lidar: Lidar) -> cq.Solid:
@@ -53,13 +56,8 @@ def lidar_cable(lidar: Lidar, y: float) -> cq.Solid:
 def servo_case(servo: Servo, z: float) -> cq.Solid:
     """The case, its horn face at height z, with recesses down to the planes of its front and rear holes."""
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
-    recesses = [
-        solids.upright(EAR_ROOM, z + servo.case_holes_z_mm, z + z1 + 1.0, *hole) for hole in servo.case_holes_mm
-    ]
-    recesses += [
-        solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.case_rear_holes_z_mm, *hole)
-        for hole in servo.case_rear_holes_mm
-    ]
+    recesses = [solids.upright(EAR_ROOM, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
+    recesses += [solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
     return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
 
 
@@ -74,23 +72,21 @@ def servo_horn(servo: Servo, z: float) -> cq.Solid:
     return disc.Solids()[0]
 
 
-def ring_stator(stack: DirectStack) -> cq.Solid:
+def ring_stator(ring: SlipRing, low: float, high: float) -> cq.Solid:
     """Of a through-bore ring; the split to its rotor is not in any drawing."""
-    low, high = stack.ring_bottom, stack.ring_top
-    stator = solids.upright(stack.ring_radius, low + 1.0, high - 1.0)
-    return stator.cut(solids.upright(_split(stack), low - 1.0, high + 1.0)).Solids()[0]
+    stator = solids.upright(ring.outer_diameter_mm / 2, low + 1.0, high - 1.0)
+    return stator.cut(solids.upright(_split(ring), low - 1.0, high + 1.0)).Solids()[0]
 
 
-def ring_rotor(stack: DirectStack) -> cq.Solid:
+def ring_rotor(ring: SlipRing, low: float, high: float) -> cq.Solid:
     """Of a through-bore ring."""
-    low, high = stack.ring_bottom, stack.ring_top
-    rotor = solids.upright(_split(stack) - 0.2, low, high)
-    return rotor.cut(solids.upright(stack.ring_bore / 2, low - 1.0, high + 1.0)).Solids()[0]
+    rotor = solids.upright(_split(ring) - 0.2, low, high)
+    return rotor.cut(solids.upright(ring.bore_mm / 2, low - 1.0, high + 1.0)).Solids()[0]
 
 
-def _split(stack: DirectStack) -> float:
-    bore = stack.ring_bore / 2
-    return bore + 0.4 * (stack.ring_radius - bore)
+def _split(ring: SlipRing) -> float:
+    bore = ring.bore_mm / 2
+    return bore + 0.4 * (ring.outer_diameter_mm / 2 - bore)
 
 
 def bearing_inner(bearing: Bearing, high: float) -> cq.Solid:
@@ -113,22 +109,26 @@ def _tube(inner: float, outer: float, low: float, high: float) -> cq.Solid:
     return solids.lathe([(inner, low), (outer, low), (outer, high), (inner, high)])
 
 
-def capsule(stack: BeltStack) -> cq.Solid:
-    """Body and flange, hollow where the rotor's stub comes out."""
-    flange = stack.flange
+def capsule(ring: SlipRing, low: float, high: float, R: Array) -> cq.Solid:
+    """Body and flange, hollow where the rotor's stub comes out; R turns it about the axis, shape (3, 3)."""
+    flange = ring.flange
+    assert flange is not None  # as of every capsule
+    flange_top = high - flange.below_top_mm
+    flange_low = flange_top - flange.thickness_mm
     with building(RING_STATOR, "flange", "flange.diameter_mm", flange.diameter_mm) as checked:
-        body = solids.upright(stack.ring_radius, stack.ring_bottom, stack.ring_top).fuse(
-            solids.upright(flange.diameter_mm / 2, stack.disc_top, stack.flange_top)
+        body = solids.upright(ring.outer_diameter_mm / 2, low, high).fuse(
+            solids.upright(flange.diameter_mm / 2, flange_low, flange_top)
         )
-        low, high = stack.disc_top - 1.0, stack.flange_top + 1.0
-        holes = [solids.upright(flange.hole_mm / 2, low, high, x, y) for x, y in flange_centres(stack)]
+        ends = flange_low - 1.0, flange_top + 1.0
+        holes = [solids.upright(flange.hole_mm / 2, *ends, x, y) for x, y in flange_centres(flange)]
         capsule = checked(body.cut(*holes))
-    return capsule.moved(solids.location(stack.turn()))
+    return capsule.moved(solids.location(R))
 
 
-def capsule_rotor(stack: BeltStack) -> cq.Solid:
+def capsule_rotor(ring: SlipRing, high: float) -> cq.Solid:
     """The stub that the soft tube goes on."""
-    return solids.upright(stack.rotor.diameter_mm / 2, stack.ring_top + STUB, stack.ring_top + stack.rotor.length_mm)
+    assert ring.rotor is not None  # as of every capsule
+    return solids.upright(ring.rotor.diameter_mm / 2, high + STUB, high + ring.rotor.length_mm)
 
 
 def belt(stack: BeltStack) -> cq.Solid:

@@ -11,7 +11,7 @@ import manifold3d
 import numpy as np
 
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
-from scanwright.cad.layout.linkage import AlignmentLinkage
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.alignment_linkage import shapes_of
 
 CHORD_ERROR = 0.2  # mm: not seen on a screen, a third of the triangles of the files

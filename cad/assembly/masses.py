@@ -11,7 +11,8 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.cables.leads import SAMPLE
-from scanwright.cad.layout.drive import Mass, Stack
+from scanwright.cad.layout.drive import Mass
+from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.loads import Weight, weight_of
 from scanwright.design.arrays import Array
 from scanwright.design.scanner import Scanner
@@ -29,16 +30,16 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns. Leads are lines.
     """
     lidar, masses = scanner.lidar, assembly.layout.drive.masses
-    standing = [assembly.inertial(name) for name in assembly.standing_parts()]
-    standing += [_share(mass, 1 - mass.turning) for mass in masses]
-    standing += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.standing if lead.path]
+    fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
+    fixed += [_share(mass, 1 - mass.turning) for mass in masses]
+    fixed += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.cables if lead.path]
     turning = [assembly.inertial(name) for name in assembly.turning_parts()]
     turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
-    turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.leads if lead.path]
+    turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.leads if lead.path]
     x, y, z = lidar.body_mm
     base = -lidar.optical_height_mm
     laser = inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
-    return {"servo": inertia.together(standing), "rot": inertia.together(turning), "laser": laser}
+    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": laser}
 
 
 def rotor_of(scanner: Scanner, bodies: Mapping[str, Inertial]) -> Inertial:
@@ -46,7 +47,7 @@ def rotor_of(scanner: Scanner, bodies: Mapping[str, Inertial]) -> Inertial:
     return inertia.together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
 
 
-def rotor_weight(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) -> Weight:
+def rotor_weight(scanner: Scanner, stack: Hub, bodies: Mapping[str, Inertial]) -> Weight:
     """Weight of all that turns, from the bodies of `link_bodies`."""
     rotor = rotor_of(scanner, bodies)
     x, y, z = rotor.centre_m

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scanwright.cad.layout.drive import Stack
-from scanwright.cad.layout.layout import config_hash, drive_of
+from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.placement import drive_of
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
@@ -63,7 +63,8 @@ class PartsWorkshop:
         """
         from scanwright.cad.assembly.make import make_parts
 
-        key = f"{config_hash(scanner)} {scanner.angles.t_rot_laser_mm}"
+        angles = scanner.angles
+        key = f"{angles.angles_deg} {angles.delta_rotvec_rot_deg} {angles.t_rot_laser_mm}"
         if key not in self._made:
             self._made[key] = make_parts(scanner)
         return self._made[key]
@@ -105,7 +106,7 @@ def bundles(scanner: Scanner) -> tuple[Array, Array]:
     return APERTURE_M * off + scanner.angles.T_rot_laser()[:3, 3], directions
 
 
-def beams_in_cone(stack: Stack, bearings_rad: Array) -> Mask:
+def beams_in_cone(stack: Hub, bearings_rad: Array) -> Mask:
     """Beams whose middle lies in the cone about -z that ring, bearing and cage fill at every axis angle."""
     q = stack.R()[2]
     down = -(q[0] * np.cos(bearings_rad) + q[1] * np.sin(bearings_rad))

@@ -8,9 +8,9 @@ import numpy as np
 from scanwright.cad import solids
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.cables import joint
+from scanwright.cad.layout.cables.fixed import FixedCable
 from scanwright.cad.layout.cables.leads import RotorLead
 from scanwright.cad.layout.cables.path import Path, PathPiece
-from scanwright.cad.layout.cables.standing import StandingLead
 from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.solids import building
 from scanwright.design.errors import BuildError
@@ -34,15 +34,15 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
         return _closed(ROTOR_LEAD, checked(tube))
 
 
-def standing_solid(lead: StandingLead) -> cq.Solid:
-    """A cable that stands still.
+def cable_solid(cable: FixedCable) -> cq.Solid:
+    """A cable that does not turn.
 
     Raises:
         BuildError: the kernel does not make one valid solid of it, with a closed mesh.
     """
-    assert lead.path is not None
-    with building(lead.name, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
-        return _closed(lead.name, checked(_tube(lead.path, lead.diameter / 2)))
+    assert cable.path is not None
+    with building(cable.name, "tube along its path", "diameter", f"{cable.diameter:g} mm") as checked:
+        return _closed(cable.name, checked(_tube(cable.path, cable.diameter / 2)))
 
 
 def _closed(name: str, solid: cq.Solid) -> cq.Solid:

@@ -10,15 +10,15 @@ from scanwright.cad.checks.limits import at_least, note, tidy
 from scanwright.cad.layout.cables import joint
 from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
 from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.tie_seat import TieSeat
 from scanwright.cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
+from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.findings import Finding
 
 
 def fixed_cable_checks(assembly: Assembly) -> list[Finding]:
     """Check bend and length of every cable that does not turn."""
     checks = []
-    for cable in assembly.standing:
+    for cable in assembly.layout.cables:
         if cable.path is None:
             what = f"no path from {cable.device} to the deck"
             checks.append(_no_path(cable.name, what, cable.radius, cable.diameter, "lay it yourself"))
@@ -32,16 +32,14 @@ def fixed_cable_checks(assembly: Assembly) -> list[Finding]:
 
 def rotor_cable_checks(assembly: Assembly) -> list[Finding]:
     """Check bend, joint, length and tie of every cable between slip ring and lidar; a note if there is none."""
-    ring = assembly.layout.scanner.slip_ring
-    if not assembly.leads:
+    ring, leads = assembly.layout.scanner.slip_ring, assembly.layout.leads
+    if not leads:
         what = "no ring: the cables of the lidar need a loose loop for the sweep"
         if ring is not None:
             what = f"no path: the catalogue has no lead_diameter_mm or bend radius of {ring.name}"
         return [Finding("leads", "note", ROTOR_LEADS, f"{ROTOR_LEADS}: {what}")]
     seat = assembly.layout.linkage.hub_tie
-    return [
-        check for i, lead in enumerate(assembly.leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}", seat)
-    ]
+    return [check for i, lead in enumerate(leads, start=1) for check in _checks(lead, f"{ROTOR_LEAD}_{i}", seat)]
 
 
 def _checks(lead: RotorLead, subject: str, seat: TieSeat | None) -> list[Finding]:

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.layout.drive import DriveLayout
+from scanwright.design.catalogue.holes import Hole, what_holds
+from scanwright.design.catalogue.measuring import how_to_measure
 from scanwright.design.catalogue.products import Product
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
@@ -13,9 +15,9 @@ from scanwright.design.scanner import Scanner
 
 # Values of a product that shape no part alone.
 SHAPING = {
-    "lidar.mount_thread_depth_mm": "the length of the screws in the lidar",
+    "lidar.holes": "the screws of the lidar",
     "printer.screw_clearance_mm": "every screw hole",
-    "servo.case_rear_holes_mm": "the holes in the deck",
+    "servo.holes": "the screws of the servo's case",
 }
 SHOWN_CHARS = 60  # of a value in a message; a longer one is cut
 
@@ -59,8 +61,8 @@ def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Finding
 
 
 def unverified(products: Iterable[Product], assembly: Assembly) -> list[Finding]:
-    """Return a note for each unverified value of a product that shapes a part."""
-    return [note for product in products for note in _unverified(product, assembly)]
+    """Return a warning for each unverified value of a product that shapes a part."""
+    return [warning for product in products for warning in _unverified(product, assembly)]
 
 
 def _unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
@@ -75,10 +77,12 @@ def _unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
         if f"{product.kind}.{field}" in shaping:
             value, source = _shown(getattr(product, field)), provenance[field].source
             message = f"{product.name}: {field} = {value} is not verified ({source})"
-            hint = f"measure yours, it shapes {shaping[f'{product.kind}.{field}']}"
-            yield Finding("unverified", "note", product.name, message, hint=hint)
+            hint = f"{how_to_measure(field)}: it shapes {shaping[f'{product.kind}.{field}']}"
+            yield Finding("unverified", "warning", product.name, message, hint=hint)
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, tuple) and value and isinstance(value[0], Hole):
+        return what_holds(value)
     text = str(list(value)) if isinstance(value, tuple) else str(value)
     return text if len(text) < SHOWN_CHARS else f"{text[: SHOWN_CHARS - 3]}..."

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.modules.unasked import unasked
-from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
+from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE
 from scanwright.cad.screws import passing_hole
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.findings import Finding
-from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 
@@ -26,22 +25,7 @@ def remarks_of(scanner: Scanner, assembly: Assembly) -> tuple[Finding, ...]:
     return tuple(remarks)
 
 
-def left_out_of(assembly: Assembly) -> tuple[LeftOut, ...]:
-    """Return the parts that this scanner does not need."""
-    layout = assembly.layout
-    out = [*layout.drive.left_out]
-    if isinstance(layout.counterweight, LeftOut):
-        out.append(layout.counterweight)
-    ties = hub_tie_of(layout.scanner, layout.linkage), plate_ties_of(layout.scanner.lidar, layout.linkage)
-    out += [tie for tie in ties if isinstance(tie, LeftOut)]
-    if layout.deck.tripod is None:
-        out.append(unasked(TRIPOD_FOOT))
-    if layout.deck.flat:
-        out.append(LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts"))
-    return tuple(out)
-
-
-def without_traps(printer: Printer, joints: list[Joint]) -> list[Finding]:
+def without_traps(printer: Printer, joints: Sequence[Joint]) -> list[Finding]:
     """Return a note for each joint with plain threads although the printer's profile requires nuts."""
     if printer.thread != "nut":
         return []
@@ -64,9 +48,10 @@ def _turn_from_metal(part: str, why: str) -> Finding:
 
 def _screwed_to_deck(scanner: Scanner, mounted: Mounted) -> Finding:
     hole = passing_hole(mounted.screw, scanner.printer)
+    what = f"{scanner.servo.name} by its rear holes" if mounted.onto == SERVO_CASE else f"{mounted.onto} by its feet"
     places = ", ".join(f"({x:g}, {y:g})" for x, y in mounted.holes)
     hint = (
-        f"hold {scanner.servo.name} by its rear holes with 4 x {mounted.screw.name} from below through the deck, "
-        f"{hole:g} mm holes at {places} mm from the axis; leave room for the plugs"
+        f"hold {what} with 4 x {mounted.screw.name} from below through the deck, {hole:g} mm "
+        f"holes at {places} mm from the axis; leave room for the plugs"
     )
     return Finding("servo_on_deck", "note", BASE_MOUNT, f"{BASE_MOUNT}: not included, the axis is upright", hint=hint)

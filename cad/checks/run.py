@@ -19,7 +19,6 @@ from scanwright.cad.checks.loads.mount import mount_checks
 from scanwright.cad.checks.loads.retention import retention_checks
 from scanwright.cad.checks.printing import printing_checks
 from scanwright.cad.checks.products import known_errors, module_checks, products_of, unverified
-from scanwright.cad.checks.remarks import left_out_of
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.design.findings import Finding
 from scanwright.design.progress import Progress
@@ -63,7 +62,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
         *known_errors(products),
         *clearance_checks(assembly),
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
-        *mechanics_checks(scanner, layout.stack, bodies),
+        *mechanics_checks(layout, bodies),
         *retention_checks(scanner, assembly),
         *wiring_checks(scanner),
         *rotor_cable_checks(assembly),
@@ -71,7 +70,7 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
         *deflection_checks(scanner, assembly, bodies, meshes),
         *mount_checks(scanner, assembly, bodies, meshes),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
-        *module_checks(scanner, left_out_of(assembly)),
+        *module_checks(scanner, layout.left_out),
         *unverified(products, assembly),
     ]
     return checks, shadow

@@ -67,6 +67,7 @@ TABLE = (
     CheckRow(
         "wiring", "circuits, wires, fuses, supply, voltages", "the rules of `design.electrics.rules`", "catalogue"
     ),
+    CheckRow("ring_data", "data rating of the slip ring", "data that the lidar sends", "catalogue"),
     CheckRow("leads", "cables between slip ring and lidar, if there are none"),
     CheckRow("lead_bend", "bend radius of a cable", "bend radius of the cable", "catalogue"),
     CheckRow("lead_joint", "straight piece of a cable for its joint", "length of its shrink tube", "chosen"),

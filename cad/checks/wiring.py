@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from scanwright.cad.layout.names import RING
+from scanwright.design.electrics.cautions import data_fault
 from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.findings import Finding
@@ -19,4 +21,7 @@ def wiring_checks(scanner: Scanner) -> list[Finding]:
     )
     ok = Finding("wiring", "ok", f"{scanner.lidar.name} and {scanner.servo.name}", summary)
     broken = [replace(fault, code="wiring") for fault in check_network(network)]
-    return [*(broken or [ok]), *network.unknown]
+    slow = "" if scanner.slip_ring is None else data_fault(scanner.slip_ring, scanner.lidar)
+    hint = "test the link through the turning ring before you build"
+    data = [Finding("ring_data", "warning", RING, f"{slow}: data can be lost", hint=hint)] if slow else []
+    return [*(broken or [ok]), *network.unknown, *data]

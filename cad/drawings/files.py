@@ -10,14 +10,14 @@ from scanwright.cad.drawings.part import Part, azimuth_deg, part_of, planes_acro
 from scanwright.cad.drawings.patterns import number
 from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.fits import OnSheet
+from scanwright.cad.layout.loads import FAR_MM, noise_deg
+from scanwright.cad.parts.fits import OnSheet
 from scanwright.cad.parts.part_spec import Process
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.scanner import Scanner
 
 MADE: dict[Process, str] = {"printed": "as printed, sanded or reamed to it", "turned": "turned", "sawn": "drilled"}
-AT_M = 10.0  # where an error of the angle is compared with the range noise, as in `cad.layout.loads`
+AT_M = FAR_MM / 1000  # distance up to which a wrong angle is judged
 
 
 def drawing_files(
@@ -47,7 +47,7 @@ def drawing_of(
     """Return the sheet of one part."""
     spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
-    part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, joints_of(assembly.layout))
+    part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, assembly.layout.joints)
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),
@@ -60,6 +60,11 @@ def drawing_of(
         ("made by", "scanwright"),
     )
     notes = _notes(scanner, part, spec.sheet, MADE[spec.process], _making(spec.process, scanner.printer, part))
+    for product in (scanner.lidar, scanner.servo, scanner.slip_ring):
+        fields = [field.partition(".")[2] for field in spec.shaped_by if product and field.startswith(product.kind)]
+        open_ = [field for field in (product.unverified() if product else ()) if field in fields]
+        if product is not None and open_:
+            notes.append(f"Not verified, measure yours first: {', '.join(open_)} of {product.name}.")
     return sheet_of(part, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 
@@ -111,7 +116,7 @@ def _notes(scanner: Scanner, part: Part, on_sheet: OnSheet, how: str, making: li
     if part.lidar_axis is not None:
         normal = part.lidar_axis
         tilt = math.degrees(math.acos(min(1.0, float(normal[2]))))
-        limit = math.degrees(math.atan2(scanner.lidar.range_sigma_mm, AT_M * 1000))
+        limit = noise_deg(scanner)
         notes.append(
             f"alpha_laser {angles.alpha_laser:g}°, beta_laser {angles.beta_laser:g}°: tilt {number(tilt)}°"
             + (
@@ -124,8 +129,8 @@ def _notes(scanner: Scanner, part: Part, on_sheet: OnSheet, how: str, making: li
         notes.append(f"The largest face across the lidar's axis lies {number(seat)} below the optical centre.")
         if any(item.hole for item in part.axial):
             notes.append(
-                f"Seat to bore within {limit:.2f}°: more moves a point at {AT_M:g} m by the noise of "
-                f"{scanner.lidar.name} ({scanner.lidar.range_sigma_mm:g} mm)."
+                f"Seat to bore within {limit:.2f}°: more moves a point within {AT_M:g} m by the range noise "
+                f"of {scanner.lidar.name}."
             )
     elif inclined:
         notes.append(f"alpha_rot {angles.alpha_rot:g}°, beta_rot {angles.beta_rot:g}°: the axis on the deck.")

@@ -9,19 +9,17 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.print_settings import print_words
 from scanwright.cad.checks.products import products_of
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.words import tied_at
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.names import JOURNAL_SLEEVE
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
 from scanwright.design.electrics.wiring import network_of
@@ -102,7 +100,7 @@ WIRING: dict[str, tuple[BomItem, ...]] = {
 def items_of(
     scanner: Scanner,
     assembly: Assembly,
-    joints: list[Joint],
+    joints: Sequence[Joint],
     masses_g: dict[str, float],
     config_hash: str,
 ) -> list[BomItem]:
@@ -111,7 +109,7 @@ def items_of(
     Args:
         scanner: angles and products.
         assembly: the solids.
-        joints: of `joints_of`.
+        joints: of the layout.
         masses_g: of the made parts.
         config_hash: of what shapes the parts.
     """
@@ -130,7 +128,7 @@ def items_of(
     items += _wiring(scanner)
     items += _ties(assembly)
     items += _electrics(scanner)
-    items += _small_things(scanner, assembly, joints)
+    items += _small_things(assembly, joints)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
@@ -148,15 +146,8 @@ def bom_text(items: list[BomItem]) -> str:
 def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
         if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
-            yield _bought(product, max(1, drive.products.count(product)), _order_number(product, drive))
-
-
-def _order_number(product: Product, drive: DriveLayout) -> str:
-    """Return what to order: a belt comes in lengths."""
-    stack = drive.stack
-    if isinstance(stack, BeltStack) and product == stack.belt:
-        return f"{product.name}, {stack.belt_teeth} teeth, {stack.belt_teeth * stack.belt.pitch_mm:g} mm"
-    return product.name
+            orders = (station.order for station in drive.stations if station.product == product and station.order)
+            yield _bought(product, max(1, drive.products.count(product)), next(orders, product.name))
 
 
 def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
@@ -176,7 +167,7 @@ def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, n
     )
 
 
-def _screws(joints: list[Joint]) -> Iterator[BomItem]:
+def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
     nuts: Counter[tuple[str, str]] = Counter()
     inserts: Counter[str] = Counter()
@@ -212,7 +203,7 @@ def _wiring(scanner: Scanner) -> Iterator[BomItem]:
 
 def _ties(assembly: Assembly) -> Iterator[BomItem]:
     """Yield the cable ties, one for each place that the steps name."""
-    places = Counter(tied_at(assembly.layout, assembly.leads))
+    places = Counter(tied_at(assembly.layout))
     if places:
         note = ", ".join(f"{count} at the {place}" for place, count in places.items())
         count = places.total()
@@ -274,24 +265,20 @@ def _electrics(scanner: Scanner) -> Iterator[BomItem]:
         yield BomItem("wiring", part, number, quantity, source=WIRING_TEXT, note=note, estimate=estimate)
 
 
-def _small_things(scanner: Scanner, assembly: Assembly, joints: list[Joint]) -> Iterator[BomItem]:
-    """Yield small things of the drive, consumables, and tools."""
-    for need in assembly.layout.drive.needs:
-        yield BomItem(need.kind, need.part, source=need.source, estimate=need.estimate)
+def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomItem]:
+    """Yield small things of the parts, consumables, and tools."""
+    rows = dict.fromkeys(row for name in assembly.made for row in assembly.parts[name].rows)
+    needs = [BomItem(row.kind, row.part, source=row.source, note=row.note, estimate=row.estimate) for row in rows]
+    yield from (need for need in needs if need.kind != "tool")
     ends, drops = "screws that end in metal or nuts", "a few drops"
     yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
     sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
-    tools = [
-        ("hexagon keys", "hexagon keys", JOINTS, f"for {sizes}", True),
-        ("torque screwdriver", "torque screwdriver, 0.1 to 1 N m", STEPS, "", True),
-        ("multimeter", "multimeter", WIRING_TEXT, "", True),
-        ("dial indicator", "dial indicator on a stand", STEPS, "reads 0.01 mm", JOURNAL_SLEEVE in assembly.made),
-        ("crimping pliers", "crimping pliers", STEPS, "for the leads", scanner.slip_ring is not None),
-        ("soldering iron", "soldering iron", STEPS, "for the inserts", any(joint.inserts for joint in joints)),
-    ]
-    for estimate, part, source, note, needed in tools:
-        if needed:
-            yield BomItem("tool", part, source=source, note=note, estimate=estimate)
+    yield BomItem("tool", "hexagon keys", source=JOINTS, note=f"for {sizes}", estimate="hexagon keys")
+    yield BomItem("tool", "torque screwdriver, 0.1 to 1 N m", source=STEPS, estimate="torque screwdriver")
+    yield BomItem("tool", "multimeter", source=WIRING_TEXT, estimate="multimeter")
+    yield from (need for need in needs if need.kind == "tool")
+    if any(joint.inserts for joint in joints):
+        yield BomItem("tool", "soldering iron", source=STEPS, note="for the inserts", estimate="soldering iron")
 
 
 def _ranged(item: BomItem) -> BomItem:

@@ -16,8 +16,8 @@ import numpy as np
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.files.glb import Node, glb_bytes, shaded
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.layout.balance.counterweight import Counterweight
-from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, LIDAR, ROTOR_LEADS, STANDING_LEADS
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, FIXED_CABLES, LIDAR, ROTOR_LEADS
+from scanwright.cad.layout.rotor.counterweight import Counterweight
 from scanwright.design.arrays import Array
 from scanwright.design.scanner import Scanner
 
@@ -99,8 +99,8 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
     lifts |= {product: -GAP_MM * normal for product in along if along[product] == "deck"}
     if ROTOR_LEADS in points:  # they stay where they run, at the linkage
         lifts[ROTOR_LEADS] = lifts[ALIGNMENT_LINKAGE]
-    if STANDING_LEADS in points:  # likewise, at the mount or the deck
-        lifts[STANDING_LEADS] = lifts.get(BASE_MOUNT, np.zeros(3))
+    if FIXED_CABLES in points:  # likewise, at the mount or the deck
+        lifts[FIXED_CABLES] = lifts.get(BASE_MOUNT, np.zeros(3))
     top, linkage = float((points[ALIGNMENT_LINKAGE] @ out).max()), lifts[ALIGNMENT_LINKAGE]
     bar = assembly.layout.counterweight
     for product in (product for product in along if along[product] == "radius"):

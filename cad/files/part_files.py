@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scanwright.cad.kernel import require_kernel
-from scanwright.cad.layout.layout import config_hash, mount_offset_mm
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding
@@ -68,7 +67,7 @@ def build_parts(
     """Make every part and write it into a build folder.
 
     Args:
-        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of `layout.mount_offset_mm`, or zero.
+        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.
         folder: the build folder; `parts/` is made in it.
         progress: callback for progress.
         make: makes the parts, if not `make.make_parts`.
@@ -77,22 +76,23 @@ def build_parts(
         InstallError: the CAD kernel is not installed.
         BuildError: a part cannot be made, or the angle set states another place of the optical centre.
     """
-    offset = mount_offset_mm(scanner)  # rejects what cannot be built before the kernel is loaded
-    _check_offset(scanner, offset)
     progress("loading the CAD kernel")
     require_kernel("the making of parts")
     from scanwright.cad.assembly.assembly import alone, as_tree
-    from scanwright.cad.assembly.make import make_parts
+    from scanwright.cad.assembly.make import made_from
     from scanwright.cad.assembly.masses import link_bodies
-    from scanwright.cad.checks.remarks import left_out_of, remarks_of
+    from scanwright.cad.checks.remarks import remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
     from scanwright.cad.geometry.mesh import checked, stl_bytes
     from scanwright.cad.labels.label import labelled_parts
+    from scanwright.cad.parts.all_parts import laid_out
 
     progress("making the parts")
-    assembly = (make or make_parts)(scanner)
-    digest = config_hash(scanner)
+    ready = None if make is None else make(scanner)
+    layout = laid_out(scanner) if ready is None else ready.layout
+    _check_offset(scanner, layout.deck.t_world_rot)  # before seconds go into the solids
+    assembly, digest = ready or made_from(layout), layout.digest
     files: dict[str, bytes] = {}
     reports = []
     meshes_of_parts: dict[str, TriMesh] = {}
@@ -110,16 +110,16 @@ def build_parts(
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
     bodies = link_bodies(scanner, assembly)
-    meshes = {"servo": assembly.standing_parts(), "rot": assembly.turning_parts()}
+    meshes = {"servo": assembly.fixed_parts(), "rot": assembly.turning_parts()}
     files["scanner.urdf"] = urdf_text(scanner, assembly.layout.drive, bodies, meshes).encode("utf-8")
     write_files(folder, files)
     return PartsResult(
         assembly=assembly,
         meshes=meshes_of_parts,
-        t_world_rot_mm=offset,
+        t_world_rot_mm=layout.deck.t_world_rot,
         parts=tuple(reports),
         findings=(*remarks_of(scanner, assembly), *labels.findings),
-        left_out=(*left_out_of(assembly), *labels.left_out),
+        left_out=(*layout.left_out, *labels.left_out),
         files=tuple(sorted(files)),
     )
 

@@ -32,11 +32,12 @@ def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial],
         meshes: names of the parts whose STL files belong to the links servo and rot.
     """
     angles = scanner.angles
+    shapes = [_fixed_shape(station.shape) for station in drive.stations if station.shape is not None]
     lines = [
         '<?xml version="1.0"?>',
         f"<robot name={quoteattr(angles.task)}>",
         '  <link name="world"/>',
-        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *map(_fixed_shape, drive.shapes)]),
+        *_link("servo", bodies["servo"], [*_meshes(meshes["servo"]), *shapes]),
         *_link("rot", bodies["rot"], _meshes(meshes["rot"])),
         *_link("laser", bodies["laser"], _lidar_shapes(scanner)),
         *_joint("servo_mount", "fixed", "world", "servo", angles.T_world_rot(0.0)),

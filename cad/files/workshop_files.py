@@ -17,8 +17,6 @@ from scanwright.cad.files.wiring import wiring_files
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
 from scanwright.cad.labels.fit_coupon import fit_coupon
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.layout import config_hash
 from scanwright.cad.layout.names import FIT_COUPON
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
@@ -49,8 +47,8 @@ def export_scanner(
         folder: the build folder.
         progress: callback for progress.
     """
-    assembly, digest, masses = made.assembly, config_hash(scanner), made.masses_g()
-    joints = joints_of(assembly.layout)
+    assembly, masses = made.assembly, made.masses_g()
+    digest, joints = assembly.layout.digest, assembly.layout.joints
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"
     progress("writing print files")
     printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}

@@ -115,7 +115,7 @@ class Ground:
         return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(taken))
 
     def turns(self, flat: Flat) -> list[Array]:
-        """Ways to turn lettering on a face: the more upright first, of equal ones lengthwise."""
+        """Circuits to turn lettering on a face: the more upright first, of equal ones lengthwise."""
         return sorted(TURNS, key=lambda turn: -self.upright(flat, turn))
 
     def upright(self, flat: Flat, turn: Array) -> float:

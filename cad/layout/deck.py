@@ -1,4 +1,4 @@
-"""Where the deck lies that the scanner stands on or hangs from. No kernel: plain numpy.
+"""Where the deck is that the scanner is screwed to, below or above it. No kernel: plain numpy.
 
 World frame: origin on the face of the deck, in the centre of the mount's deck holes; z up. The deck is below the
 scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). A tripod's head
@@ -15,11 +15,10 @@ import numpy as np
 
 from scanwright.cad import outlines
 from scanwright.cad.layout.drive import DriveLayout, Mounted
-from scanwright.cad.layout.envelope import rotor_radius
-from scanwright.cad.layout.hub import Hub
-from scanwright.cad.layout.joints import triple
+from scanwright.cad.layout.joints import DECK_MM, Joint, triple, upright_axes
 from scanwright.cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
-from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.layout.names import BASE_MOUNT, DECK
+from scanwright.cad.layout.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
 from scanwright.cad.screws import SCREWS, Screw
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
@@ -28,6 +27,8 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 FOOT_THICKNESS = 6.0
+TIES_HALF = 5.5  # half of the room between two slots of the foot: two leads lie side by side
+FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
 BACK_THICKNESS = 8.0
 UNDER_MOUNT_HEAD = 5.0  # of the mount, to what it holds
@@ -58,6 +59,8 @@ class Deck:
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     tripod: TripodFoot | None  # plate under the mount
     foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
+    ties: tuple[TieSeat, ...]  # slots at the sides of the foot, frame of the deck
+    joints: tuple[Joint, ...]  # of what is screwed to a flat deck without a mount
 
     def rotation(self) -> Array:
         """Axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
@@ -82,12 +85,14 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
     tripod = tripod_foot_of(screw, scanner.printer, FOOT_THICKNESS) if scanner.modules.tripod_foot else None
     bare = scanner.deck is None and tripod is None
-    flat = mounted.stands_alone and bare and bool(R[2, 2] > 1.0 - 1e-9)
+    flat = mounted.on_flat_deck and bare and bool(R[2, 2] > 1.0 - 1e-9)
     if flat:
         centre = np.array([0.0, 0.0, mounted.rear])
     else:
-        height = _height_of_back(scanner, drive.stack, mounted, normal, back, half)
+        rotor_radius = drive.envelope.radius(drive.stack.sub_plate)
+        height = _height_of_back(rotor_radius, mounted, normal, back, half)
         centre = back - height * normal + _foot_shift(scanner, mounted, deck_holes, back, normal, R[0], height)
+    foot = _foot(pattern, screw)
     offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
     return Deck(
@@ -101,8 +106,40 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         screw=screw,
         deck_holes=deck_holes,
         tripod=tripod,
-        foot=_foot(pattern, screw),
+        foot=foot,
+        ties=() if flat else _foot_ties(foot, deck_holes),
+        joints=(_on_flat_deck(mounted),) if flat else (),
     )
+
+
+def _on_flat_deck(mounted: Mounted) -> Joint:
+    axes = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0)
+    return Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=mounted.thread_mm)
+
+
+def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:
+    """At the middle of each side of the foot, unless a screw is there; the groove is below."""
+    x, y, _ = foot
+    seats = [
+        TieSeat(
+            azimuth=turn * math.pi / 2,
+            inner=PAD_HALF,
+            first=half - SLOT_WALL - SLOT_ALONG,
+            low=0.0,
+            high=FOOT_THICKNESS,
+            half=TIES_HALF,
+            grooved=True,
+            below=True,
+        )
+        for turn, half in enumerate((x, y, x, y))
+    ]
+    return tuple(seat for seat in seats if seat.first > PAD_HALF + 1.0 and not _near_screw(seat, deck_holes))
+
+
+def _near_screw(seat: TieSeat, deck_holes: tuple[tuple[float, float], ...]) -> bool:
+    across = np.linspace(-1.0, 1.0, 9) * (seat.half + SLOT_ACROSS)
+    slots = seat.points(np.array([seat.first, seat.last]), across, np.zeros(1))[:, None, :2]
+    return bool((np.linalg.norm(slots - np.array(deck_holes), axis=2) < FROM_DECK_SCREW).any())
 
 
 def strut_corners(deck: Deck) -> Array:
@@ -126,7 +163,7 @@ def rail_wall(printer: Printer) -> float:
 
 
 def _height_of_back(
-    scanner: Scanner, stack: Hub, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
+    rotor_radius: float, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
 ) -> float:
     """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
     plate = [
@@ -138,7 +175,7 @@ def _height_of_back(
     below = [float(-(np.array(point) @ normal)) for point in (*mounted.corners, *plate)]
     sideways = float(np.hypot(normal[0], normal[1]))
     below += [around * sideways - z * float(normal[2]) for around, z in mounted.discs]
-    below.append(rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN)
+    below.append(rotor_radius + SWEEP_MARGIN)
     return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
 
 

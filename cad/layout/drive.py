@@ -1,22 +1,33 @@
-"""How the servo turns the shaft, as data: what a layout is made of, what stands where, and in which order it is built.
+"""How the servo turns the shaft, as data: a list of stations along the axis, and what each kind of drive adds.
 
-Rotation frame at gamma = 0, mm. `cad/layout/direct/drive.py` and `cad/layout/belt/drive.py` fill it.
+Rotation frame at gamma = 0, mm. Only `drive_of` in `cad/layout/layout.py` knows which drives there are; each fills a
+`DriveLayout` in a folder of its own (`direct/`, `belt/`), and everybody else reads it.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.screws import Screw
+import numpy as np
+
+from scanwright.cad.layout.envelope import Envelope
+from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.joints import Fixing
+from scanwright.cad.layout.loads import ShaftBend
+from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.layout.tie_seat import TieSeat
+from scanwright.cad.screws import Screw, Thread
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Bearing, Belt
+from scanwright.design.catalogue.products import Bearing, Belt, Servo, SlipRing
 from scanwright.design.left_out import LeftOut
 
-Stack = DirectStack | BeltStack
+Body = Literal["base", "rotor", "servo_horn"]
 Point = tuple[float, float, float]
+BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
+Record = TypeVar("Record")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,36 +52,48 @@ class Rod:
         return Cuboid((-r, -r, self.low), (r, r, self.high))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Station:
+    """A part or a bought product, and its place in the stack from the deck to the linkage.
+
+    Attributes:
+        name: of the part, or of the product.
+        body: what it moves with; of a ring or a bearing the outer half.
+        z_mm: heights of its lower and upper end.
+        radius_mm: of the cylinder or the box around it, from its own axis.
+        product: that it is, if it is bought.
+        box: the homogeneous box that a product's mass is taken for.
+        turning: share of that mass that turns about the axis.
+        shape: simple body of a product that does not move, for the URDF.
+        place: which one it is, if there are two of it; the lower one is put in from below.
+        order: what to order, if that is not the name of the product.
+    """
+
+    name: str
+    body: Body
+    z_mm: tuple[float, float]
+    radius_mm: float
+    product: Servo | SlipRing | Bearing | Belt | None = None
+    box: Cuboid | None = None
+    turning: float = 0.0
+    shape: Cuboid | Rod | None = None
+    place: Literal["", "_upper", "_lower"] = ""
+    order: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Mass:
-    """What a bought product of a name weighs, as a homogeneous box; `turning` is the share of it that turns."""
+    """Mass of a bought product, as a homogeneous box; `turning` is the share of it that turns."""
 
     product: str
     mass_g: float
     box: Cuboid
-    turning: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Need:
-    """A small thing that is bought for a drive.
-
-    Attributes:
-        kind: row of the parts list.
-        estimate: name of its price in `cad.files.prices`.
-        part: what it is, with its size.
-        source: of the row.
-    """
-
-    kind: Literal["wiring", "consumable"]
-    estimate: str
-    part: str
-    source: str
+    turning: float
 
 
 @dataclass(frozen=True, slots=True)
 class Mounted:
-    """What a base mount holds: the servo's case, or a tower, above the mount's rails.
+    """What a base mount carries: the servo's case, or a tower, above the mount's rails.
 
     Attributes:
         onto: body that its screws end in.
@@ -78,9 +101,12 @@ class Mounted:
         ears: height of the faces around its holes.
         screw: that goes through the mount into them.
         holes: x and y of the four.
-        corners: of boxes around all that stands still, shape (n, 3).
+        fixing: what the screws hold in: a nut behind the holes, or their thread.
+        corners: of boxes around all that does not turn, shape (n, 3).
         discs: radius and height of what else must stay clear of the deck, round about the axis.
-        stands_alone: whether it may stand on a flat deck without a mount where the axis is upright.
+        on_flat_deck: whether it may be screwed to a flat deck without a mount if the axis is upright.
+        thread_mm: of thread, or of material before the nut, behind its holes.
+        thread: what a printed one gives the screws to hold on to.
     """
 
     onto: str
@@ -88,37 +114,132 @@ class Mounted:
     ears: float
     screw: Screw
     holes: tuple[tuple[float, float], ...]
+    fixing: Fixing
     corners: Array
     discs: tuple[tuple[float, float], ...]
-    stands_alone: bool
+    on_flat_deck: bool
+    thread_mm: float
+    thread: Thread | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LeadExit:
+    """One way out for the leads of the ring's rotor.
+
+    Attributes:
+        tie: that they can be tied to.
+        ends: corners from the ring to where a lead turns outwards, shape (k, 3), and that direction, shape (3,); any
+            of them will do.
+    """
+
+    tie: TieSeat | None
+    ends: tuple[tuple[Array, Array], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """Leads of the ring's rotor, one for each cable of the lidar.
+
+    Attributes:
+        number: of this one.
+        count: of all.
+        half: radius of one.
+        radius: that it may be bent to.
+    """
+
+    number: int
+    count: int
+    half: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class StatorExit:
+    """Where the leads of the ring's stator leave.
+
+    Attributes:
+        places: point and direction, shape (3,) each; any of them will do.
+        inside: how far they run inside of what surrounds the ring.
+        stiff: whether they are straight there.
+    """
+
+    places: tuple[tuple[Array, Array], ...]
+    inside: float
+    stiff: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLayout:
-    """One layout of one scanner.
+    """One layout of one scanner below its hub.
 
     Attributes:
+        envelope: of the lidar that it carries.
         stack: every number along the axis.
+        stations: from the deck to the linkage, in which the exploded view lifts them.
+        records: numbers of its parts, a record for each kind of part.
         shaft: the part that carries the linkage.
-        products: what is bought beside lidar, servo and ring, as often as it is needed.
-        mounted: what the base mount holds.
-        masses: of the bought products between mount and linkage.
-        shapes: simple bodies that stand still.
+        bend: of the shaft at the hub.
+        mounted: what the base mount carries.
+        servo_pose: of the servo's frame in the rotation frame: rotation (3, 3) and origin (3,), on the horn's face.
+        floor: height of all below the rotor that does not turn, or is as wide.
+        ceiling: height below all that turns.
+        lead_exits: ways out for the leads of the ring's rotor, the best first, by the tie of the hub and the azimuth
+            between the cross screws.
+        leads_leave: the same in words.
+        tied_to: what they are tied to if no tie of the hub holds them.
+        no_hub_tie: why the hub has no seat for a tie; empty if it may have one.
+        stator_exit: of the leads of the ring's stator, if the catalogue says.
+        bears: whether the servo bears a counterweight of a mass [g] at a height besides the rotor.
         built: parts and products in the order in which they are put in.
-        stacked: parts and products from the deck to the linkage, in which the exploded view lifts them.
         left_out: parts that this scanner does not need.
         borne: parts that another one keeps along the axis without a screw, by a bearing or a retaining ring.
-        needs: small things that are bought for it.
     """
 
-    stack: Stack
+    envelope: Envelope
+    stack: Hub
+    stations: tuple[Station, ...]
+    records: tuple[object, ...]
     shaft: str
-    products: tuple[Bearing | Belt, ...]
+    bend: ShaftBend
     mounted: Mounted
-    masses: tuple[Mass, ...]
-    shapes: tuple[Cuboid | Rod, ...]
+    servo_pose: tuple[Array, Array]
+    floor: float
+    ceiling: float
+    lead_exits: Callable[[Bundle, TieSeat | None, float], Iterator[LeadExit]]
+    leads_leave: str
+    tied_to: Literal["shaft", "neck"]
+    no_hub_tie: str
+    stator_exit: StatorExit | None
+    bears: Callable[[float, float], bool]
     built: tuple[str, ...]
-    stacked: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
-    needs: tuple[Need, ...]
     borne: tuple[tuple[str, str], ...] = ()
+
+    def of(self, kind: type[Record]) -> Record | None:
+        """The numbers of one kind of part; None if this drive has none."""
+        return next((record for record in self.records if isinstance(record, kind)), None)
+
+    @property
+    def stacked(self) -> tuple[str, ...]:
+        """Parts and products from the deck to the linkage, in which the exploded view lifts them."""
+        return tuple(dict.fromkeys((BASE_MOUNT, *(each.name for each in self.stations))))
+
+    @property
+    def products(self) -> tuple[Bearing | Belt, ...]:
+        """What is bought besides lidar, servo and ring, as often as it is needed."""
+        return tuple(each.product for each in self.stations if isinstance(each.product, Bearing | Belt))
+
+    @property
+    def masses(self) -> tuple[Mass, ...]:
+        """Of the bought products between mount and linkage."""
+        return tuple(
+            Mass(each.name, each.product.mass_g, each.box, each.turning)
+            for each in self.stations
+            if each.product is not None and each.box is not None
+        )
+
+
+def towards(points: Array, azimuth: float) -> tuple[Array, Array]:
+    """Points (n, 3) turned about the axis by an azimuth [rad], and the unit vector at that azimuth."""
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])

@@ -29,29 +29,43 @@ EAR_HALF_WIDTH = 10.0
 EAR_SCREW = SCREWS["M3"]
 EAR_SCREW_OFFSET = 5.5  # half the distance of the two screws of an ear
 H_FLOOR = (45.0, 58.0)  # for an upright lidar and from 60 deg of tilt: stiffness and shadow (measured study)
+SIDES = 24  # of the prism around a cylinder
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What belongs to the lidar, as boxes (low corner, high corner) in the laser frame.
+    """What belongs to a lidar, gaps included, as boxes (low corner, high corner) in the laser frame.
 
     Attributes:
+        lidar: whose it is.
         body: the lidar.
         cables: where they leave, straight.
-        plate: of the linkage, with a sub-plate if there is one.
-        under: heads of the lidar's screws below the plate, or the ears of the sub-plate.
     """
 
+    lidar: Lidar
     body: Box
     cables: tuple[Box, ...]
-    plate: Box
-    under: Box
 
-    def corners(self) -> Array:
-        """Corners of all boxes, shape (n, 3)."""
-        return np.concatenate([box_corners(box) for box in (self.body, *self.cables, self.plate, self.under)])
+    def plate(self, sub_plate: Axis | None) -> Box:
+        """Plate of the linkage, with a sub-plate if there is one."""
+        (x, y), seat = self.lidar.half_mm, -self.lidar.optical_height_mm
+        lower = seat - (0.0 if sub_plate is None else SUB_PLATE_THICKNESS) - PLATE_THICKNESS
+        return (-x, -y, lower), (x, y, seat)
+
+    def under(self, sub_plate: Axis | None) -> Box:
+        """Heads of the lidar's screws below the plate, or the ears of the sub-plate."""
+        (x0, y0, lower), (x1, y1, seat) = self.plate(sub_plate)
+        if sub_plate is None:
+            return (x0, y0, lower - SCREWS[self.lidar.base.screw].head_height - 0.5), (x1, y1, lower)
+        x, y = ear_corner(self.lidar, sub_plate)
+        return (-x, -y, lower), (x, y, seat)
+
+    def radius(self, sub_plate: Axis | None) -> float:
+        """Radius of the sphere about the optical centre that lidar, cables and plate sweep."""
+        boxes = (self.body, *self.cables, self.plate(sub_plate), self.under(sub_plate))
+        return float(max(np.linalg.norm(box_corners(box), axis=1).max() for box in boxes))
 
 
 def lidar_pose(scanner: Scanner) -> Array:
@@ -74,7 +88,7 @@ def _instead(scanner: Scanner) -> str:
     """Words for a setting that sees the same with the lidar upright: an angle of this one is beyond its range."""
     angles = scanner.angles.angles_deg.model_dump()
     setting = {name: (angles[name], angles[name]) for name in BOUNDS}
-    return next((said for name in BOUNDS if (said := advice(setting, name))), "")
+    return next((text for name in BOUNDS if (text := advice(setting, name))), "")
 
 
 def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:
@@ -92,14 +106,14 @@ def screw_travel_mm(lidar: Lidar) -> float:
 
     Slots along such lines take another pitch, and still hold the lidar in the middle, unless all are one line.
     """
-    lines = {round(math.atan2(y, x) % math.pi, 2) for x, y in lidar.mount_holes_mm}
-    if "mount_holes_mm" not in lidar.unverified() or len(lines) == 1:
+    lines = {round(math.atan2(y, x) % math.pi, 2) for x, y in lidar.base.places}
+    if "holes" not in lidar.unverified() or len(lines) < 2:
         return 0.0
-    hole = SCREWS[lidar.mount_screw].nominal + 0.4
+    hole = SCREWS[lidar.base.screw].nominal + 0.4
     rooms = [
         (half - abs(at) - hole / 2 - SLOT_WALL) * math.hypot(*place) / abs(at)
-        for place in lidar.mount_holes_mm
-        for half, at in zip((lidar.body_mm[0] / 2, lidar.body_mm[1] / 2), place, strict=True)
+        for place in lidar.base.places
+        for half, at in zip(lidar.half_mm, place, strict=True)
         if abs(at) > 1e-6
     ]
     return max(0.0, min(SLOT_TRAVEL, *rooms))
@@ -114,18 +128,18 @@ def slot_ends(place: tuple[float, float], travel: float) -> tuple[tuple[float, f
 
 
 def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
-    """Which of the lidar's screws (index into `mount_holes_mm`) the hub hides from a driver below the plate."""
+    """Which of the lidar's screws (index into `base.places`) the hub hides from a driver below the plate."""
     travel = screw_travel_mm(lidar)
     return [
         i
-        for i, place in enumerate(lidar.mount_holes_mm)
+        for i, place in enumerate(lidar.base.places)
         if not all(_driver_passes(lidar, stack, end) for end in slot_ends(place, travel))
     ]
 
 
 def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     """Whether the driver's way misses hub and journal, or takes no more than the hub's rim."""
-    R, room = stack.R(), SCREWS[lidar.mount_screw].head_room
+    R, room = stack.R(), SCREWS[lidar.base.screw].head_room
     depth = np.linspace(0.0, 150.0, 601)
     line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
     reach = np.hypot(line[:, 0], line[:, 1]) - room
@@ -135,11 +149,10 @@ def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
 
 
-def envelope_of(lidar: Lidar, sub_plate: Axis | None) -> Envelope:
-    """The boxes of one lidar, gaps included, in the laser frame (origin at the optical centre)."""
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+def envelope_of(lidar: Lidar) -> Envelope:
+    """The boxes of one lidar (origin at the optical centre)."""
+    half_x, half_y = lidar.half_mm
     seat = -lidar.optical_height_mm
-    top = lidar.body_mm[2] - lidar.optical_height_mm
     room = lidar.cable_diameter_mm / 2 + 2.0
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
     cables = tuple(
@@ -149,25 +162,13 @@ def envelope_of(lidar: Lidar, sub_plate: Axis | None) -> Envelope:
         )
         for y in lidar.cable_y_mm
     )
-    gap = BODY_GAP
-    if sub_plate is None:
-        lower = seat - PLATE_THICKNESS
-        under = (-half_x, -half_y, lower - SCREWS[lidar.mount_screw].head_height - 0.5), (half_x, half_y, lower)
-    else:
-        lower = seat - SUB_PLATE_THICKNESS - PLATE_THICKNESS
-        x, y = ear_corner(lidar, sub_plate)
-        under = (-x, -y, lower), (x, y, seat)
-    return Envelope(
-        body=((-half_x - gap, -half_y - gap, seat), (half_x + gap, half_y + gap, top)),
-        cables=cables,
-        plate=((-half_x, -half_y, lower), (half_x, half_y, seat)),
-        under=under,
-    )
+    top, gap = lidar.body_mm[2] - lidar.optical_height_mm, BODY_GAP
+    return Envelope(lidar, ((-half_x - gap, -half_y - gap, seat), (half_x + gap, half_y + gap, top)), cables)
 
 
 def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
     """Half extents of the strip that holds the two ears of a sub-plate."""
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    half_x, half_y = lidar.half_mm
     if sub_plate == "x":
         return half_x + EAR_REACH, EAR_HALF_WIDTH
     return EAR_HALF_WIDTH, half_y + EAR_REACH
@@ -175,15 +176,10 @@ def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
 
 def ear_screws(lidar: Lidar, axis: Axis) -> tuple[tuple[float, float], ...]:
     """Centres of the ears' screws: their heads stand clear of the lidar's body."""
-    half = (lidar.body_mm[0] if axis == "x" else lidar.body_mm[1]) / 2
+    half = lidar.half_mm[0 if axis == "x" else 1]
     away = half + BODY_GAP + EAR_SCREW.head_room + 0.5
     along = [(sign * away, side * EAR_SCREW_OFFSET) for sign in (1, -1) for side in (1, -1)]
     return tuple(along if axis == "x" else [(y, x) for x, y in along])
-
-
-def rotor_radius(lidar: Lidar, sub_plate: Axis | None) -> float:
-    """Radius of the sphere about the optical centre that lidar, cables and plate sweep."""
-    return float(np.linalg.norm(envelope_of(lidar, sub_plate).corners(), axis=1).max())
 
 
 def box_corners(box: Box) -> Array:
@@ -192,24 +188,33 @@ def box_corners(box: Box) -> Array:
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
+def around_axis(radius: float, low: float, high: float) -> Array:
+    """Corners around a cylinder about the axis, shape (n, 3)."""
+    turn = 2 * math.pi * np.arange(SIDES) / SIDES
+    around = radius / math.cos(math.pi / SIDES)
+    ring = around * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return np.concatenate([np.column_stack([ring, np.full(SIDES, z)]) for z in (low, high)])
+
+
 def exact(R: Array) -> Array:
     """Cosines of 90 deg are 6e-17 in floating point: make them 0, so that right angles stay planar in the kernel."""
     return np.where(np.abs(R) < 1e-12, 0.0, R)
 
 
-def hub_height(lidar: Lidar, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None = None) -> float:
-    """h: the hub's top lies at z = -h. The largest of what each thing asks for, rounded up to 0.25 mm."""
-    envelope = envelope_of(lidar, sub_plate)
+def hub_height(
+    envelope: Envelope, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None = None
+) -> float:
+    """h: the hub's top lies at z = -h. The largest of what each thing needs, rounded up to 0.25 mm."""
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
-    plate = float((box_corners(envelope.plate) @ R[2]).min())
-    heads = float((box_corners(envelope.under) @ R[2]).min())
-    wishes = [1.0 - z for z in lowest]
-    wishes.append(1.0 - heads - HUB_HEIGHT)
-    wishes.append(1.0 - plate - (HUB_HEIGHT - CROSS_ABOVE_BOTTOM - 3.0))  # a driver reaches the cross screws
+    plate = float((box_corners(envelope.plate(sub_plate)) @ R[2]).min())
+    heads = float((box_corners(envelope.under(sub_plate)) @ R[2]).min())
+    heights = [1.0 - z for z in lowest]
+    heights.append(1.0 - heads - HUB_HEIGHT)
+    heights.append(1.0 - plate - (HUB_HEIGHT - CROSS_ABOVE_BOTTOM - 3.0))  # a driver reaches the cross screws
     if ring_radius > hub_radius:
         # the hub stays inside the cone that the ring hides anyway
-        wishes.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))
+        heights.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))
     tilt = math.degrees(math.acos(min(1.0, R[2, 2])))
     low, high = H_FLOOR
-    wishes.append(low + (high - low) * min(1.0, max(0.0, (tilt - 45.0) / 15.0)))
-    return math.ceil(max(wishes) * 4 - 1e-6) / 4
+    heights.append(low + (high - low) * min(1.0, max(0.0, (tilt - 45.0) / 15.0)))
+    return math.ceil(max(heights) * 4 - 1e-6) / 4

@@ -6,6 +6,7 @@ it beside the axis.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,10 +29,10 @@ Axis = Literal["x", "y"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hub:
+class Hub(ABC):
     """The hub along the axis: radii, lengths and the z of each plane (rotation frame, mm).
 
-    Where the hub would cover a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
+    If the hub covers a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
     to the linkage from the lidar's side by its ears.
     """
 
@@ -56,7 +57,7 @@ class Hub:
 
     @property
     def shoulder(self) -> float:
-        """Height of the hub's lower face, which parts what turns from what stands still, but for sleeve and shaft."""
+        """Height of the hub's lower face, which parts what turns from what does not, but for sleeve and shaft."""
         return -self.h - HUB_HEIGHT
 
     @property
@@ -93,6 +94,21 @@ class Hub:
     def flat(self) -> float:
         """Distance from the axis of the flat that keys the spigot."""
         return self.shaft_diameter / 2 - 1.0
+
+    @property
+    @abstractmethod
+    def horn(self) -> float:
+        """Height of the servo's horn face."""
+
+    @property
+    @abstractmethod
+    def shadow_half_angle(self) -> float:
+        """Half angle [rad] of the cone about -z that what is below the hub hides from the optical centre."""
+
+    @property
+    @abstractmethod
+    def sure_half_angle(self) -> float:
+        """Half angle [rad] of a cone inside it, of round bodies only."""
 
     def R(self) -> Array:
         """Laser in the rotation frame, shape (3, 3)."""

@@ -1,8 +1,8 @@
 """Joints: what holds what, by which screw, where, and how long that is. Declared here, and read by everybody.
 
-Parts list, steps, drawings and findings read them; the parts cut their holes from the same numbers of the layout, and a
-test reads the joints back from the solids. What only one drive has is in `direct/joints.py` and `belt/joints.py`.
-Lengths are the shortest of the standards that hold. Rotation frame at gamma = 0, mm.
+Each part declares its own (`PartSpec.joints`). Parts list, steps, drawings and findings read them; the parts cut their
+holes from the same numbers of the layout, and a test reads the joints back from the solids. Lengths are the shortest of
+the standards that hold. Rotation frame at gamma = 0, mm.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import numpy as np
 from scanwright.cad.outlines import polygon
 from scanwright.cad.screws import SCREWS, Screw, Thread
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.holes import Pattern
 from scanwright.design.catalogue.products import Lidar, Servo
 
 # ISO 4762 and ISO 4026
 LENGTHS = {
+    "M1.6": (3, 4, 5, 6, 8, 10, 12, 16),
     "M2": (3, 4, 5, 6, 8, 10, 12, 16, 20),
     "M2.5": (4, 5, 6, 8, 10, 12, 16, 20, 25),
     "M3": (4, 5, 6, 8, 10, 12, 16, 20, 25, 30),
@@ -31,7 +33,6 @@ LENGTHS = {
 HOLDS = 2.0  # diameters of thread that hold
 NUT = 1.0  # diameters: a nut, 0.8, and the thread that looks out
 THREAD_FREE = 0.5  # that a screw may not bottom
-CASE_EAR = 2.0  # of a servo's case between a screw hole and its nut: assumed, no catalogue gives it
 DECK_MM = 5.0  # thickness of the robot's deck, assumed
 ALL_SCREWS = "{*}"  # mark for all screws of a step's part
 
@@ -62,7 +63,7 @@ class Joint:
         thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
         slot_mm: width and length of the slots that they may slide in, if not holes.
         stands_out_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
-        heel_mm: from a lone screw to the edge over which the part tips off; None where there are several, or a fit.
+        heel_mm: from a lone screw, or the line of a pair, to the edge over which the part tips off; None for others.
     """
 
     part: str
@@ -133,7 +134,7 @@ def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
     return next((n for n in known if n >= grip + depth + NUT * screw.nominal), known[-1])
 
 
-def held_in(thread: Thread) -> Fixing:
+def fixing_in(thread: Thread) -> Fixing:
     """How a screw holds in a printed part."""
     return "thread" if thread.trap is None else "trap"
 
@@ -167,13 +168,18 @@ def screws(onto: str, part: str = "") -> str:
 
 
 def lidar_thread_mm(lidar: Lidar) -> float:
-    """Depth of the threads in a lidar's base, as far as they are drawn."""
-    return min(lidar.mount_thread_depth_mm, lidar.window_z_mm[0] - 1.0)
+    """Depth of the threads in a lidar's base, as far as they are drawn, or thickness of its ears."""
+    return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
+
+
+def fixing_of(pattern: Pattern) -> Fixing:
+    """What holds a screw that goes into the holes of a bought device: their thread, or a nut behind them."""
+    return "nut" if pattern.kind == "through" else "thread"
 
 
 def horn_thread_mm(servo: Servo) -> float:
     """Depth of the threads in a servo's horn."""
-    return min(servo.horn_thread_depth_mm, servo.horn_thickness_mm)
+    return servo.horn_thread_depth_mm
 
 
 def horn_centres(servo: Servo) -> Array:

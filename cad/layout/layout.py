@@ -1,81 +1,98 @@
-"""Every number of one scanner that more than one of its parts needs, worked out once. No kernel: plain numpy."""
+"""The layout of one scanner: every number that more than one of its parts needs, worked out once. No kernel.
+
+`layout_of` places everything, lets the parts describe themselves, and runs the cables clear of them.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
 
-from scanwright.cad.layout.balance.counterweight import Counterweight, counterweight_of
-from scanwright.cad.layout.belt.drive import belt_drive
-from scanwright.cad.layout.cables.ties import hub_tie_of, plate_ties_of
-from scanwright.cad.layout.deck import Deck, deck_of
-from scanwright.cad.layout.direct.drive import direct_drive
-from scanwright.cad.layout.drive import DriveLayout, Stack
+from scanwright.cad.layout.cables.fixed import FixedCable, fixed_cables_of
+from scanwright.cad.layout.cables.leads import RotorLead, leads_of
+from scanwright.cad.layout.cables.obstacles import Shape
+from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.envelope import screw_travel_mm
-from scanwright.cad.layout.linkage import AlignmentLinkage, linkage_of
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.placement import Placement, placement_of
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
 from scanwright.design.scanner import NO_MODULES, Scanner
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """One scanner before it has parts; `counterweight` is the bar, or why there is none."""
-
-    scanner: Scanner
-    drive: DriveLayout
-    deck: Deck
-    linkage: AlignmentLinkage
-    counterweight: Counterweight | LeftOut
+class PlacedPart(Protocol):
+    """What the layout reads of a part."""
 
     @property
-    def stack(self) -> Stack:
-        """Every number along the axis."""
-        return self.drive.stack
+    def turns(self) -> bool:
+        """Whether it turns about the rotation axis."""
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """What it is screwed to."""
+
+    @property
+    def avoid(self) -> tuple[Shape, ...]:
+        """Space that cables must stay clear of."""
 
 
-def layout_of(scanner: Scanner) -> Layout:
+Parts = Callable[[Placement], Sequence[PlacedPart | LeftOut]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout(Placement):
+    """One scanner before its parts are made.
+
+    Attributes:
+        joints: all joints, in the order of the parts; those with slots last.
+        leads: on the rotor, between ring and lidar.
+        cables: that do not turn.
+        left_out: parts that this scanner does not need.
+        digest: twelve hex digits of everything that shapes the parts: angles, products, the name on the labels; not J.
+    """
+
+    joints: tuple[Joint, ...]
+    leads: tuple[RotorLead, ...]
+    cables: tuple[FixedCable, ...]
+    left_out: tuple[LeftOut, ...]
+    digest: str
+
+
+def layout_of(scanner: Scanner, parts_of: Parts) -> Layout:
     """Lay out one scanner.
 
-    Raises:
-        BuildError: it cannot be laid out.
-    """
-    drive = drive_of(scanner)
-    deck, linkage = deck_of(scanner, drive), linkage_of(scanner, drive.stack)
-    ties = plate_ties_of(scanner.lidar, linkage)
-    linkage = replace(linkage, plate_ties=() if isinstance(ties, LeftOut) else ties)
-    bar = counterweight_of(scanner, deck, linkage)
-    if isinstance(bar, Counterweight):
-        linkage = replace(linkage, ear=bar.ear)
-    tie = hub_tie_of(scanner, linkage)
-    linkage = replace(linkage, hub_tie=None if isinstance(tie, LeftOut) else tie)
-    return Layout(scanner, drive, deck, linkage, bar)
-
-
-def drive_of(scanner: Scanner) -> DriveLayout:
-    """The drive of one scanner: a belt where the ring is a capsule, else the servo on the axis.
+    Args:
+        scanner: angles and products.
+        parts_of: the parts that it has, described from where they are, and those that it does not need.
 
     Raises:
         BuildError: it cannot be laid out.
     """
-    ring = scanner.slip_ring
-    return belt_drive(scanner) if ring is not None and ring.bore_mm == 0 else direct_drive(scanner)
+    place = placement_of(scanner)
+    described = parts_of(place)
+    parts = [part for part in described if not isinstance(part, LeftOut)]
+    joints = [*(joint for part in parts for joint in part.joints), *place.deck.joints]
+    avoid = {turns: [shape for part in parts if part.turns == turns for shape in part.avoid] for turns in (True, False)}
+    return Layout(
+        **{field.name: getattr(place, field.name) for field in fields(Placement)},
+        joints=tuple(sorted(joints, key=lambda joint: joint.slot_mm is not None)),
+        leads=leads_of(place, avoid[True]),
+        cables=fixed_cables_of(place, avoid[False]),
+        left_out=(
+            *place.drive.left_out,
+            *place.ties_left_out,
+            *(part for part in described if isinstance(part, LeftOut)),
+        ),
+        digest=digest_of(scanner, place.drive),
+    )
 
 
-def mount_offset_mm(scanner: Scanner) -> tuple[float, float, float]:
-    """`t_world_rot_mm`: the optical centre in the world; its origin is the centre of the deck holes, or on a tripod.
-
-    Raises:
-        BuildError: the scanner cannot be laid out.
-    """
-    return deck_of(scanner, drive_of(scanner)).t_world_rot
-
-
-def config_hash(scanner: Scanner) -> str:
-    """Twelve hex digits of everything that shapes the parts: angles, products, and the name on their labels; not J."""
-    angles, drive = scanner.angles, drive_of(scanner)
+def digest_of(scanner: Scanner, drive: DriveLayout) -> str:
+    """Return twelve hex digits of everything that shapes the parts; see `Layout.digest`."""
+    angles = scanner.angles
     # the journal's bearing has had its place in the list since before there were others
     others: list[dict[str, Any] | None] = [
         product.model_dump() for product in drive.products if product != drive.stack.bearing
@@ -92,7 +109,7 @@ def config_hash(scanner: Scanner) -> str:
         + others,
     }
     if (travel := screw_travel_mm(scanner.lidar)) > 0:
-        content["screw_travel_mm"] = travel  # slots, where nobody has verified the lidar's holes
+        content["screw_travel_mm"] = travel  # slots, if the lidar's holes are not verified
     if isinstance(angles.motion, Sweep):
         content["sweep"] = angles.motion.limits_deg  # one that keeps the gears on a flank needs no counterweight
     if scanner.modules != NO_MODULES:

@@ -1,18 +1,24 @@
-"""What the rotor's weight is, and what a servo's horn is rated for. SI units. No kernel: plain numpy."""
+"""The weight of the rotor, the give of its shaft, and the rating of a servo's horn. SI units. No kernel."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
+RUBS_NM = (5e-3, 5e-3)  # of bearings, and of a ring whose friction is not in the catalogue: assumed
+NEAR_MM = 500.0
 FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of the ranges
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
 STEEL_G_CM3 = 7.85
+METAL_POISSON = 0.33
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,33 @@ class Weight:
         return self.across_n * self.lever_m + self.along_n * self.off_axis_m
 
 
+@dataclass(frozen=True, slots=True)
+class ShaftBend:
+    """What a load at the hub's lower end does to it. A force along x bends it about y, and so all around.
+
+    Attributes:
+        compliance: (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m].
+        twist_rad_per_nm: about the axis.
+        stretch_m_per_n: along the axis.
+    """
+
+    compliance: Array
+    twist_rad_per_nm: float
+    stretch_m_per_n: float
+
+    def rotation_of(self, force_n: Array, moment_nm: Array) -> Array:
+        """Rotation of the hub [rad], rotation frame; force and moment act on it at the height of its lower end."""
+        along = np.array([-force_n[1], force_n[0], 0.0])  # z x force
+        bend = self.compliance[1, 0] * along + self.compliance[1, 1] * np.array([*moment_nm[:2], 0.0])
+        return bend + np.array([0.0, 0.0, self.twist_rad_per_nm * moment_nm[2]])
+
+    def shift_of(self, force_n: Array, moment_nm: Array) -> Array:
+        """Displacement of the hub's lower end [m]."""
+        across = np.array([moment_nm[1], -moment_nm[0], 0.0])  # moment x z
+        bend = self.compliance[0, 0] * np.array([*force_n[:2], 0.0]) + self.compliance[0, 1] * across
+        return bend + np.array([0.0, 0.0, self.stretch_m_per_n * force_n[2]])
+
+
 def tilt_sine(scanner: Scanner) -> float:
     """Sine of the angle between the rotation axis and the vertical."""
     up = scanner.angles.T_world_rot(0.0)[2, :3]
@@ -56,6 +89,13 @@ def rated_moment_nm(scanner: Scanner) -> float | None:
     return None if rated is None else rated * RATED_AT_MM / 1000
 
 
+def friction_nm(scanner: Scanner) -> tuple[float, float]:
+    """Least and most torque that ring and bearings rub with."""
+    ring = scanner.slip_ring
+    return RUBS_NM if ring is None or ring.friction_nm is None else ring.friction_nm
+
+
 def noise_deg(scanner: Scanner) -> float:
-    """Angle that puts a point at FAR_MM off by the noise of the lidar's ranges."""
-    return math.degrees(math.atan(scanner.lidar.range_sigma_mm / FAR_MM))
+    """Largest angle that moves no point within FAR_MM by more than the noise of the lidar's ranges."""
+    range_mm = np.linspace(NEAR_MM, FAR_MM, 96)
+    return math.degrees(math.atan(float((scanner.lidar.sigma_mm(range_mm) / range_mm).min())))

@@ -46,6 +46,10 @@ ALUMINIUM = Material("aluminium 6082-T6", 290.0, 200.0, False, "EN 755-2; pressu
 STEEL = Material("steel", 360.0, 235.0, False, "S235, EN 10025-2")
 BOUGHT = Material("metal of a bought device", 180.0, 120.0, False, "cast aluminium, the softest of its kind; assumed")
 
+MOULDED = Material(
+    "plastic of a bought device", 40.0, 25.0, True, "PBT and PA of servo cases, taken as printed; assumed"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Hold:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -21,28 +22,46 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.geometry.mesh import checked_mesh
-from scanwright.cad.layout.balance.free_space import in_hull
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, slot_ends
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.linkage import AlignmentLinkage, neck_corners
-from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, MAIN_SHAFT, SERVO_SHAFT
+from scanwright.cad.layout.cables.obstacles import Shape, shape_of
+from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, around_axis, slot_ends
+from scanwright.cad.layout.joints import (
+    Joint,
+    fixing_in,
+    inward_axes,
+    screws,
+)
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, LIDAR_BODY
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.free_space import in_hull
+from scanwright.cad.layout.rotor.linkage import (
+    CROSS_SCREW,
+    AlignmentLinkage,
+    cross_floor_mm,
+    cross_seat_mm,
+    cross_thread_mm,
+    neck_corners,
+)
 from scanwright.cad.parts.fins import FAR, fins_beside
 from scanwright.cad.parts.linkage_hub import hub, hub_cuts, tie_slots, tongue
 from scanwright.cad.parts.part_spec import PartSpec, Step
-from scanwright.cad.parts.sub_plate import front_mark
+from scanwright.cad.parts.sub_plate import front_mark, lidar_joint
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 
+LIDAR_STEP = Step(
+    "Lidar on its seat",
+    "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables to the other side. "
+    f"{screws(LIDAR_BODY)}",
+    "no light shows under the lidar: a gap of 0.1 mm tilts its plane by about a tenth of a degree",
+)
 OF_LIDAR = (
     "lidar.body_mm",
     "lidar.optical_height_mm",
     "lidar.window_z_mm",
-    "lidar.mount_screw",
-    "lidar.mount_holes_mm",
+    "lidar.holes",
+    "lidar.ears_mm",
     "lidar.cable_y_mm",
     "lidar.cable_z_mm",
     "lidar.cable_diameter_mm",
@@ -55,47 +74,56 @@ MARK_WAY = 8.0  # of the mark beyond the plate: a neck that is thicker there kee
 DRIVER_WAY = 150.0
 DRIVER_DEEP = 8.0  # below the plate, where a wall beside a driver's way is measured: the neck tapers
 DRIVER_WALL = 3.0  # what would be less is open
-SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
-SEATED_ON_CUP = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
-CUP_WORDS = (
-    "Lower the hub over the cup until it sits on its rim; the flat of the cup fits one way only, and the groove of the "
-    f"hub then stands above the groove of the cup. {screws(HORN_CUP)}"
-)
-BELT_WORDS = (
-    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
-    f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
-    "shaft in its loose pulley, until the groove of the hub stands over the groove in the edge of the tower's "
-    "top, and tighten the pulley's two grub screws. Both pulleys have the same number of teeth and turn the "
-    "same way, so from now on the servo's angle is that of the axis."
-)
 
 
-def linkage_spec(layout: Layout) -> PartSpec:
-    """The linkage of one scanner."""
-    p, stack = layout.linkage, layout.stack
-    words = (
-        "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way "
-        f"only, and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
-    )
-    step = Step("Linkage on the shaft", words, SEATED)
-    if stack.cup_bore > 0:
-        step = Step("Linkage on the cup", CUP_WORDS, SEATED_ON_CUP)
-    if isinstance(stack, BeltStack):
-        step = Step("Linkage on the shaft, and the belt set", BELT_WORDS, SEATED)
+def linkage_spec(place: Placement) -> PartSpec:
+    """The linkage of one scanner; the shaft that it sits on has the words of its step."""
+    p = place.linkage
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
         slots = f"the slots of {ALIGNMENT_LINKAGE}, where a screw may sit {p.screw_travel:.2g} mm nearer or farther"
-        shapes["lidar.mount_holes_mm"] = slots
+        shapes["lidar.holes"] = slots
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
         turns=True,
         make=partial(alignment_linkage, p),
-        step=step,
         shaped_by=OF_LIDAR,
         shapes=shapes,
         angles="laser",
         seat=p.top,
+        joints=(
+            _crossed(p, place.drive.shaft),
+            *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)]),
+        ),
+        avoid=tuple(_around(place)),
+        steps={LIDAR: LIDAR_STEP},
     )
+
+
+def _crossed(p: AlignmentLinkage, shaft: str) -> Joint:
+    """The hub on the shaft: cap screws through its wall into threads or nuts of the shaft."""
+    heads = cross_seat_mm(p.stack)
+    return Joint(
+        ALIGNMENT_LINKAGE,
+        shaft,
+        "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
+        CROSS_SCREW,
+        inward_axes(p.cross_azimuths, heads, p.stack.cross),
+        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
+        thread_mm=cross_thread_mm(p),
+        thread=p.cross_thread,
+    )
+
+
+def _around(place: Placement) -> Iterator[Shape]:
+    """Hub, tongues, and the neck, from which the channels of the cables are cut."""
+    p, stack = place.linkage, place.stack
+    yield shape_of(around_axis(stack.hub_radius, stack.shoulder, -stack.h))
+    for tie in p.plate_ties:
+        yield shape_of(tie.corners(tie.inner) @ stack.R().T)
+    if p.hub_tie is not None:
+        yield shape_of(p.hub_tie.corners(stack.hub_radius))
+    yield shape_of(place.neck, carved=True)
 
 
 def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.layout import Layout, layout_of
+from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.alignment_linkage import linkage_spec
 from scanwright.cad.parts.base_mount import mount_spec
 from scanwright.cad.parts.bearing_cage import base_spec, bell_spec
@@ -16,14 +16,21 @@ from scanwright.cad.parts.journal_sleeve import sleeve_spec
 from scanwright.cad.parts.main_shaft import main_shaft_spec
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from scanwright.cad.parts.servo_frame import frame_spec
 from scanwright.cad.parts.servo_shaft import servo_shaft_spec
 from scanwright.cad.parts.shaft_ring import shaft_ring_spec
 from scanwright.cad.parts.slip_ring_adapter import adapter_spec
 from scanwright.cad.parts.sub_plate import sub_plate_spec
 from scanwright.cad.parts.tripod_foot import tripod_foot_spec
+from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
-OF_DIRECT = (servo_shaft_spec, adapter_spec, base_spec, bell_spec)
-OF_BELT = (
+SPECS = (
+    frame_spec,
+    servo_shaft_spec,
+    adapter_spec,
+    base_spec,
+    bell_spec,
     main_shaft_spec,
     shaft_pulley_spec,
     shaft_ring_spec,
@@ -31,8 +38,6 @@ OF_BELT = (
     holder_spec,
     plate_spec,
     drive_pulley_spec,
-)
-OF_ALL = (
     cup_spec,
     linkage_spec,
     sub_plate_spec,
@@ -43,14 +48,15 @@ OF_ALL = (
 )
 
 
-def parts_of(layout: Layout) -> list[PartSpec]:
-    """The parts that one scanner needs."""
-    scanner, stack = layout.scanner, layout.stack
-    specs: list[PartSpec | None] = [spec_of(layout) for spec_of in OF_ALL]
-    if isinstance(stack, BeltStack):
-        return _needed([*(spec_of(scanner, stack) for spec_of in OF_BELT), *specs])
-    return _needed([*(spec_of(scanner, stack) for spec_of in OF_DIRECT), *specs])
+def parts_of(place: Placement) -> list[PartSpec | LeftOut]:
+    """The parts that one scanner needs, and those that it does not, with the reason."""
+    return [part for spec_of in SPECS if (part := spec_of(place)) is not None]
 
 
-def _needed(specs: list[PartSpec | None]) -> list[PartSpec]:
-    return [spec for spec in specs if spec is not None]
+def laid_out(scanner: Scanner) -> Layout:
+    """Lay out one scanner with all its parts.
+
+    Raises:
+        BuildError: it cannot be laid out.
+    """
+    return layout_of(scanner, parts_of)

@@ -9,13 +9,15 @@ Screws: first the case from behind through the strut, then the foot on the deck.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import cadquery as cq
+import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.deck import (
     BACK_THICKNESS,
     FOOT_THICKNESS,
@@ -28,63 +30,109 @@ from scanwright.cad.layout.deck import (
     strut_corners,
 )
 from scanwright.cad.layout.drive import Mounted
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE
+from scanwright.cad.layout.envelope import box_corners
+from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
+from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE, SERVO_FRAME
+from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.linkage_hub import tie_slots
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
+from scanwright.design.left_out import LeftOut
 
+SERVO_STEP = Step(
+    "Servo into the mount",
+    f"Put the case between the rails of the base mount, plugs to the channel behind it. {screws(SERVO_CASE)} "
+    "Connect the servo's cable now, and lay a cable tie into the slots of the foot where it leaves. "
+    f"{screws(DECK)}",
+    check="the case does not rock on its four feet, nor the mount on the deck",
+    brings=(SERVO,),
+)
+TOWER_STEP = Step(
+    "Tower on the mount",
+    "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
+    f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot where cables leave. {screws(DECK)}",
+    check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
+)
+FRAME_STEP = Step(
+    "Frame on the mount",
+    f"Put the frame on the rails of the base mount. {screws(SERVO_FRAME)} Connect the servo's cable now, and lay a "
+    f"cable tie into the slots of the foot where it leaves. {screws(DECK)}",
+    check="the frame does not rock on its four feet, nor the mount on the deck",
+)
+RAIL_HALF = 5.0  # of the mount's rails, at most
 OF_SERVO = (
     "servo.case_min_mm",
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_rear_holes_mm",
-    "servo.case_rear_holes_z_mm",
+    "servo.holes",
 )
 RAIL_HALF_WIDTH = 4.0  # least
 FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
 
 
-def mount_spec(layout: Layout) -> PartSpec | None:
-    """The mount of one scanner; None where the servo stands on the deck."""
-    if layout.deck.flat:
-        return None
-    step = Step(
-        "Servo into the mount",
-        f"Put the case between the rails of the base mount, plugs to the channel behind it. {screws(SERVO_CASE)} "
-        "Connect the servo's cable now, and lay a cable tie into the slots of the foot where it leaves. "
-        f"{screws(DECK)}",
-        check="the case does not rock on its four feet, nor the mount on the deck",
-        brings=(SERVO,),
-    )
-    if isinstance(layout.stack, BeltStack):
-        step = Step(
-            "Tower on the mount",
-            "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
-            f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot where cables leave. {screws(DECK)}",
-            check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
-        )
+STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_STEP}
+
+
+def mount_spec(place: Placement) -> PartSpec | LeftOut:
+    """The mount of one scanner, or why the servo is screwed to the deck."""
+    if place.deck.flat:
+        return LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts")
+    onto = place.drive.mounted.onto
     return PartSpec(
         name=BASE_MOUNT,
         turns=False,
-        make=partial(base_mount, layout),
-        step=step,
-        shaped_by=() if isinstance(layout.stack, BeltStack) else OF_SERVO,
+        make=partial(base_mount, place),
+        step=STEPS[onto],
+        shaped_by=OF_SERVO if onto == SERVO_CASE else (),
         angles="rot",
+        joints=tuple(_joints(place)),
+        avoid=tuple(_around(place.deck, place.drive.mounted)),
     )
 
 
-def base_mount(layout: Layout) -> cq.Solid:
+def _joints(place: Placement) -> Iterator[Joint]:
+    """What the mount carries, and the mount on the deck unless a plate is between them."""
+    mounted, deck = place.drive.mounted, place.deck
+    yield Joint(
+        BASE_MOUNT,
+        mounted.onto,
+        mounted.fixing if mounted.thread is None else fixing_in(mounted.thread),
+        mounted.screw,
+        upright_axes(mounted.holes, mounted.ears - UNDER_MOUNT_HEAD, 1.0),
+        grip_mm=UNDER_MOUNT_HEAD,
+        thread_mm=mounted.thread_mm,
+        thread=mounted.thread,
+    )
+    if deck.tripod is None:
+        axes = placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), deck.rotation(), deck.centre)
+        yield Joint(BASE_MOUNT, DECK, "deck", deck.screw, axes, grip_mm=FOOT_THICKNESS, thread_mm=DECK_MM)
+
+
+def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
+    """Back plate, rails, strut and foot; what is under the foot is below the face of the deck."""
+    (x, y), (_, cy, cz) = deck.back_half, deck.back_centre
+    yield shape_of(box_corners(((-x, cy - y, cz - BACK_THICKNESS), (x, cy + y, cz))))
+    for side in (1.0, -1.0):
+        middle, along = side * abs(mounted.holes[0][0]), y - RAIL_INSET
+        low, high = (middle - RAIL_HALF, cy - along, cz), (middle + RAIL_HALF, cy + along, cz + PLUG_GAP)
+        yield shape_of(box_corners((low, high)))
+    strut = shape_of(strut_corners(deck))
+    front = np.array([[0.0, 0.0, 1.0, STRUT_BEHIND - cz]])
+    yield replace(strut, planes=np.concatenate([strut.planes, front]))
+    outline = outlines.octagon(*deck.foot)
+    layers = [np.column_stack([outline, np.full(8, z)]) for z in (0.0, FOOT_THICKNESS)]
+    yield shape_of(np.concatenate(layers) @ deck.rotation().T + np.array(deck.centre))
+
+
+def base_mount(place: Placement) -> cq.Solid:
     """Make the mount.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    deck, mounted, printer = layout.deck, layout.drive.mounted, layout.scanner.printer
+    deck, mounted, printer = place.deck, place.drive.mounted, place.scanner.printer
     hole, deck_hole = passing_hole(mounted.screw, printer) / 2, passing_hole(deck.screw, printer) / 2
     axis = f"({deck.normal[0]:.4f}, {deck.normal[1]:.4f}, {deck.normal[2]:.4f})"
     on_deck = solids.location(deck.rotation(), deck.centre)
@@ -102,7 +150,7 @@ def base_mount(layout: Layout) -> cq.Solid:
             cuts.append(solids.upright(mounted.screw.head_room, back - 400.0, mounted.ears - UNDER_MOUNT_HEAD, x, y))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
-        cuts += [cut.moved(on_deck) for seat in foot_ties_of(deck) for cut in tie_slots(seat)]
+        cuts += [cut.moved(on_deck) for seat in deck.ties for cut in tie_slots(seat)]
         return checked(body.cut(*cuts).clean())
 
 

@@ -21,32 +21,46 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
+from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.direct.cage import (
     CAGE_SCREW,
     FOOT_RADIUS,
     SCREW_DEPTH,
+    SEAT_GAP,
     TRAP_WALL,
     UNDER_CAGE_HEAD,
     UNDER_HEAD,
     WINDOW_HALF_WIDTH,
     BearingCage,
-    cage_of,
+    Ears,
+    plate_half_x,
 )
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
-from scanwright.cad.layout.fits import OnSheet, printed_seat
-from scanwright.cad.layout.joints import ALL_SCREWS, screws
-from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE
-from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
-from scanwright.cad.screws import Trap
+from scanwright.cad.layout.envelope import around_axis, box_corners
+from scanwright.cad.layout.joints import (
+    ALL_SCREWS,
+    Joint,
+    fixing_in,
+    fixing_of,
+    inward_axes,
+    round_wall_mm,
+    screws,
+    upright_axes,
+)
+from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE, SLIP_RING_ADAPTER
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.fits import OnSheet, printed_seat
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
+from scanwright.cad.screws import SCREWS, Trap
 from scanwright.cad.solids import building
-from scanwright.design.scanner import Scanner
+from scanwright.design.catalogue.products import Servo
 
 ROOM = 0.7  # between the bell's foot and what stands beside it
 
 
-def bell_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
-    """The bell of one scanner; None where no bearing carries its axis."""
-    p = cage_of(scanner, stack)
+def bell_spec(place: Placement) -> PartSpec | None:
+    """The bell of one scanner; None if no bearing carries its axis."""
+    p = place.drive.of(BearingCage)
     if p is None:
         return None
     words = (
@@ -61,13 +75,31 @@ def bell_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         make=partial(bearing_cage, p),
         step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
         sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
+        joints=(_bell_joint(p, CAGE_BASE if place.scanner.slip_ring is None else SLIP_RING_ADAPTER),),
+        avoid=(shape_of(around_axis(p.stack.cage_outer, p.low, p.stack.cage_top)),),
+        rows=(Row("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat"),),
     )
 
 
-def base_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
-    """Its base as a part of its own; None where it is the plate of the adapter, or nothing."""
-    p = cage_of(scanner, stack)
-    if p is None or scanner.slip_ring is not None:
+def _bell_joint(p: BearingCage, base: str) -> Joint:
+    """The bell on its base, by radial screws."""
+    stack, heads = p.stack, p.stack.cage_inner + UNDER_CAGE_HEAD
+    return Joint(
+        BEARING_CAGE,
+        base,
+        fixing_in(p.thread),
+        CAGE_SCREW,
+        inward_axes(p.legs, heads, (p.foot + p.high) / 2),
+        grip_mm=round_wall_mm(stack.cage_inner, heads, p.cage_hole),
+        thread_mm=SCREW_DEPTH - p.fit / 2 if p.thread.trap is None else TRAP_WALL,
+        thread=p.thread,
+    )
+
+
+def base_spec(place: Placement) -> PartSpec | None:
+    """Its base as a part of its own; None if it is the plate of the adapter, or nothing."""
+    p = place.drive.of(BearingCage)
+    if p is None or place.scanner.slip_ring is not None:
         return None
     return PartSpec(
         name=CAGE_BASE,
@@ -79,7 +111,30 @@ def base_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
             "the shaft turns a whole turn without touching the base",
         ),
         shaped_by=ON_CASE,
+        joints=(on_ears(place.scanner.servo, p.stack, p.ears, CAGE_BASE),),
+        avoid=(around_base(place.scanner.servo, p),),
     )
+
+
+def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
+    """A plate on the front of the servo's case."""
+    heads = stack.horn + ears.front + SEAT_GAP + UNDER_HEAD
+    axes, grip = upright_axes(ears.holes, heads, -1.0), heads - (stack.horn + ears.seats)
+    return Joint(
+        part,
+        SERVO_CASE,
+        fixing_of(servo.front),
+        ears.screw,
+        axes,
+        grip_mm=grip,
+        thread_mm=servo.front.depth_mm,
+    )
+
+
+def around_base(servo: Servo, p: BearingCage) -> Shape:
+    """What the base fills beside the bell."""
+    wide, back = plate_half_x(servo, SCREWS[servo.front.screw]), servo.case_min_mm[1]
+    return shape_of(box_corners(((-wide, back, p.low), (wide, 0.0, p.stack.ring_bottom))))
 
 
 def bearing_cage(p: BearingCage) -> cq.Solid:
@@ -123,22 +178,23 @@ def cage_base(p: BearingCage) -> cq.Solid:
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    stack = p.stack
-    last = min(y for _, y in p.holes) - FOOT_RADIUS - 1.5
-    with building(CAGE_BASE, "plate and boss", "case_holes_mm", p.holes) as checked:
+    stack, ears = p.stack, p.ears
+    seats = stack.horn + ears.seats
+    last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
+    with building(CAGE_BASE, "plate and boss", "holes", ears.holes) as checked:
         reaches_out = -last > stack.cage_outer + ROOM + 2 * FOOT_RADIUS
-        tail = solids.box((-p.half_x, last, p.low), (p.half_x, 0.0, p.high if reaches_out else p.foot))
+        tail = solids.box((-ears.half_x, last, p.low), (ears.half_x, 0.0, p.high if reaches_out else p.foot))
         around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
         boss = solids.upright(stack.cage_inner - p.fit / 2, p.low, p.high)
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
-        body = body.cut(solids.upright(p.opening, p.low - 1.0, p.high + 1.0))
+        body = body.cut(solids.upright(ears.opening, p.low - 1.0, p.high + 1.0))
         body = checked(body)
-    with building(CAGE_BASE, "feet and screw holes", "case_holes_mm", p.holes) as checked:
-        feet = [solids.upright(FOOT_RADIUS, p.ears, p.low + 1.0, x, y) for x, y in p.holes]
+    with building(CAGE_BASE, "feet and screw holes", "holes", ears.holes) as checked:
+        feet = [solids.upright(FOOT_RADIUS, seats, p.low + 1.0, x, y) for x, y in ears.holes]
         body = body.fuse(*feet)
-        cuts: list[cq.Shape] = [solids.upright(p.opening, p.front, p.high + 1.0)]
-        for x, y in p.holes:
-            cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, p.high + 1.0, x, y))
+        cuts: list[cq.Shape] = [solids.upright(ears.opening, stack.horn + ears.front, p.high + 1.0)]
+        for x, y in ears.holes:
+            cuts.append(solids.upright(ears.hole / 2, seats - 1.0, p.high + 1.0, x, y))
             cuts.append(_head_room(p, x, y))
         for azimuth in p.legs:
             middle, start = (p.foot + p.high) / 2, stack.cage_inner - SCREW_DEPTH
@@ -158,13 +214,13 @@ def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
 
 def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
     """Recess of one screw's head; one beside the opening is open to it, else a sliver would stand between them."""
-    radius, low, high = p.screw.head_room, p.low + UNDER_HEAD, p.high + 1.0
+    radius, low, high = p.ears.screw.head_room, p.low + UNDER_HEAD, p.high + 1.0
     recess: cq.Shape = solids.upright(radius, low, high, x, y)
     reach = math.hypot(x, y)
-    if reach - radius > p.opening + 1.0:
+    if reach - radius > p.ears.opening + 1.0:
         return recess
-    way = solids.box((0.0, -radius, low), (reach, radius, high))
-    return recess.fuse(way.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(math.atan2(y, x))))
+    channel = solids.box((0.0, -radius, low), (reach, radius, high))
+    return recess.fuse(channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(math.atan2(y, x))))
 
 
 def _windows(p: BearingCage) -> list[cq.Solid]:

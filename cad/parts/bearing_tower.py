@@ -11,6 +11,7 @@ down. An index groove in the edge of its top at +y meets the groove of the linka
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import partial
 
 import cadquery as cq
@@ -34,18 +35,22 @@ from scanwright.cad.layout.belt.stack import (
 )
 from scanwright.cad.layout.belt.tower import (
     DISC_SCREW,
+    SCREW_DEPTH,
     UNDER_FOOT_NUT,
     UNDER_HEAD,
     BearingTower,
     disc_azimuths,
-    tower_of,
 )
-from scanwright.cad.layout.fits import OnSheet, printed_seat
-from scanwright.cad.layout.names import BEARING, BEARING_TOWER
+from scanwright.cad.layout.cables.obstacles import Shape, shape_of
+from scanwright.cad.layout.envelope import around_axis, box_corners
+from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
+from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.fits import OnSheet, printed_seat
 from scanwright.cad.parts.part_spec import PartSpec, Step
-from scanwright.cad.screws import Trap
+from scanwright.cad.screws import Trap, thread_in_part
 from scanwright.cad.solids import building
-from scanwright.design.scanner import Scanner
+from scanwright.design.catalogue.products import Printer
 
 BEYOND_NUT = 6.0  # of the hole in the foot: screws come in steps of 5 mm at most
 WINDOW = 10.0  # diameter
@@ -54,9 +59,12 @@ GROOVE = 1.0  # half width of the index groove
 MARKED = 6.0  # half of the edge that it is in
 
 
-def tower_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
-    """The tower of one scanner."""
-    p = tower_of(scanner, stack)
+def tower_spec(place: Placement) -> PartSpec | None:
+    """The tower of one scanner; None without a belt."""
+    p = place.drive.of(BearingTower)
+    if p is None:
+        return None
+    stack = p.stack
     words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
     return PartSpec(
         name=BEARING_TOWER,
@@ -68,7 +76,32 @@ def tower_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         sheet=OnSheet((printed_seat(stack.carrier, p.fit),), _nuts_words(p)),
         shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
         shapes={"printer.fit_clearance_mm": "every bore and seat"},
+        joints=(_disc_joint(p, place.scanner.printer),),
+        avoid=tuple(_around(stack)),
     )
+
+
+def _disc_joint(p: BearingTower, printer: Printer) -> Joint:
+    """The capsule's disc in the tower, by radial screws."""
+    stack, heads = p.stack, p.stack.chamber_radius + UNDER_HEAD
+    return Joint(
+        BEARING_TOWER,
+        SLIP_RING_ADAPTER,
+        "thread",
+        DISC_SCREW,
+        placed_axes(inward_axes(disc_azimuths(stack), heads, stack.disc_top - DISC / 2), stack.turn()),
+        grip_mm=round_wall_mm(stack.chamber_radius, heads, p.disc_hole),
+        thread_mm=SCREW_DEPTH - p.fit / 2,
+        thread=thread_in_part(DISC_SCREW, printer, room_for_nut=False),
+    )
+
+
+def _around(stack: BeltStack) -> Iterator[Shape]:
+    """Tower with its foot."""
+    yield shape_of(around_axis(stack.wide_radius, stack.tower_bottom, stack.tower_top))
+    flares = max(0.0, math.sqrt(2) * FOOT_HALF - stack.wide_radius)  # the cone on the foot, at 45 deg
+    foot = stack.tower_bottom + FOOT + flares
+    yield shape_of(box_corners(((-FOOT_HALF, -FOOT_HALF, stack.tower_bottom), (FOOT_HALF, FOOT_HALF, foot))))
 
 
 def _nuts_words(p: BearingTower) -> tuple[str, ...]:

@@ -15,19 +15,35 @@ import cadquery as cq
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import DISC, BeltStack
 from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.names import RING_STATOR, SLIP_RING_ADAPTER
-from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.layout.joints import Joint, placed_axes, screws, upright_axes
+from scanwright.cad.layout.names import BEARING_TOWER, RING, RING_STATOR, SLIP_RING_ADAPTER
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.part_spec import CRIMPS, PartSpec, Row, Step
 from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
-from scanwright.design.scanner import Scanner
 
 BODY_ROOM = 0.5  # around the capsule's body
+SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
+RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
 
-def holder_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
-    """The disc of one scanner."""
+RING_STEP = Step(
+    "Capsule into the tower",
+    "Lead the rotor's leads up the shaft and out by its windows, those of each cable by the one that the step of the "
+    "leads names, if it names one, and slide the disc into the tower from below until the soft tube sits in the shaft. "
+    f"{screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
+    "turned by hand, the shaft takes the rotor along without slipping",
+)
+
+
+def holder_spec(place: Placement) -> PartSpec | None:
+    """The disc of one scanner; None if it has no capsule."""
+    stack, printer = place.drive.of(BeltStack), place.scanner.printer
+    if stack is None:
+        return None
+    axes = placed_axes(upright_axes(flange_centres(stack.flange), stack.disc_top - DISC, 1.0), stack.turn())
+    screw, thickness = SCREWS[stack.flange.screw], stack.flange.thickness_mm
     words = (
         "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
         f"{screws(RING_STATOR)} Leave them so loose that the flange still gives. Push 10 mm of soft tube, "
@@ -36,11 +52,14 @@ def holder_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(capsule_holder, stack, scanner.printer),
+        make=partial(capsule_holder, stack, printer),
         step=Step(
             "Capsule on its disc", words, "the capsule can be shifted a little by hand, and its rotor turns freely"
         ),
         shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
+        joints=(Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness),),
+        rows=(Row("wiring", "soft tube", SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER), CRIMPS),
+        steps={RING: RING_STEP},
     )
 
 
@@ -56,7 +75,7 @@ def capsule_holder(stack: BeltStack, printer: Printer) -> cq.Solid:
     with building(SLIP_RING_ADAPTER, "disc", "flange.diameter_mm", f"{stack.flange.diameter_mm:g}") as checked:
         radius = stack.chamber_radius - printer.fit_clearance_mm / 2
         cuts = [solids.upright(stack.ring_radius + BODY_ROOM, low - 1.0, high + 1.0)]
-        cuts += [solids.upright(hole / 2, low - 1.0, high + 1.0, x, y) for x, y in flange_centres(stack)]
+        cuts += [solids.upright(hole / 2, low - 1.0, high + 1.0, x, y) for x, y in flange_centres(stack.flange)]
         for azimuth in disc_azimuths(stack):
             start = radius - SCREW_DEPTH
             cuts.append(solids.radial(thread.hole / 2, azimuth, (low + high) / 2, start, SCREW_DEPTH + 1.0))

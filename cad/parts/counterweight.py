@@ -1,30 +1,38 @@
-"""Counterweight: a piece of steel bar on the ear of the linkage's hub, with two threads (`cad/layout/balance/`).
+"""Counterweight: a piece of steel bar on the ear of the linkage's hub, with two threads (`cad/layout/rotor/`).
 
 Frame: rotation frame at gamma = 0, mm. It lies along a radius; its screws come from below, through slots of the ear.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from functools import partial
 
 import cadquery as cq
 
 from scanwright.cad import solids
-from scanwright.cad.layout.balance.counterweight import SCREW, Counterweight
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.layout import Layout
+from scanwright.cad.layout.cables.obstacles import Shape, shape_of
+from scanwright.cad.layout.drive import towards
+from scanwright.cad.layout.envelope import box_corners
+from scanwright.cad.layout.joints import Joint, screws, upright_axes
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.counterweight import LONGER, SCREW, Counterweight
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.solids import building
 from scanwright.design.left_out import LeftOut
 
 
-def counterweight_spec(layout: Layout) -> PartSpec | None:
-    """The bar of one scanner; None where nothing is to be balanced, or nothing can."""
-    bar = layout.counterweight
-    if isinstance(bar, LeftOut):
-        return None
-    tie = layout.linkage.hub_tie
+def counterweight_spec(place: Placement) -> PartSpec | LeftOut:
+    """The bar of one scanner, or why it has none."""
+    bar = place.counterweight
+    return bar if isinstance(bar, LeftOut) else bar_spec(place, bar)
+
+
+def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
+    """A bar that may be cut to another length than the layout estimated."""
+    tie = place.linkage.hub_tie
     first = (
         ""
         if tie is None or not tie.grooved
@@ -49,7 +57,36 @@ def counterweight_spec(layout: Layout) -> PartSpec | None:
         shaped_by=("lidar.mass_g",),
         shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
         lifted="radius",
+        joints=(_joint(bar),),
+        avoid=tuple(_around(bar)),
     )
+
+
+def _joint(bar: Counterweight) -> Joint:
+    """The bar on the ear of the hub, from below."""
+    ear, slide = bar.ear, bar.ear.slots[0]
+    x, y = math.cos(ear.azimuth), math.sin(ear.azimuth)
+    return Joint(
+        ALIGNMENT_LINKAGE,
+        COUNTERWEIGHT,
+        "thread",
+        SCREW,
+        upright_axes(((at * x, at * y) for at in bar.screws), ear.low, 1.0),
+        grip_mm=ear.high - ear.low,
+        thread_mm=bar.section[1],
+        slot_mm=(ear.slot_width, slide[1] - slide[0] + ear.slot_width),
+    )
+
+
+def _around(bar: Counterweight) -> Iterator[Shape]:
+    """The bar on its ear, and the heads of its screws wherever it slides."""
+    ear, half = bar.ear, max(bar.ear.half_width, bar.section[0] / 2)
+    above, below = ear.high + bar.section[1], ear.low - SCREW.head_height
+    wide = SCREW.head_diameter / 2
+    boxes = [((0.0, -half, ear.low), (max(bar.end + LONGER, ear.end), half, above))]
+    boxes += [((first - wide, -wide, below), (last + wide, wide, ear.low)) for first, last in ear.slots]
+    for box in boxes:
+        yield shape_of(towards(box_corners(box), ear.azimuth)[0])
 
 
 def counterweight(p: Counterweight) -> cq.Solid:

@@ -13,25 +13,30 @@ from functools import partial
 import cadquery as cq
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.fits import OnSheet, spigot_in_hub
 from scanwright.cad.layout.joints import horn_centres, screws
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.linkage import BEFORE_NUT, AlignmentLinkage
-from scanwright.cad.layout.names import HORN_CUP, SERVO_HORN
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, SERVO_HORN
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.linkage import BEFORE_NUT, AlignmentLinkage
+from scanwright.cad.parts.fits import OnSheet, spigot_in_hub
 from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
+from scanwright.cad.parts.servo_shaft import on_horn
 from scanwright.cad.screws import SCREWS, Trap, passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer, Servo
 
 AROUND_BOSS = 0.2  # of the horn
+SEATED_ON_RIM = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
+LINKAGE_WORDS = (
+    "Lower the hub over the cup until it sits on its rim; the flat of the cup fits one way only, and the groove of the "
+    f"hub then stands above the groove of the cup. {screws(HORN_CUP)}"
+)
 
 
-def cup_spec(layout: Layout) -> PartSpec | None:
-    """The cup of one scanner; None where its shaft is a turned one."""
-    p, stack, scanner = layout.linkage, layout.stack, layout.scanner
-    if isinstance(stack, BeltStack) or stack.cup_bore == 0:
+def cup_spec(place: Placement) -> PartSpec | None:
+    """The cup of one scanner; None if its shaft is a turned one."""
+    p, stack, scanner = place.linkage, place.drive.of(DirectStack), place.scanner
+    if stack is None or stack.cup_bore == 0:
         return None
     words = (
         "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the cup on the horn so that its index "
@@ -44,6 +49,8 @@ def cup_spec(layout: Layout) -> PartSpec | None:
         step=Step("Cup on the horn", words, "the index groove stands over the middle of the +Y face"),
         sheet=OnSheet((spigot_in_hub(stack.shaft_diameter, p.fit),)),
         shaped_by=HORN,
+        joints=(on_horn(scanner.servo, stack, HORN_CUP),),
+        steps={ALIGNMENT_LINKAGE: Step("Linkage on the cup", LINKAGE_WORDS, SEATED_ON_RIM)},
     )
 
 
@@ -54,23 +61,28 @@ def horn_cup(p: AlignmentLinkage, stack: DirectStack, servo: Servo, printer: Pri
         BuildError: a step did not give one valid solid.
     """
     horn, floor, top = stack.horn, stack.horn + stack.flange_thickness, stack.spigot_top
-    radius, bore = stack.shaft_diameter / 2, stack.cup_bore / 2
+    radius, bore, seat = stack.shaft_diameter / 2, stack.cup_bore / 2, horn + stack.horn_grip
     with building(HORN_CUP, "floor and wall", "horn_circle_mm", servo.horn_circle_mm) as checked:
-        body = solids.upright(stack.flange_radius, horn, floor).fuse(solids.upright(radius, horn, top))
-        body = checked(body.cut(solids.upright(bore, floor, top + 1.0)))
+        if stack.foot_radius > 0:
+            foot, low = stack.foot_radius, horn + stack.foot_height
+            outline = [(0.0, horn), (foot, horn), (foot, low), (radius, low + radius - foot), (radius, top), (0.0, top)]
+            body: cq.Shape = solids.lathe(outline)
+        else:
+            body = solids.upright(stack.flange_radius, horn, floor).fuse(solids.upright(radius, horn, top))
+        body = checked(body.cut(solids.upright(bore, seat, top + 1.0)))
     with building(HORN_CUP, "holes, flat and marks", "horn_circle_mm", servo.horn_circle_mm) as checked:
         hole, boss = passing_hole(SCREWS[servo.horn_screw], printer) / 2, servo.horn_boss_diameter_mm / 2
         cuts = [solids.box((-2 * radius, stack.flat, floor), (2 * radius, 2 * radius, top + 1.0))]
-        cuts += [solids.upright(hole, horn - 1.0, floor + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
+        cuts += [solids.upright(hole, horn - 1.0, seat + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
         cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, floor + 1.0))  # index groove
         if boss > 0:
             cuts.append(solids.upright(boss + AROUND_BOSS, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
         for azimuth in p.cross_azimuths:
-            cuts += _held(p, azimuth)
+            cuts += _cross_holes(p, azimuth)
         return checked(body.cut(*cuts).clean())
 
 
-def _held(p: AlignmentLinkage, azimuth: float) -> list[cq.Solid]:
+def _cross_holes(p: AlignmentLinkage, azimuth: float) -> list[cq.Solid]:
     """What one cross screw holds in: a hole through the wall, or one to the slot of its nut."""
     stack, thread = p.stack, p.cross_thread
     assert thread is not None  # as in every cup

@@ -16,24 +16,26 @@ from scanwright.cad import solids
 from scanwright.cad.layout.direct.loads import JOURNAL_WALL
 from scanwright.cad.layout.direct.misalignment import TRUED_MM
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter
 from scanwright.cad.layout.hub import BEARING_STEP
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.linkage import AlignmentLinkage
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
-from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Step
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
+from scanwright.cad.parts.fits import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Row, Step
 from scanwright.cad.solids import building
 
 SLIDES = 0.02  # in the inner ring: the lower end of g6
 BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills
 UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
 WIRES_HALF_WIDTH = 5.0
+COMPOUND = "retaining compound for metal, medium strength"
+RETAINING = "groove of the shaft, under the bearing's sleeve"
 
 
-def sleeve_spec(layout: Layout) -> PartSpec | None:
-    """The sleeve of one scanner; None where no bearing carries its axis."""
-    stack = layout.stack
-    if not isinstance(stack, DirectStack) or stack.bearing is None:
+def sleeve_spec(place: Placement) -> PartSpec | None:
+    """The sleeve of one scanner; None if no bearing of a cage carries its axis."""
+    stack = place.drive.of(DirectStack)
+    if stack is None or stack.bearing is None:
         return None
     words = (
         f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
@@ -47,13 +49,23 @@ def sleeve_spec(layout: Layout) -> PartSpec | None:
     return PartSpec(
         name=JOURNAL_SLEEVE,
         turns=True,
-        make=partial(journal_sleeve, layout.linkage, stack),
+        make=partial(journal_sleeve, place.linkage, stack),
         step=Step("Sleeve of the bearing, and the shaft trued", words, "the indicator stays within 0.05 mm"),
         process="turned",
         material=TURNED_FROM,
         why_metal=f"{stack.bearing.name} wants a round seat to g6",
         sheet=OnSheet((seat, bore), ("Bore and outside in one setting: runout 0.01.",)),
         shaped_by=("bearing.bore_mm", "bearing.width_mm", "slip_ring.bore_mm"),
+        rows=(
+            Row("consumable", "retaining ring", f"retaining ring DIN 471 - {stack.retaining_ring}", RETAINING),
+            Row(
+                "consumable",
+                "retaining compound",
+                "retaining compound for metal, medium strength",
+                "sleeve on the shaft",
+            ),
+            Row("tool", "dial indicator", "dial indicator on a stand", "assembly.md", "reads 0.01 mm"),
+        ),
     )
 
 

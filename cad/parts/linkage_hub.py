@@ -11,9 +11,9 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 from scanwright.cad.layout.direct.loads import JOURNAL_WALL
-from scanwright.cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.rotor.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
 WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing

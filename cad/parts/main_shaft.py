@@ -14,20 +14,31 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltStack
-from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
-from scanwright.cad.layout.names import MAIN_SHAFT
-from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Step
+from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.fits import OnSheet, ToleratedDiameter, spigot_in_hub
+from scanwright.cad.parts.part_spec import SEATED, TURNED_FROM, PartSpec, Step
 from scanwright.cad.parts.servo_shaft import cross_holes, cross_words
 from scanwright.cad.solids import building
-from scanwright.design.scanner import Scanner
 
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot
 WINDOW = 8.0  # diameter
+LINKAGE_WORDS = (
+    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
+    f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
+    "shaft in its loose pulley, until the groove of the hub stands over the groove in the edge of the tower's "
+    "top, and tighten the pulley's two grub screws. Both pulleys have the same number of teeth and turn the "
+    "same way, so from now on the servo's angle is that of the axis."
+)
 
 
-def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
-    """The shaft of one scanner."""
+def main_shaft_spec(place: Placement) -> PartSpec | None:
+    """The shaft of one scanner; None if it has another one."""
+    scanner, stack = place.scanner, place.drive.of(BeltStack)
+    if stack is None:
+        return None
     seat = ToleratedDiameter(stack.seat_diameter, False, "+0.02/0", "f7 in the bearings, which slide on by hand")
     words = "Lower the shaft through both bearings until its collar lies on the upper one."
     return PartSpec(
@@ -43,6 +54,7 @@ def main_shaft_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
             (*cross_words(stack), _ring_words()),
         ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
+        steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft, and the belt set", LINKAGE_WORDS, SEATED)},
     )
 
 

@@ -1,4 +1,4 @@
-"""What is to know of a made part beside its shape: who moves it, how it is made, drawn, put in and called."""
+"""The description of a made part: its shape, joints, space, steps, rows of lists, and what shapes it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Literal
 
 import cadquery as cq
 
-from scanwright.cad.layout.fits import OnSheet
+from scanwright.cad.layout.cables.obstacles import Shape
+from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
+from scanwright.cad.parts.fits import OnSheet
 from scanwright.design.catalogue.products import Printer
 
 Process = Literal["printed", "turned", "sawn"]
@@ -26,12 +28,11 @@ HORN = (
 )
 ON_CASE = (
     "servo.case_max_mm",
-    "servo.case_screw",
-    "servo.case_holes_mm",
-    "servo.case_holes_z_mm",
+    "servo.holes",
     "servo.horn_diameter_mm",
     "servo.horn_thickness_mm",
 )
+SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 TURNED_FROM = "aluminium EN AW-6082-T6"
 
 
@@ -52,15 +53,37 @@ class Step:
     brings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One row of the parts list.
+
+    Attributes:
+        kind: of the row.
+        estimate: name of its price in `cad/files/prices.py`.
+        part: what it is, with its size.
+        source: of the row.
+        note: on it.
+    """
+
+    kind: Literal["consumable", "wiring", "tool"]
+    estimate: str
+    part: str
+    source: str
+    note: str = ""
+
+
+CRIMPS = Row("tool", "crimping pliers", "crimping pliers", "assembly.md", "for the leads")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartSpec:
-    """One part of one scanner.
+    """One part of one scanner, described before it is made: `make` alone needs the kernel.
 
     Attributes:
         name: of `cad/layout/names.py`.
         turns: whether it turns about the rotation axis, or stands still.
         make: its solid, rotation frame at gamma = 0, mm; raises BuildError.
-        step: that puts it in.
+        step: that puts it in; None if that of what it sits on does.
         process: how it is made.
         material: what it is made from, where that is not what the printer prints.
         work: what else is done to it.
@@ -71,13 +94,17 @@ class PartSpec:
         angles: those that shape it and stand on its label.
         seat: height in the laser frame of its face towards the lidar; None where it does not carry the lidar.
         lifted: along what the exploded view moves it.
-        sweep: what it fills where it turns about an axis of its own.
+        sweep: what it fills if it turns about an axis of its own.
+        joints: what it is screwed to.
+        avoid: convex shapes that cables must stay clear of.
+        rows: small things that it needs, for the parts list.
+        steps: of products that are put in with it, and of parts that sit on it: these go before their own.
     """
 
     name: str
     turns: bool
     make: Callable[[], cq.Solid]
-    step: Step
+    step: Step | None = None
     process: Process = "printed"
     material: str = ""
     work: str = ""
@@ -89,6 +116,10 @@ class PartSpec:
     seat: float | None = None
     lifted: Literal["axis", "radius", "lidar", "deck"] = "axis"
     sweep: Callable[[], cq.Solid] | None = None
+    joints: tuple[Joint, ...] = ()
+    avoid: tuple[Shape, ...] = ()
+    rows: tuple[Row, ...] = ()
+    steps: Mapping[str, Step] = field(default_factory=dict)
 
     @property
     def colour(self) -> Colour:

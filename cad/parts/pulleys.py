@@ -11,6 +11,7 @@ half of the sliding fit: what they stand off their axes turns the angle once per
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import cadquery as cq
@@ -20,8 +21,15 @@ from scanwright.cad import solids
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
 from scanwright.cad.layout.belt.plate import pulley_foot_radius
 from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
-from scanwright.cad.layout.fits import OnSheet, no_wider
-from scanwright.cad.layout.joints import horn_centres, screws
+from scanwright.cad.layout.joints import (
+    Joint,
+    horn_centres,
+    horn_joint,
+    inward_axes,
+    placed_axes,
+    round_wall_mm,
+    screws,
+)
 from scanwright.cad.layout.names import (
     BEARING_TOWER,
     BELT,
@@ -31,11 +39,12 @@ from scanwright.cad.layout.names import (
     SERVO_OUTPUT,
     SHAFT_PULLEY,
 )
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.fits import OnSheet, no_wider
 from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
-from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
+from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
-from scanwright.design.scanner import Scanner
 
 CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
 MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
@@ -43,26 +52,55 @@ GIVE_MM = 2.0  # of a strand, when the pre-load is felt
 OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
 
 
-def shaft_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
-    """The pulley on the shaft of one scanner."""
+def shaft_pulley_spec(place: Placement) -> PartSpec | None:
+    """The pulley on the shaft of one scanner; None without a belt."""
+    stack, printer = place.drive.of(BeltStack), place.scanner.printer
+    if stack is None:
+        return None
     words = (
         "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and lay the belt "
         f"around it: {stack.belt.name} of {stack.belt_teeth} teeth ({stack.belt_teeth * stack.belt.pitch_mm:g} mm). "
         f"{screws(MAIN_SHAFT)} Leave these two loose."
     )
-    fit = no_wider(stack.tube_diameter, scanner.printer.fit_clearance_mm, OFF_AXIS)
+    fit, grub = no_wider(stack.tube_diameter, printer.fit_clearance_mm, OFF_AXIS), _grub_thread(printer)
+    azimuths = (math.radians(azimuth) for azimuth in GRUBS_DEG)
     return PartSpec(
         name=SHAFT_PULLEY,
         turns=True,
-        make=partial(shaft_pulley, stack, scanner.printer),
+        make=partial(shaft_pulley, stack, printer),
         step=Step("Pulley and belt on the shaft", words, "the belt lies between both rims", (BELT,)),
         sheet=OnSheet((fit,), (_teeth_words(stack),)),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
+        joints=(
+            Joint(
+                SHAFT_PULLEY,
+                MAIN_SHAFT,
+                "grub",
+                GRUB,
+                inward_axes(azimuths, stack.boss_radius, stack.pulley_top - BOSS / 2),
+                grip_mm=round_wall_mm(_bore(stack, printer), stack.boss_radius, grub.hole),
+                thread_mm=0.0,
+                thread=grub,
+            ),
+        ),
     )
 
 
-def drive_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
-    """The pulley on the horn of one scanner."""
+def _bore(stack: BeltStack, printer: Printer) -> float:
+    """Radius of the pulley on the shaft: a light press."""
+    return stack.tube_diameter / 2 + printer.fit_clearance_mm / 4
+
+
+def _grub_thread(printer: Printer) -> Thread:
+    return thread_in_part(GRUB, printer, room_for_nut=False)
+
+
+def drive_pulley_spec(place: Placement) -> PartSpec | None:
+    """The pulley on the horn of one scanner; None without a belt."""
+    scanner, stack = place.scanner, place.drive.of(BeltStack)
+    if stack is None:
+        return None
+    horn = horn_joint(scanner.servo, DRIVE_PULLEY, SERVO_OUTPUT, stack.pulley_seat, stack.pulley_seat - stack.horn)
     push = press_newton(stack, PRELOAD_N, GIVE_MM)
     words = (
         f"The boss of the horn centres the pulley. {screws(SERVO_OUTPUT)} Hang the servo between the arms of the "
@@ -81,6 +119,7 @@ def drive_pulley_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack),
+        joints=(replace(horn, axes=placed_axes(horn.axes, stack.turn(), stack.beside() * [1.0, 1.0, 0.0])),),
     )
 
 
@@ -90,10 +129,7 @@ def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    bore, grub = (
-        stack.tube_diameter / 2 + printer.fit_clearance_mm / 4,
-        thread_in_part(GRUB, printer, room_for_nut=False),
-    )
+    bore, grub = _bore(stack, printer), _grub_thread(printer)
     with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
         boss = solids.upright(stack.boss_radius, stack.teeth_top - 0.5, stack.pulley_top)
         body = checked(_toothed(stack, None, boss))

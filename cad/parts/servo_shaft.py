@@ -16,21 +16,27 @@ import cadquery as cq
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL
 from scanwright.cad.layout.direct.stack import GROOVES, DirectStack
-from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.layout.hub import Hub
-from scanwright.cad.layout.joints import horn_centres, screws
-from scanwright.cad.layout.linkage import CROSS_AT, CROSS_SCREW
-from scanwright.cad.layout.names import SERVO_HORN, SERVO_SHAFT
-from scanwright.cad.parts.part_spec import HORN, TURNED_FROM, PartSpec, Step
+from scanwright.cad.layout.joints import Joint, horn_centres, horn_joint, screws
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SERVO_HORN, SERVO_SHAFT
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.linkage import CROSS_AT, CROSS_SCREW
+from scanwright.cad.parts.fits import OnSheet, ToleratedDiameter, spigot_in_hub
+from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, Step
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer, Servo
-from scanwright.design.scanner import Scanner
+
+LINKAGE_ON_SHAFT = (
+    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way only, "
+    f"and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
+)
 
 
-def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
-    """The shaft of one scanner; None where a cup stands in its place."""
-    if stack.cup_bore > 0:
+def servo_shaft_spec(place: Placement) -> PartSpec | None:
+    """The shaft of one scanner; None if it has another one."""
+    scanner, stack = place.scanner, place.drive.of(DirectStack)
+    if stack is None or stack.cup_bore > 0:
         return None
     fits = (spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm),)
     if stack.bearing is not None:
@@ -50,7 +56,14 @@ def servo_shaft_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
         why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",
         sheet=OnSheet(fits, (*cross_words(stack), *_waist_words(stack))),
         shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
+        joints=(on_horn(scanner.servo, stack, SERVO_SHAFT),),
+        steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft", LINKAGE_ON_SHAFT, SEATED)},
     )
+
+
+def on_horn(servo: Servo, stack: DirectStack, part: str) -> Joint:
+    """What is on the axis of the servo on its horn."""
+    return horn_joint(servo, part, SERVO_HORN, stack.horn + stack.horn_grip, stack.horn_grip)
 
 
 def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:

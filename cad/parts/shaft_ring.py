@@ -14,17 +14,22 @@ import cadquery as cq
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import BOSS, RING_SCREW, RING_SCREWS_DEG, BeltStack
 from scanwright.cad.layout.hub import BEARING_STEP
-from scanwright.cad.layout.joints import screws
+from scanwright.cad.layout.joints import Joint, inward_axes, screws
 from scanwright.cad.layout.names import MAIN_SHAFT, SHAFT_RING
+from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
-from scanwright.design.scanner import Scanner
 
 
-def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
-    """The ring of one scanner."""
+def shaft_ring_spec(place: Placement) -> PartSpec | None:
+    """The ring of one scanner; None without a belt."""
+    stack, printer = place.drive.of(BeltStack), place.scanner.printer
+    if stack is None:
+        return None
+    bore, hole = _bore(stack, printer), passing_hole(RING_SCREW, printer) / 2
+    azimuths = (math.radians(azimuth) for azimuth in RING_SCREWS_DEG)
     words = (
         "From below push the ring up the shaft, its step against the lower bearing and its holes over the threads, so "
         f"that the shaft has no play along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a driver "
@@ -33,9 +38,24 @@ def shaft_ring_spec(scanner: Scanner, stack: BeltStack) -> PartSpec:
     return PartSpec(
         name=SHAFT_RING,
         turns=True,
-        make=partial(shaft_ring, stack, scanner.printer),
+        make=partial(shaft_ring, stack, printer),
         step=Step("Ring under the bearings", words, "pushed and pulled along its axis the shaft does not click"),
+        joints=(
+            Joint(
+                SHAFT_RING,
+                MAIN_SHAFT,
+                "thread",
+                RING_SCREW,
+                inward_axes(azimuths, stack.ring_seat, stack.ring_screws),
+                grip_mm=stack.ring_seat - math.sqrt(bore**2 - hole**2),
+                thread_mm=(stack.tube_diameter - stack.shaft_bore) / 2,
+            ),
+        ),
     )
+
+
+def _bore(stack: BeltStack, printer: Printer) -> float:
+    return (stack.tube_diameter + printer.fit_clearance_mm) / 2
 
 
 def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
@@ -50,7 +70,7 @@ def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
         body = solids.upright(stack.boss_radius, low, high).fuse(
             solids.upright(stack.collar_radius, low, high + BEARING_STEP)
         )
-        bore = solids.upright((stack.tube_diameter + printer.fit_clearance_mm) / 2, low - 1.0, high + 2.0)
+        bore = solids.upright(_bore(stack, printer), low - 1.0, high + 2.0)
         cuts = [bore]
         for azimuth in (math.radians(azimuth) for azimuth in RING_SCREWS_DEG):
             cuts.append(solids.radial(hole, azimuth, stack.ring_screws))

@@ -11,56 +11,81 @@ every pair of ears beside the flange; it comes down over the shaft. Without a ri
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import cadquery as cq
 
 from scanwright.cad import solids
-from scanwright.cad.layout.direct.adapter import ARM, ARM_HALF_WIDTH, PLATE, PLAY, SlipRingAdapter, adapter_of, arm_top
-from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, cage_of
+from scanwright.cad.layout.cables.obstacles import Shape, shape_of
+from scanwright.cad.layout.direct.adapter import ARM, ARM_GAP, ARM_HALF_WIDTH, PLATE, SlipRingAdapter, arm_top
+from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, Ears, plate_half_x
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.names import SERVO_CASE, SLIP_RING_ADAPTER
-from scanwright.cad.parts.bearing_cage import cage_base
-from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
+from scanwright.cad.layout.names import RING, SERVO_CASE, SLIP_RING_ADAPTER
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.bearing_cage import around_base, cage_base, on_ears
+from scanwright.cad.parts.part_spec import CRIMPS, ON_CASE, PartSpec, Row, Step
+from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
-from scanwright.design.scanner import Scanner
+from scanwright.design.catalogue.products import Servo
 
-RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
+RING_STEP = Step(
+    "Slip ring",
+    "Lower the ring over the shaft, the rotor's leads upwards, and clamp its rotor to the shaft with its own set "
+    "screws. A cable tie in the grooves of the adapter holds the stator: it may move a little, it may not turn.",
+    "turned by hand, the shaft takes the rotor along and the stator stays; no lead is pulled",
+)
+OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
 
 
-def adapter_spec(scanner: Scanner, stack: DirectStack) -> PartSpec | None:
+def adapter_spec(place: Placement) -> PartSpec | None:
     """The adapter of one scanner; None without a ring."""
-    if scanner.slip_ring is None:
+    p, cage = place.drive.of(SlipRingAdapter), place.drive.of(BearingCage)
+    if p is None:
         return None
-    how = (
-        "Slide the fork round the flange of the shaft." if stack.bearing is None else "Lower the plate over the shaft."
-    )
+    how = "Lower the plate over the shaft." if p.fork is None else "Slide the fork round the flange of the shaft."
+    ears = p.fork if cage is None else cage.ears
+    assert ears is not None  # a fork, or the base of a cage
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(slip_ring_adapter, cage_of(scanner, stack) or adapter_of(scanner, stack)),
+        make=partial(slip_ring_adapter, p, cage),
         step=Step(
             "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a whole turn without touching"
         ),
-        shaped_by=(*ON_CASE, *RING),
+        shaped_by=(*ON_CASE, *OF_RING),
+        joints=(on_ears(place.scanner.servo, p.stack, ears, SLIP_RING_ADAPTER),),
+        avoid=tuple(_around(place.scanner.servo, p)) if cage is None else (around_base(place.scanner.servo, cage),),
+        rows=(Row("wiring", "cable tie", "cable tie around the ring's stator", "groove of the adapter"), CRIMPS),
+        steps={RING: RING_STEP},
     )
 
 
-def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
+def _around(servo: Servo, p: SlipRingAdapter) -> Iterator[Shape]:
+    """Arms and fork."""
+    stack, front = p.stack, p.stack.horn + servo.case_max_mm[2] + SEAT_GAP
+    outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo, SCREWS[servo.front.screw]))
+    yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
+    yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + PLATE))))
+
+
+def slip_ring_adapter(p: SlipRingAdapter, cage: BearingCage | None) -> cq.Solid:
     """Make the adapter: the fork, or the base of a cage, and the arms.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
     stack = p.stack
-    inner = stack.ring_radius + PLAY
+    inner = stack.ring_radius + ARM_GAP
     outer = inner + ARM
-    if isinstance(p, SlipRingAdapter):
-        body, top = _fork(p, outer), p.front + SEAT_GAP + PLATE
+    if p.fork is not None:
+        body, top = _fork(stack, p.fork, outer), stack.horn + p.fork.front + SEAT_GAP + PLATE
     else:
-        body, top = cage_base(p), p.foot
-    high_end = arm_top(stack, p)
+        assert cage is not None
+        body, top = cage_base(cage), cage.foot
+    high_end = arm_top(p)
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         arms = [
             solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end))
@@ -77,19 +102,19 @@ def slip_ring_adapter(p: SlipRingAdapter | BearingCage) -> cq.Solid:
         return checked(body.cut(*cuts).clean())
 
 
-def _fork(p: SlipRingAdapter, outer: float) -> cq.Shape:
+def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
     """The plate on the servo, open at +y."""
-    low = p.front + SEAT_GAP
+    low, seats = stack.horn + p.front + SEAT_GAP, stack.horn + p.seats
     top = low + PLATE
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5
-    with building(SLIP_RING_ADAPTER, "fork", "case_holes_mm", p.holes) as checked:
+    with building(SLIP_RING_ADAPTER, "fork", "holes", p.holes) as checked:
         tail = solids.box((-p.half_x, last, low), (p.half_x, first, top))
         prongs = solids.box((-outer, min(first, slot_end - 12.0), low), (outer, ARM_HALF_WIDTH, top))
-        feet = [solids.upright(FOOT_RADIUS, p.ears, low + 1.0, x, y) for x, y in p.holes]
+        feet = [solids.upright(FOOT_RADIUS, seats, low + 1.0, x, y) for x, y in p.holes]
         cuts = [solids.box((-p.opening, slot_end, low - 9), (p.opening, 99.0, top + 9))]
         for x, y in p.holes:
-            cuts.append(solids.upright(p.hole / 2, p.ears - 1.0, top + 1.0, x, y))
+            cuts.append(solids.upright(p.hole / 2, seats - 1.0, top + 1.0, x, y))
             cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, top + 1.0, x, y))
         return checked(tail.fuse(prongs, *feet).cut(*cuts))

@@ -13,20 +13,21 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.drive import Stack
 from scanwright.cad.layout.envelope import (
     EAR_REACH,
     EAR_SCREW,
+    PLATE_THICKNESS,
     SUB_PLATE_THICKNESS,
     ear_corner,
     ear_screws,
     screw_travel_mm,
     slot_ends,
 )
-from scanwright.cad.layout.hub import Axis
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SUB_PLATE
+from scanwright.cad.layout.hub import Axis, Hub
+from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, lidar_thread_mm, placed_axes, screws, upright_axes
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR_BODY, SUB_PLATE
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
@@ -36,9 +37,9 @@ from scanwright.design.scanner import Scanner
 CHAMFER = 3.0
 
 
-def sub_plate_spec(layout: Layout) -> PartSpec | None:
-    """The sub-plate of one scanner; None where a driver reaches all screws of the lidar."""
-    scanner, axis = layout.scanner, layout.stack.sub_plate
+def sub_plate_spec(place: Placement) -> PartSpec | None:
+    """The sub-plate of one scanner; None if a driver reaches all screws of the lidar."""
+    scanner, axis = place.scanner, place.stack.sub_plate
     if axis is None:
         return None
     words = (
@@ -49,28 +50,63 @@ def sub_plate_spec(layout: Layout) -> PartSpec | None:
     return PartSpec(
         name=SUB_PLATE,
         turns=True,
-        make=partial(sub_plate, scanner, layout.stack, axis),
+        make=partial(sub_plate, scanner, place.stack, axis),
         step=Step("Lidar and sub-plate on the linkage", words, "the two plates meet without a gap"),
         angles="laser",
-        seat=layout.linkage.seat,
+        seat=place.linkage.seat,
         lifted="lidar",
+        joints=(lidar_joint(place, SUB_PLATE, SUB_PLATE_THICKNESS), _ears_joint(place.linkage)),
     )
 
 
-def sub_plate(scanner: Scanner, stack: Stack, axis: Axis) -> cq.Solid:
+def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
+    """The lidar on the linkage, or on its sub-plate."""
+    p = place.linkage
+    axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), p.stack.R())
+    slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
+    lidar = place.scanner.lidar
+    return Joint(
+        part,
+        LIDAR_BODY,
+        fixing_of(lidar.base),
+        p.screw,
+        axes,
+        grip_mm=grip,
+        thread_mm=lidar_thread_mm(lidar),
+        slot_mm=slot,
+        heel_mm=min(lidar.half_mm) if len(p.holes) == 2 else None,
+    )
+
+
+def _ears_joint(p: AlignmentLinkage) -> Joint:
+    """The sub-plate on the linkage."""
+    thread = p.ear_thread
+    return Joint(
+        SUB_PLATE,
+        ALIGNMENT_LINKAGE,
+        fixing_in(thread),
+        EAR_SCREW,
+        placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
+        grip_mm=SUB_PLATE_THICKNESS,
+        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
+        thread=thread,
+    )
+
+
+def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
     """Make the sub-plate, its ears along an axis of the laser frame.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    half_x, half_y = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2
+    half_x, half_y = lidar.half_mm
     low, high = -lidar.optical_height_mm - SUB_PLATE_THICKNESS, -lidar.optical_height_mm
-    hole, ear_hole = passing_hole(SCREWS[lidar.mount_screw], printer) / 2, passing_hole(EAR_SCREW, printer) / 2
+    hole, ear_hole = passing_hole(SCREWS[lidar.base.screw], printer) / 2, passing_hole(EAR_SCREW, printer) / 2
     with building(SUB_PLATE, "plate and holes", "ears along", axis) as checked:
         body: cq.Shape = solids.prism(outlines.octagon(half_x, half_y, CHAMFER), low, high)
         body = body.fuse(solids.prism(outlines.octagon(*ear_corner(lidar, axis), CHAMFER), low, high))
-        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.mount_holes_mm]
+        ends = [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.base.places]
         cuts = [solids.slot(hole, *each, low - 1.0, high + 1.0) for each in ends]
         cuts += [solids.upright(ear_hole, low - 1.0, high + 1.0, *at) for at in ear_screws(lidar, axis)]
         front = front_mark(half_x + (EAR_REACH if axis == "x" else 0.0))

@@ -7,25 +7,36 @@ the mount's screws in pockets from below.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.modules.tripod_foot import OVER_NUTS, TripodFoot, corner_turn
+from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
+from scanwright.cad.layout.modules.tripod_foot import (
+    FLOOR,
+    HEEL,
+    OVER_NUTS,
+    STANDS_OUT,
+    TripodFoot,
+    corner_turn,
+)
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
+from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.screws import TRIPOD_SCREW
 from scanwright.cad.solids import building
+from scanwright.design.left_out import LeftOut
 
 
-def tripod_foot_spec(layout: Layout) -> PartSpec | None:
-    """The plate of one scanner; None where no task asks for it."""
-    p = layout.deck.tripod
+def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
+    """The plate of one scanner, if the task requires it."""
+    p = place.deck.tripod
     if p is None:
-        return None
+        return LeftOut(TRIPOD_FOOT, f"the task does not ask for it by modules.{TRIPOD_FOOT}", 1, "parts")
     nut = "Lay the nut 1/4-20 into the pocket in the middle of the plate. " if p.tripod.trap is not None else ""
     words = (
         f"{nut}Put the plate under the foot of the mount, over its holes. {screws(TRIPOD_FOOT, BASE_MOUNT)} When the "
@@ -35,19 +46,46 @@ def tripod_foot_spec(layout: Layout) -> PartSpec | None:
     return PartSpec(
         name=TRIPOD_FOOT,
         turns=False,
-        make=partial(tripod_foot, layout, p),
+        make=partial(tripod_foot, place.deck, p),
         step=Step("Tripod foot", words, "no screw stands out below the plate, and the nut does not turn"),
         lifted="deck",
+        joints=tuple(_joints(place.deck, p)),
     )
 
 
-def tripod_foot(layout: Layout, p: TripodFoot) -> cq.Solid:
+def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
+    """The mount on its plate, and that on the tripod."""
+    R = deck.rotation()
+    yield Joint(
+        BASE_MOUNT,
+        TRIPOD_FOOT,
+        fixing_in(p.mount),
+        deck.screw,
+        placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), R, deck.centre),
+        grip_mm=FOOT_THICKNESS,
+        thread_mm=p.thickness if p.mount.trap is None else OVER_NUTS,
+        thread=p.mount,
+    )
+    yield Joint(
+        TRIPOD,
+        TRIPOD_FOOT,
+        fixing_in(p.tripod),
+        TRIPOD_SCREW,
+        placed_axes(upright_axes([(0.0, 0.0)], -p.thickness - DECK_MM, 1.0), R, deck.centre),
+        grip_mm=DECK_MM,
+        thread_mm=p.thickness if p.tripod.trap is None else FLOOR,
+        thread=p.tripod,
+        stands_out_mm=STANDS_OUT,
+        heel_mm=HEEL,
+    )
+
+
+def tripod_foot(deck: Deck, p: TripodFoot) -> cq.Solid:
     """Make the plate.
 
     Raises:
         BuildError: a step did not give one valid solid.
     """
-    deck = layout.deck
     with building(TRIPOD_FOOT, "plate and pockets", "deck.screw", deck.screw.name) as checked:
         plate = solids.prism(outlines.octagon(*deck.foot), -p.thickness, 0.0)
         cuts = [solids.upright(p.tripod.hole / 2, -p.thickness - 1.0, 1.0)]

@@ -16,9 +16,9 @@ import numpy as np
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
-from scanwright.cad.statics.shaft import ShaftBend
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2

@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from scanwright.design.catalogue.holes import with_holes
 from scanwright.design.catalogue.products import (
     Bearing,
     Belt,
@@ -73,13 +74,13 @@ class Catalogue:
 
     def bearings(self) -> tuple[Bearing, ...]:
         """All bearings, smallest bore first."""
-        found = [product for product in self.products.values() if isinstance(product, Bearing)]
-        return tuple(sorted(found, key=lambda bearing: (bearing.bore_mm, bearing.outer_mm, bearing.name)))
+        matching = [product for product in self.products.values() if isinstance(product, Bearing)]
+        return tuple(sorted(matching, key=lambda bearing: (bearing.bore_mm, bearing.outer_mm, bearing.name)))
 
     def belts(self) -> tuple[Belt, ...]:
         """All belts, the narrowest first."""
-        found = [product for product in self.products.values() if isinstance(product, Belt)]
-        return tuple(sorted(found, key=lambda belt: (belt.width_mm, belt.pitch_mm, belt.name)))
+        matching = [product for product in self.products.values() if isinstance(product, Belt)]
+        return tuple(sorted(matching, key=lambda belt: (belt.width_mm, belt.pitch_mm, belt.name)))
 
     def named(self, name: str) -> Product:
         """The product of that name, of whatever kind.
@@ -130,7 +131,7 @@ def load_product(path: Path) -> Product:
     values: dict[str, Any] = {}
     provenance: dict[str, Provenance] = {}
     faults: list[Fault] = []
-    for key, entry in table.items():
+    for key, entry in with_holes(table).items():
         if key in ("kind", "name", "maker", "known_wrong"):
             values[key] = entry
         elif isinstance(entry, dict) and entry.keys() == {"value", "source", "verified"}:
@@ -162,5 +163,5 @@ def _shipped() -> dict[str, Product]:
 def _installed() -> list[Path]:
     """Folders of the modules that installed packages name in these groups; the modules themselves stay unloaded."""
     modules = {entry.module for group in (LIDAR_GROUP, SERVO_GROUP) for entry in entry_points(group=group)}
-    found = [find_spec(module) for module in sorted(modules)]
-    return [Path(spec.origin).parent for spec in found if spec is not None and spec.origin is not None]
+    specs = [find_spec(module) for module in sorted(modules)]
+    return [Path(spec.origin).parent for spec in specs if spec is not None and spec.origin is not None]

@@ -8,7 +8,7 @@ from pydantic_core import to_jsonable_python
 
 from scanwright.design.files.record import Record
 
-PATTERN_FIELDS = ("mount_holes_mm", "case_holes_mm", "case_rear_holes_mm", "horn_holes", "horn_first_hole_deg")
+PATTERN_FIELDS = ("holes", "horn_holes", "horn_first_hole_deg")
 """Fields that place screws: if one is wrong, the screws do not meet the holes of the device."""
 
 

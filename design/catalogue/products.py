@@ -5,21 +5,30 @@ Lengths are millimetres, masses grams.
 
 from __future__ import annotations
 
+import itertools
 import json
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
+from numpy.typing import ArrayLike
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import to_jsonable_python
 
+from scanwright.design.catalogue.holes import Hole, Pattern, mounting_holes
 from scanwright.design.catalogue.known_error import KnownError
 from scanwright.design.files.record import Record
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+Box = tuple[Triple, Triple]
 UsbId = Annotated[str, Field(pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")]
+
+
+def _absent(value: object) -> bool:
+    """Return whether a field that shapes parts is left out of the record, so that others keep their digest."""
+    return value is None
 
 
 class Provenance(Record):
@@ -43,13 +52,13 @@ class Product(Record):
         return self._provenance
 
     def unverified(self) -> list[str]:
-        """Names of the values that nobody has verified."""
+        """Names of the values that are not verified."""
         return [field for field, origin in self._provenance.items() if not origin.verified]
 
-    def doubt(self, field: str) -> str:
-        """Words behind a value that something is refused for, where nobody has verified it."""
+    def caution(self, field: str) -> str:
+        """Return what a message adds behind an unverified value; empty if it is verified."""
         origin = self._provenance.get(field)
-        return "" if origin is None or origin.verified else " (nobody has verified it: measure yours)"
+        return "" if origin is None or origin.verified else " (not verified: measure yours)"
 
     def misfit(self) -> list[str]:
         """A warning that printed parts will not fit this product, a line for each reason below it; empty if they do."""
@@ -69,11 +78,12 @@ class Product(Record):
             value = json.dumps(to_jsonable_python(getattr(self, field)))
             values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
         wrong = [f"  ! {error.words(self)}   [{error.source}]" for error in self.known_wrong]
-        doubt = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
+        mark = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
         known = ["  ! does not agree with the real device"] if wrong else []
-        return [f"{self.name} ({self.maker})", *values, *wrong, doubt, *known]
+        return [f"{self.name} ({self.maker})", *values, *wrong, mark, *known]
 
 
+Rating = Literal["usb2", "ethernet100", "none"]
 Link = Literal["usb", "usb-powered", "ethernet", "serial"]
 
 
@@ -91,7 +101,7 @@ class TiedPin(Record):
     to: str
 
 
-class Ways(Record):
+class Circuits(Record):
     """Equal circuits of a slip ring; a circuit for signals has less noise, not less current."""
 
     count: int = Field(gt=0)
@@ -111,7 +121,13 @@ class Lidar(Product):
     range_min_mm: float = Field(gt=0)
     range_max_mm: float = Field(gt=0)
     range_practical_mm: float | None = Field(default=None, gt=0, description="what users really get")
-    range_sigma_mm: float = Field(gt=0)
+    range_sigma_mm: float = Field(gt=0, description="noise of one range, one standard deviation")
+    sigma_by_range_mm: tuple[Pair, ...] | None = Field(
+        default=None, min_length=1, exclude_if=_absent, description="points (range, noise), linear between them"
+    )
+    triangulates: bool | None = Field(
+        default=None, exclude_if=_absent, description="noise beyond the last point grows with the square of the range"
+    )
     mass_g: float = Field(gt=0)
     price_usd: float | None = Field(default=None, gt=0)
     wavelength_nm: float | None = Field(default=None, gt=0)
@@ -119,9 +135,10 @@ class Lidar(Product):
     optical_height_mm: float = Field(gt=0)
     window_z_mm: Pair
     window_radius_mm: float = Field(gt=0)
-    mount_screw: Literal["M2", "M2.5", "M3", "M4"]
-    mount_holes_mm: tuple[Pair, ...] = Field(min_length=3)
-    mount_thread_depth_mm: float = Field(gt=0)
+    ears_mm: tuple[Box, ...] | None = Field(
+        default=None, exclude_if=_absent, description="boxes of the body outside of body_mm"
+    )
+    holes: tuple[Hole, ...] = Field(min_length=1)
     cable_y_mm: tuple[float, ...]
     cable_z_mm: float
     cable_diameter_mm: float = Field(gt=0)
@@ -157,6 +174,8 @@ class Lidar(Product):
             raise ValueError(f"steps {self.first_step}..{self.last_step} do not fit {self.steps_per_turn} per turn")
         if self.range_min_mm >= self.range_max_mm:
             raise ValueError(f"range_min_mm {self.range_min_mm} is not below range_max_mm {self.range_max_mm}")
+        if any(b[0] < a[0] for a, b in itertools.pairwise(self.sigma_by_range_mm or ())):
+            raise ValueError("sigma_by_range_mm: its ranges do not rise")
         return self
 
     def lead_colours(self) -> dict[str, tuple[str, ...]]:
@@ -167,6 +186,19 @@ class Lidar(Product):
         return {net: tuple(lead.colour for lead in self.leads if lead.net == net) for net in ("+", "-")}
 
     @property
+    def base(self) -> Pattern:
+        """Holes in its base that a plate below it can be screwed to."""
+        return mounting_holes((hole for hole in self.holes if hole.at_mm[2] == 0), "-z")
+
+    @property
+    def half_mm(self) -> Pair:
+        """Half of the rectangle about the optical axis that holds the body with its ears, along x and y."""
+        corners = np.abs(
+            [[0.5 * self.body_mm[0], 0.5 * self.body_mm[1], 0.0], *(c for ear in self.ears_mm or () for c in ear)]
+        )
+        return float(corners[:, 0].max()), float(corners[:, 1].max())
+
+    @property
     def stated_range_m(self) -> float:
         """The farthest that it sees, as its maker states it."""
         return self.range_max_mm / 1000
@@ -175,6 +207,18 @@ class Lidar(Product):
     def practical_range_m(self) -> float:
         """The farthest that its users get where that is known, else as stated: what a scanner can count on."""
         return (self.range_practical_mm or self.range_max_mm) / 1000
+
+    def sigma_mm(self, range_mm: ArrayLike) -> Float[ndarray, " *n"]:
+        """Noise of a range at ranges: one standard deviation, same shape.
+
+        A triangulating sensor measures the place of a spot, which moves with the inverse of the range: its noise grows
+        with the square of it. Beyond range_max_mm the noise is that at range_max_mm.
+        """
+        range_mm = np.minimum(range_mm, self.range_max_mm)
+        points = np.array(self.sigma_by_range_mm or [(self.range_max_mm, self.range_sigma_mm)])
+        sigma = np.interp(range_mm, points[:, 0], points[:, 1])
+        beyond = np.maximum(1.0, range_mm / points[-1, 0]) if self.triangulates else 1.0
+        return np.asarray(sigma * beyond**2)
 
     def bearings_rad(self) -> Float[ndarray, " beams"]:
         """Angle of every beam about the scan-plane normal, 0 to the front, shape (beams,) (SCIP 2.0, p. 5)."""
@@ -213,11 +257,7 @@ class Servo(Product):
     horn_first_hole_deg: float = Field(ge=0, lt=360, description="of one hole from +y, position at its centre")
     horn_screw: Literal["M2", "M2.5", "M3"]
     horn_thread_depth_mm: float = Field(gt=0)
-    case_screw: Literal["M2", "M2.5", "M3"]
-    case_holes_mm: tuple[Pair, ...] = Field(min_length=4)
-    case_holes_z_mm: float
-    case_rear_holes_mm: tuple[Pair, ...] = Field(description="at least four, or none where something covers the back")
-    case_rear_holes_z_mm: float
+    holes: tuple[Hole, ...] = Field(description="of the case; those of the horn are stated by the horn_ fields")
     usb_ids: tuple[UsbId, ...] | None = Field(
         default=None,
         exclude=True,
@@ -237,8 +277,18 @@ class Servo(Product):
     cable: str | None = Field(default=None, exclude=True, description="between the adapter and the servo")
 
     @property
-    def lasting_torque_nm(self) -> float:
-        """What it gives all day: a fifth of its stall torque."""
+    def front(self) -> Pattern:
+        """Holes in the face that the horn comes out of."""
+        return mounting_holes(self.holes, "+z")
+
+    @property
+    def rear(self) -> Pattern:
+        """Holes in the opposite face."""
+        return mounting_holes(self.holes, "-z")
+
+    @property
+    def continuous_torque_nm(self) -> float:
+        """Torque that it gives continuously: a fifth of its stall torque."""
         return self.stall_torque_nm / 5
 
 
@@ -271,7 +321,9 @@ class SlipRing(Product):
     mass_g: float = Field(gt=0)
     max_rpm: float | None = Field(default=None, gt=0)
     circuits: str
-    ways: tuple[Ways, ...] | None = Field(default=None, exclude=True, description="circuits by current; shapes no part")
+    ways: tuple[Circuits, ...] | None = Field(
+        default=None, exclude=True, description="circuits by current; shapes no part"
+    )
     lead_diameter_mm: float | None = Field(
         default=None, gt=0, exclude=True, description="of the bundle that goes to one outlet; shapes no part"
     )
@@ -282,9 +334,12 @@ class SlipRing(Product):
         default=None, exclude=True, description="where the stator's leads leave, at its lower end; shapes no part"
     )
     price_usd: float | None = Field(default=None, gt=0)
-    # left out of the record where there is none, so that a ring with a bore keeps its digest
-    flange: Flange | None = Field(default=None, exclude_if=lambda value: value is None)
-    rotor: Rotor | None = Field(default=None, exclude_if=lambda value: value is None)
+    friction_nm: Pair | None = Field(
+        default=None, exclude_if=_absent, description="drag of its brushes and seals, least and most"
+    )
+    data: Rating | None = Field(default=None, exclude=True, description="fastest data it is rated for; shapes no part")
+    flange: Flange | None = Field(default=None, exclude_if=_absent)
+    rotor: Rotor | None = Field(default=None, exclude_if=_absent)
 
     @model_validator(mode="after")
     def _capsules_have_a_flange(self) -> SlipRing:

@@ -9,8 +9,8 @@ from typing import Any
 from scanwright.design.catalogue.catalogue import KINDS
 from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Multibeam, Printer, Product, Servo, SlipRing
 
-DOUBT = "?"
-FOOTNOTE = f"{DOUBT} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."
+MARK = "?"
+FOOTNOTE = f"{MARK} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +30,8 @@ class Figure:
 
 def _of(title: str, field: str, scale: float = 1.0) -> Figure:
     def value(product: Product) -> float | str | None:
-        held: float | str | None = getattr(product, field)
-        return held * scale if isinstance(held, float | int) else held
+        stated: float | str | None = getattr(product, field)
+        return stated * scale if isinstance(stated, float | int) else stated
 
     return Figure(title, (field,), value)
 
@@ -115,8 +115,8 @@ def chosen(
     """
 
     def at_most(product: Product, field: str, most: float | None) -> bool:
-        held = getattr(product, field, None)
-        return most is None or (held is not None and held <= most)
+        value = getattr(product, field, None)
+        return most is None or (value is not None and value <= most)
 
     return [
         product
@@ -129,15 +129,15 @@ def chosen(
 
 
 def table_lines(products: Iterable[Product]) -> list[str]:
-    """A table for each kind, in words; `DOUBT` behind what nobody has verified."""
+    """A table for each kind, in words; `MARK` behind what nobody has verified."""
     listed = list(products)
     lines: list[str] = []
     for word, kind in KINDS.items():
-        held = [product for product in listed if type(product) is kind]
-        if held:
+        alike = [product for product in listed if type(product) is kind]
+        if alike:
             figures = FIGURES[kind]
             heads = [word.replace("_", " "), *(figure.title for figure in figures), "maker"]
-            rows = [[p.name, *(_cell(p, figure) for figure in figures), p.maker] for p in held]
+            rows = [[p.name, *(_cell(p, figure) for figure in figures), p.maker] for p in alike]
             lines += ["", *_aligned([heads, *rows])]
     return [*lines[1:], "", FOOTNOTE] if lines else ["no product of the catalogue is like that"]
 
@@ -148,7 +148,7 @@ def _cell(product: Product, figure: Figure) -> str:
         return "-"
     word = value if isinstance(value, str) else f"{value:.3g}" if abs(value) < 1000 else f"{value:,.0f}"
     known = [field for field in figure.fields if getattr(product, field) is not None]
-    return word + (DOUBT if known[0] in product.unverified() else " ")
+    return word + (MARK if known[0] in product.unverified() else " ")
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:

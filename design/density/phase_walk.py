@@ -92,18 +92,22 @@ def windows_at(
     """Where line 0 enters the windows of the beams at a polar angle and leaves them, by turns, in `edges` [steps].
 
     `beam_steps` are the azimuths of the beams. The edges are not brought back to one turn. Returned: their number, and
-    how many beams see all lines, for which there are none.
+    how many beams see all lines, for which there are none. With sines and cosines of two polar angles, (4, n), the
+    windows are the narrower ones: a half-width has one maximum over the polar angle, so no window between the two
+    angles is narrower.
     """
-    n, whole = 0, 0
+    n, full = 0, 0
     for b in range(ends[0, i], ends[1, i]):
         half = half_width(polar[0, i], polar[1, i], beams[0, b], beams[1, b], ball[0], ball[1])
+        if len(polar) > 2:
+            half = min(half, half_width(polar[2, i], polar[3, i], beams[0, b], beams[1, b], ball[0], ball[1]))
         if half >= np.pi:
-            whole += 1
+            full += 1
         elif half >= 0.0:
             half *= turn / (2 * np.pi)
             edges[n], edges[n + 1] = beam_steps[b] - half, beam_steps[b] + half
             n += 2
-    return n, whole
+    return n, full
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -121,18 +125,18 @@ def even_zones(
     at = np.empty(2 * len(beam_steps))
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     for i in range(n):
-        edges, whole = windows_at(i, ends, polar, beams, ball, beam_steps, count, at)
+        edges, full = windows_at(i, ends, polar, beams, ball, beam_steps, count, at)
         inside, balance = 0.0, 0.0
         for k in range(0, edges, 2):
             inside += at[k + 1] - at[k]
             at[k], at[k + 1] = at[k] - np.floor(at[k]), at[k + 1] - np.floor(at[k + 1])
             balance += at[k] - at[k + 1]
-        need[i] = whole * count + int(inside) + edges + 2
+        need[i] = full * count + int(inside) + edges + 2
         if need[i] > len(g):
             continue
-        mean[i] = whole * count + inside
+        mean[i] = full * count + inside
         # what the mean count leaves when all steps are done is open from the start, whatever ties with what
-        level = whole * count + int(np.floor(inside + balance + 0.5))
+        level = full * count + int(np.floor(inside + balance + 0.5))
         sort_by_buckets(at, edges, order, starts)
         here, lowest, highest = 0.0, NO_LEVEL, 0
         for j in range(edges):
@@ -180,12 +184,12 @@ def seam_zones(
     order, rank, starts = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size + 1, np.int64)
     width, level = np.empty(size + 1), np.empty(size + 1, np.int64)
     for i in range(n):
-        edges, whole = windows_at(i, ends, polar, beams, ball, beam_steps, turn, edge)
+        edges, full = windows_at(i, ends, polar, beams, ball, beam_steps, turn, edge)
         pieces = 2 * edges + 1
         inside, balance = 0.0, 0.0
         for k in range(0, edges, 2):
             inside += edge[k + 1] - edge[k]
-        need[i] = whole * count + int(inside) + edges + 2
+        need[i] = full * count + int(inside) + edges + 2
         if need[i] > len(g):
             continue
         for k in range(edges):
@@ -199,9 +203,9 @@ def seam_zones(
             through = gap[k] + goes_on[k]  # lines
             for lines, first_at in ((through, ahead), (count - through, edge[k])):
                 balance += sign * (lines * (turn - first_at) - lines * (lines - 1) / 2)
-        mean[i] = whole * count + inside * (count / turn)
+        mean[i] = full * count + inside * (count / turn)
         # what the mean count leaves when all steps are done is open from the start, whatever ties with what
-        now = whole * count + int(np.floor((inside * count - balance) / turn + 0.5))
+        now = full * count + int(np.floor((inside * count - balance) / turn + 0.5))
         sort_by_buckets(at, 2 * edges, order, starts)
         here, total = 0.0, 0.0
         for j in range(pieces):
@@ -217,26 +221,26 @@ def seam_zones(
         sort_by_buckets(at, edges, order, starts)
         lowest, highest = NO_LEVEL, 0
         first, last = 0, pieces  # that have changed
-        begun, ended, walked = 0, 0, 0
+        started, ended, walked = 0, 0, 0
         while True:
-            while ended < begun:
+            while ended < started:
                 k = order[ended]
                 if goes_on[k]:
                     total += _raise(level, width, 0, rank[k] + 1, 1 - 2 * (k % 2), g)
                     first, last = 0, max(last, rank[k] + 1)
                 ended += 1
-            while begun < edges and gap[order[begun]] <= walked:
-                k = order[begun]
+            while started < edges and gap[order[started]] <= walked:
+                k = order[started]
                 start, end_at = rank[edges + k] + 1, pieces if goes_on[k] else rank[k] + 1
                 total += _raise(level, width, start, end_at, 1 - 2 * (k % 2), g)
                 first, last = min(first, start), max(last, end_at)
-                begun += 1
+                started += 1
             if walked == count - 1:
                 break
             for j in range(first, last):
                 if width[j] > TIE:
                     lowest, highest = min(lowest, level[j]), max(highest, level[j])
-            after = walked + 1 if ended < begun else (gap[order[begun]] if begun < edges else count - 1)
+            after = walked + 1 if ended < started else (gap[order[started]] if started < edges else count - 1)
             mean_g[i] += total * (after - walked)
             walked, first, last = after, pieces, 0
         here = 0.0

@@ -22,7 +22,7 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Counts, Ints
 from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.design.density.beams import ScanLines
-from scanwright.design.density.phase_walk import even_zones, mean_counts, meetings, seam_zones
+from scanwright.design.density.phase_walk import even_zones, halves, mean_counts, meetings, seam_zones
 from scanwright.design.density.value_table import walked
 
 EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
@@ -65,6 +65,7 @@ def zones(
     lines: ScanLines,
     ball_rad: float,
     g: Callable[[Counts], Array],
+    until_rad: Float[ndarray, " n"] | None = None,
 ) -> Zones:
     """Exact statistics over the start phase at polar angles t.
 
@@ -78,6 +79,8 @@ def zones(
         lines: scan lines of the turn.
         ball_rad: ball radius.
         g: of counts of beams, element by element.
+        until_rad: other ends of ranges that begin at `polar_rad`, shape (n,): then `least` is a lower bound of the
+            lowest count in each range, and the rest has no meaning.
     """
     order = np.argsort(beam_polar_rad, kind="stable")
     polar_b, azimuth_b = beam_polar_rad[order], beam_azimuth_rad[order] % (2 * np.pi)
@@ -87,10 +90,12 @@ def zones(
     beam_steps = azimuth_b / lines.step_rad
 
     def walk(which: Ints, table: Array) -> tuple[Array, Array, Array, Array, Ints]:
-        met = meetings(polar_rad[which], polar_b, ball_rad)
+        ends, polar, beams, ball = meetings(polar_rad[which], polar_b, ball_rad)
+        if until_rad is not None:
+            polar = np.concatenate([polar, halves(until_rad[which])])
         if even:
-            return even_zones(*met, beam_steps, lines.count, table)
-        return seam_zones(*met, beam_steps, turn, table)
+            return even_zones(ends, polar, beams, ball, beam_steps, lines.count, table)
+        return seam_zones(ends, polar, beams, ball, beam_steps, turn, table)
 
     mean_g, mean, least, most = walked(walk, len(polar_rad), g, lines.repeats, smallest=512)
     return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)

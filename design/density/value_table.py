@@ -26,19 +26,19 @@ def walked(walk: Walk, directions: int, g: Callable[[Counts], Array], repeats: i
         repeats: beams of each line that is counted.
         smallest: number of directions that is worth a thread.
     """
-    found, need = _with_table(walk, np.arange(directions), _table(g, repeats, FIRST), smallest)
+    result, need = _with_table(walk, np.arange(directions), _table(g, repeats, FIRST), smallest)
     late = np.flatnonzero(need > FIRST)
     if len(late):
         again, _ = _with_table(walk, late, _table(g, repeats, 1 << int(need.max() - 1).bit_length()), 1)
-        for values, those in zip(found, again, strict=True):
+        for values, those in zip(result, again, strict=True):
             values[late] = those
-    return found
+    return result
 
 
 def _with_table(walk: Walk, which: Ints, table: Array, smallest: int) -> tuple[list[Array], Ints]:
     parts = in_chunks(lambda chunk: walk(which[chunk], table), len(which), smallest=smallest)
-    *found, need = (np.concatenate(values) for values in zip(*parts, strict=True))
-    return found, need
+    *result, need = (np.concatenate(values) for values in zip(*parts, strict=True))
+    return result, need
 
 
 @lru_cache(maxsize=64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.products import Lidar, SlipRing
 from scanwright.design.electrics.loads import SUPPLY_V, ElectricLoad
 from scanwright.design.electrics.network import Wire
 from scanwright.design.scanner import Scanner
@@ -31,6 +31,23 @@ RISKS = {
     "serial": "A serial line passes any ring: at 500 kBaud and more use RS-422 and twist the pairs.",
 }
 RISKS["usb-powered"] = RISKS["usb"].replace("power the lidar by its own lead, not by VBUS", "VBUS feeds the lidar")
+
+
+CARRIES = {
+    "usb": ("usb2",),
+    "usb-powered": ("usb2",),
+    "ethernet": ("ethernet100",),
+    "serial": ("usb2", "ethernet100", "none"),
+}
+
+
+def data_fault(ring: SlipRing, lidar: Lidar) -> str:
+    """Return why a ring is not rated for a lidar's data; empty if it is, or if the catalogue does not know."""
+    if ring.data is None or lidar.link is None or ring.data in CARRIES[lidar.link]:
+        return ""
+    rated = {"usb2": "USB 2.0", "ethernet100": "Ethernet of 100 Mbit/s", "none": "no data"}[ring.data]
+    needed = "Ethernet of 100 Mbit/s" if lidar.link == "ethernet" else "USB 2.0"
+    return f"{ring.name} is rated for {rated}, and {lidar.name} needs {needed}"
 
 
 def cautions_of(scanner: Scanner, loads: list[ElectricLoad], wires: list[Wire]) -> Iterator[str]:

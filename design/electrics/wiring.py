@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
-from scanwright.design.catalogue.products import Lidar, SlipRing, Ways
+from scanwright.design.catalogue.products import Circuits, Lidar, SlipRing
 from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of
 from scanwright.design.electrics.loads import (
     CHANGER,
@@ -91,7 +91,7 @@ def _nets(lidar: Lidar) -> list[tuple[str, float]]:
 
 def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
     """Return for each net the first circuit that carries its current, of its use if possible; the others are spare."""
-    assumed = (Ways(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
+    assumed = (Circuits(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
     rated = [(group.amps, group.use) for group in ring.ways or assumed for _ in range(group.count)]
     left, used = list(range(len(rated))), dict[int, tuple[str, float]]()
     for net, amps in _nets(lidar):

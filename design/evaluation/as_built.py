@@ -143,15 +143,15 @@ def as_built(
         own = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
     if mounts is None:
         mounts = reference_mounts(problem, task)
-    found = gains(problem, np.degrees(angles_rad).round(6).tolist(), own.J, mounts)
+    result = gains(problem, np.degrees(angles_rad).round(6).tolist(), own.J, mounts)
     return AsBuilt(
         None if shadow is None else shadow.share(),
         seen_of(problem, angles_rad, own, shadow),
-        tuple(ReferenceMount(gain, seen_of(problem, gain.mount.angles_rad, gain.mount.score)) for gain in found),
+        tuple(ReferenceMount(gain, seen_of(problem, gain.mount.angles_rad, gain.mount.score)) for gain in result),
     )
 
 
-def seen_of(problem: Problem, angles_rad: Setting, found: Score, shadow: SelfOcclusion | None = None) -> Seen:
+def seen_of(problem: Problem, angles_rad: Setting, result: Score, shadow: SelfOcclusion | None = None) -> Seen:
     """Return what a setting of a known score sees, without the beams that `shadow` blocks.
 
     Raises:
@@ -161,16 +161,16 @@ def seen_of(problem: Problem, angles_rad: Setting, found: Score, shadow: SelfOcc
     moving = problem if shadow is None else problem.behind(shadow)
     spots = holes(moving, angles_rad)
     blind = [spot.words() for spot in spots]
-    behind = found.blind_weight - sum(spot.weight for spot in spots)
+    behind = result.blind_weight - sum(spot.weight for spot in spots)
     if shadow is not None and shadow.partly().any() and behind > NO_BLIND_WEIGHT:
         blind.append(f"blind behind what stands still: about {percent(behind)} of the weight")
-    J, J_error = rounded_to_error(found.J, found.J_error)
+    J, J_error = rounded_to_error(result.J, result.J_error)
     return Seen(
         J=J,
         J_error=J_error,
         blind=tuple(blind),
-        blind_weight=found.blind_weight,
+        blind_weight=result.blind_weight,
         blind_fraction=coverage(problem, angles_rad, shadow).blind_fraction,
-        least=found.least,
+        least=result.least,
         line_gap_deg=gaps(moving, angles_rad).line_gap_deg,
     )

@@ -36,7 +36,7 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import NODES, Problem, with_scanner
 from scanwright.design.objective.score import Score, blind_share, score_on
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress, no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.search.search import search
@@ -101,7 +101,7 @@ def compare(
     problem: Problem,
     best: Family,
     mounts: tuple[TunedMount, ...],
-    progress: Progress = lambda _: None,
+    progress: Progress = no_progress,
     built: tuple[Setting, SelfOcclusion] | None = None,
 ) -> list[ComparisonRow]:
     """Rows of the answer, the reference mounts, other scanners, and every multibeam of the catalogue.
@@ -121,8 +121,8 @@ def compare(
     rows = [_rotating("optimum", loaded, problem, best.angles_rad, best.score)]
     if built is not None:
         setting, shadow = built
-        found = score_with(problem, setting, shadow)
-        rows.insert(0, _rotating(AS_BUILT, loaded, problem, setting, found, shadow))
+        result = score_with(problem, setting, shadow)
+        rows.insert(0, _rotating(AS_BUILT, loaded, problem, setting, result, shadow))
     rows += [_rotating(mount.name, loaded, problem, mount.angles_rad, mount.score) for mount in mounts]
     for name in SCANNERS:
         other = load_task(Path(name))
@@ -134,8 +134,8 @@ def compare(
     for product in loaded.products:
         if isinstance(product, Multibeam):
             progress(product.name)
-            whole = max(1, int(np.floor(loaded.task.motion.duration_s * product.turn_rate_hz + 1e-9)))
-            rows += [ready_made(problem, product, turns) for turns in sorted({1, whole})]
+            full = max(1, int(np.floor(loaded.task.motion.duration_s * product.turn_rate_hz + 1e-9)))
+            rows += [ready_made(problem, product, turns) for turns in sorted({1, full})]
     return rows
 
 
@@ -195,16 +195,16 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
         upper, lower = [], []
         for moment in problem.objective.moments:
             samples = sample_set(moment.field, problem.grid_step_deg, DIRECTIONS, index)
-            found = turns * counts(samples.directions)
+            result = turns * counts(samples.directions)
             share = samples.weights / samples.weights.sum()
             if moment.gathered == "highest":
-                upper.append(moment.g(found).max())
-                lower.append(moment.g(found.mean(axis=0)).max())
+                upper.append(moment.g(result).max())
+                lower.append(moment.g(result.mean(axis=0)).max())
             else:
-                upper.append(moment.g(found).mean(axis=0) @ share)
-                lower.append(moment.g(found.mean(axis=0)) @ share)
+                upper.append(moment.g(result).mean(axis=0) @ share)
+                lower.append(moment.g(result.mean(axis=0)) @ share)
             if moment is problem.objective.moments[0]:
-                blind.append(blind_share(samples.weights, found.max(axis=0) == 0))
+                blind.append(blind_share(samples.weights, result.max(axis=0) == 0))
         uppers.append(float(problem.objective.join(np.array(upper))))
         lowers.append(float(problem.objective.join(np.array(lower))) if turns > 1 else uppers[-1])
     sphere = spiral(BLIND_DIRECTIONS)
@@ -273,5 +273,5 @@ def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, flo
     J, half = judged.J, LAYERED * judged.J_error
     if turns > 1:
         J, half = (judged.J + judged.J_lower) / 2, half + (judged.J - judged.J_lower) / 2
-    whole = abs(lines.step_rad / np.radians(product.azimuth_step_deg) - 1)  # -ln(1 + d) moves by less than d does
-    return J, half + whole, coverage(fan, UPRIGHT_RAD).blind_fraction, judged.blind_weight
+    full = abs(lines.step_rad / np.radians(product.azimuth_step_deg) - 1)  # -ln(1 + d) moves by less than d does
+    return J, half + full, coverage(fan, UPRIGHT_RAD).blind_fraction, judged.blind_weight

@@ -26,13 +26,13 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     """
     names = list(dict.fromkeys(row.name for row in rows))
     longest = {name: max(row.time_s for row in rows if row.name == name) for name in names}
-    whole = [row for row in rows if row.time_s == longest[row.name]]
+    full = [row for row in rows if row.time_s == longest[row.name]]
     single = [row for row in rows if row.time_s < longest[row.name]]
     twice = {row.name for row in single}
 
     figure = Figure(figsize=(13, 1.6 + 0.5 * len(names)), layout="constrained")
     J, blind, gap, cost, value = figure.subplots(1, 5, sharey=True, width_ratios=[2.2, 1.2, 1.2, 1.2, 1.2])
-    for row in whole:
+    for row in full:
         y = names.index(row.name)
         look = OPTIMUM if row is rows[0] else LONG
         place, height = (y - 0.2, 0.38) if row.name in twice else (y, 0.6)

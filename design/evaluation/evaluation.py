@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
 from scanwright.design.objective.tolerance import rise_words, sensitivity
+from scanwright.design.progress import Progress
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
@@ -167,10 +168,10 @@ class Evaluation:
         if gap.half_turn_misses is not None:
             lines.append(f"half a turn    misses {gap.half_turn_misses:.1%} of the weight that a full turn sees")
         if self.hit is not None:
-            for found in self.hit.chances:
-                beams = f"{found.beams} beam{'s' if found.beams > 1 else ''}"
-                _, error = rounded_to_error(100 * found.chance, 100 * found.error)
-                chance = f"{found.chance:.2%} +- {error:g}%"
+            for result in self.hit.chances:
+                beams = f"{result.beams} beam{'s' if result.beams > 1 else ''}"
+                _, error = rounded_to_error(100 * result.chance, 100 * result.error)
+                chance = f"{result.chance:.2%} +- {error:g}%"
                 lines.append(f"pole           {chance} get at least {beams} ({self.hit.stands} azimuths)")
         if self.surfaces is not None:
             low, middle = self.surfaces["lowest_points_per_m2"], self.surfaces["median_points_per_m2"]
@@ -191,7 +192,7 @@ def evaluate(
     angles_rad: Setting,
     pole: Pole | None,
     lever: Lever | None,
-    progress: Callable[[str], None],
+    progress: Progress,
     shadow: SelfOcclusion | None = None,
 ) -> Evaluation:
     """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
@@ -201,7 +202,7 @@ def evaluate(
         angles_rad: the setting.
         pole: computes the chance to hit it; None for no pole.
         lever: offset of the optical centre; None for one on the axis.
-        progress: is told what is being computed.
+        progress: called with what is being computed.
         shadow: beams that the parts of this very setting block, if it was built.
 
     Raises:
@@ -218,7 +219,7 @@ def evaluate(
     progress("closed form")
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
     interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
-    found = checked_score(loaded, problem, angles_rad, None)
+    result = checked_score(loaded, problem, angles_rad, None)
     built = None
     if shadow is not None:
         built = as_built(problem, loaded.task, angles_rad, shadow, checked_score(loaded, problem, angles_rad, shadow))
@@ -227,7 +228,7 @@ def evaluate(
         problem=problem,
         angles_rad=angles_rad,
         lever=lever,
-        score=found,
+        score=result,
         ball=ball_score(problem, angles_rad),
         holes=holes(problem, angles_rad),
         coverage=coverage(problem, angles_rad),

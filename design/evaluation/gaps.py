@@ -100,12 +100,12 @@ def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:
 
 def _blind_cones(u: Vector, beam_polar: Float[ndarray, " beams"]) -> tuple[BlindCone, ...]:
     cones = [(u, float(beam_polar.min())), (-u, float(np.pi - beam_polar.max()))]
-    found = [
+    result = [
         BlindCone((float(a[0]) + 0.0, float(a[1]) + 0.0, float(a[2]) + 0.0), float(np.degrees(h)))
         for a, h in cones
         if h > 1e-9
     ]
-    return tuple(sorted(found, key=lambda cone: -cone.half_angle_deg))
+    return tuple(sorted(result, key=lambda cone: -cone.half_angle_deg))
 
 
 def _around(

@@ -65,8 +65,8 @@ class PlaneFigures:
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON; None where no beam ends there."""
-        told = asdict(self)
-        return told if self.points else told | dict.fromkeys(("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm"))
+        facts = asdict(self)
+        return facts if self.points else facts | dict.fromkeys(("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm"))
 
     def words(self) -> str:
         """The same in a line."""
@@ -182,7 +182,7 @@ class _Plane:
         lengths_m = np.linalg.norm(sides, axis=1)
         foot_m = -(sides @ self.corner) / lengths_m
         radius_m = np.sqrt(max(0.0, self.reach_m**2 - self.corner @ self.corner + foot_m @ foot_m))
-        low, high = (np.clip((foot_m + way * radius_m) / lengths_m, 0.0, 1.0) for way in (-1, 1))
+        low, high = (np.clip((foot_m + side * radius_m) / lengths_m, 0.0, 1.0) for side in (-1, 1))
         along, across = (high - low)[:, None] * sides
         return replace(self, corner=self.corner + low @ sides, along=along, across=across)
 
@@ -201,17 +201,17 @@ class _Plane:
         while True:
             middles = self.points(shares)
             reach = half * float(np.linalg.norm(np.abs(self.along) + np.abs(self.across)))
-            found = nearest(middles, [k])[0][:, 0]
+            result = nearest(middles, [k])[0][:, 0]
             away = np.linalg.norm(middles, axis=1)
             masked = self.hidden(shares)
             there = (away_m[0] <= away) & (away <= away_m[1]) & ~masked
-            best = max(best, float(found[there].max(initial=0.0)))
-            near = (away_m[0] - reach <= away) & (away <= away_m[1] + reach) & (found + reach > best * (1 + SLACK))
+            best = max(best, float(result[there].max(initial=0.0)))
+            near = (away_m[0] - reach <= away) & (away <= away_m[1] + reach) & (result + reach > best * (1 + SLACK))
             if masked.any():  # a cell in the midst of what is hidden has no place for a disc
                 near &= ~np.all([masked, *(self.hidden(shares + half * step) for step in QUARTERS)], axis=0)
             if not near.any():
                 return best * (1 + SLACK)
-            bound = float((found[near] + reach).max())
+            bound = float((result[near] + reach).max())
             if bound <= best * (1 + SLACK) or 4 * near.sum() > MOST_CELLS or reach < 1e-4:
                 return max(best, bound)
             half /= 2

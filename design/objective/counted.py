@@ -5,10 +5,15 @@ the beams that parts block: rotations are Rodrigues', windows come from the law 
 by region, no sum is zonal. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
 three dimensions); the spread of independent shifts is its error.
 With `quadrature = "equal_angle"` the directions are the nodes of the paper's grid, and only the phases are random.
+
+If the axis turns, each direction is counted at several start phases, which share its windows. The mean count over all
+phases is the sum of the window widths, so the deviation of a count from it is a control variate: g minus its slope
+times that deviation has the same mean as g and a smaller variance.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -28,8 +33,10 @@ SETS, POINTS = 8, 2**15  # shifts, and directions that each draws
 LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
 SMALL_RAD = 1e-3  # of a ball
 PILOT, LEAST = 2**10, 2**4  # directions drawn in each region to see how much weight it has; and of the count, at least
-PHASES = 2048  # of the lines of a sweep; where the start phase turns them all alike, it is continuous
-MOST_LISTED = 4_000_000  # lines of all phases of a sweep
+PHASES = 2048  # of the lines of a sweep; if the start phase turns them all alike, it is continuous
+MOST_LISTED = 1_000_000  # lines of all phases of a sweep
+EACH = 2  # start phases of each direction, the golden section of a span apart
+GOLDEN = (5**0.5 - 1) / 2
 SPARSEST = 256.0  # times more directions are drawn, if few have a weight
 BITS = 32  # of a coordinate of the net
 X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
@@ -48,6 +55,27 @@ class Counted:
     least: int
     none: float
     weighted: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    """Directions that have a weight, and what is counted there.
+
+    Attributes:
+        counts: at several start phases, shape (n, phases).
+        mean: over all start phases, shape (n,); NaN if it has no closed form.
+        value: weight, shape (n,).
+        area: that each direction represents, shape (n,).
+        required: count that is required, shape (n,).
+        keep: which of all drawn directions these are, shape (drawn,).
+    """
+
+    counts: Ints
+    mean: Array
+    value: Array
+    area: Array
+    required: Array
+    keep: Mask
 
 
 def counted_J(
@@ -96,18 +124,24 @@ def counted_J(
     objective = density.objective
     moments, least, none, weighted = [], np.iinfo(int).max, 0.0, 0.0
 
-    def counted(cubes: list[Array]) -> tuple[Ints, Array, Array, Array]:
-        found = _weighted(layers, cubes) if nodes is None else _at_nodes(nodes, cubes)
-        directions, value, area, required, phase = found
-        turned, mine = phase * span, np.minimum((phase * (len(first) - 1)).astype(int), len(first) - 2)
-        in_rot = directions @ to_rot
-        counts, keep = np.zeros(len(value), dtype=np.int64), value > 0
-        counts[keep] = repeats * _counts(
-            in_rot[keep], beams[order], turned[keep], mine[keep], lines, first, ball, blocked[order]
+    def counted(cubes: list[Array]) -> _Sample:
+        directions, value, area, required, phase = (
+            _weighted(layers, cubes) if nodes is None else _at_nodes(nodes, cubes)
         )
-        return counts, value, area, required
+        keep = value > 0
+        phases = (phase[keep, None] + GOLDEN * np.arange(each)) % 1.0
+        listed = np.minimum((phases * (len(first) - 1)).astype(int), len(first) - 2)
+        counts, mean = _counts(
+            directions[keep] @ to_rot, beams[order], phases * span, listed, lines, first, ball, blocked[order]
+        )
+        if len(first) > 2 or blocked.shape[1] > 1:  # of a sweep, or of free lines only, it has no closed form here
+            mean[:] = np.nan
+        return _Sample(repeats * counts, repeats * mean, value[keep], area[keep], required[keep], keep)
 
     nodes = nodes_in(layers, density.grid_step_deg) if density.quadrature == "equal_angle" else None
+    each = 1 if objective == "worst" or len(first) > 2 else EACH
+    if nodes is not None:
+        each = max(1, points // max(1, len(nodes.value)))
     drawing = drawn_in(layers)
     if not drawing or (nodes is not None and not len(nodes.value)):
         raise TaskError(EMPTY)
@@ -117,30 +151,29 @@ def counted_J(
         if nodes is None:
             cubes = [_net(n, rng) for n in numbers]
         else:
-            cubes = _phases_at(nodes, max(1, points // len(nodes.value)), rng)
-        counts, value, area, required = counted(cubes)
-        keep = value > 0
-        if not keep.any():
+            count = len(nodes.value)
+            cubes = [np.column_stack([(np.arange(count) + 0.5) / count, rng.uniform(size=count)])]
+        sample = counted(cubes)
+        if not len(sample.value):
             continue
-        moments.append(_moments(objective, counts[keep], value[keep], area[keep], required[keep]))
-        weighted += float(keep.mean()) / sets
-        least = min(least, int(counts[keep].min()))
-        weight = value * area
-        none += float(weight[counts == 0].sum() / weight.sum()) / sets
+        moments.append(_moments(objective, sample))
+        weighted += float(sample.keep.mean()) / sets
+        least = min(least, int(sample.counts.min()))
+        weight = sample.value * sample.area
+        none += float(weight @ (sample.counts == 0).mean(axis=1) / weight.sum()) / sets
         for reach in NEARER if objective == "worst" else ():
-            cubes = _about_the_lowest(cubes, np.where(keep, counts, np.inf), reach, rng)
-            counts, value, area, required = counted(cubes)
-            keep = value > 0
-            if keep.any():
-                least = min(least, int(counts[keep].min()))
+            lowest = np.full(len(sample.keep), np.inf)
+            lowest[sample.keep] = sample.counts.min(axis=1)
+            cubes = _about_the_lowest(cubes, lowest, reach, max(1, LOOKS // each), rng)
+            sample = counted(cubes)
+            least = min(least, int(sample.counts.min(initial=least)))
     if len(moments) < 2:
         raise TaskError(EMPTY)
     if objective == "worst":
         return Counted(-float(np.log(1 + least)), 0.0, least, none, weighted)
     J = _joined(objective, np.mean(moments, axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):  # a set in which nothing has a weight, or nothing is seen
-        each = np.array([_joined(objective, m) for m in moments])
-        J_error = float(3 * np.std(each, ddof=1) / sets**0.5)
+        J_error = float(3 * np.std([_joined(objective, m) for m in moments], ddof=1) / sets**0.5)
     return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
 
 
@@ -181,22 +214,17 @@ def _digits(count: int) -> Array:
     return points
 
 
-def _about_the_lowest(cubes: list[Array], counts: Array, reach: float, rng: np.random.Generator) -> list[Array]:
-    """Points of the unit cubes about those of the lowest counts: a lowest count is found so, chance seldom meets it."""
+def _about_the_lowest(
+    cubes: list[Array], counts: Array, reach: float, tries: int, rng: np.random.Generator
+) -> list[Array]:
+    """Draw points of the unit cubes about those of the lowest counts: chance seldom meets a lowest count."""
     owner = np.repeat(np.arange(len(cubes)), [len(cube) for cube in cubes])
     lowest = np.argsort(counts, kind="stable")[:LOWEST]
-    near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], LOOKS, axis=0) for i in range(len(cubes))]
+    near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], tries, axis=0) for i in range(len(cubes))]
     moved = [cube + reach * rng.uniform(-1, 1, cube.shape) for cube in near]
     if near[0].shape[1] == 2:  # nodes stay, at any phase
         moved = [np.column_stack([cube[:, 0], rng.uniform(0, 1, len(cube))]) for cube in near]
     return [np.clip(cube, 0, 1 - 1e-12) for cube in moved]
-
-
-def _phases_at(nodes: Nodes, each: int, rng: np.random.Generator) -> list[Array]:
-    """Start phases of every node, spread evenly from a start of its own: (node as a share of all, phase), one array."""
-    count = len(nodes.value)
-    phase = (np.arange(each)[:, None] + rng.uniform(size=count)) / each
-    return [np.column_stack([np.tile((np.arange(count) + 0.5) / count, each), phase.ravel()])]
 
 
 def _at_nodes(nodes: Nodes, cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
@@ -275,22 +303,27 @@ def _counts(
     first: Ints,
     ball: float,
     blocked: Mask,
-) -> Ints:
-    """Free beams within the ball of each direction; `blocked` is at equal steps of the axis angle, (beams, steps)."""
-    counts = np.zeros(len(directions), np.int64)
+) -> tuple[Ints, Array]:
+    """Free beams within the ball of each direction at its phases, (n, phases), and the mean over all phases, (n,).
+
+    `blocked` is at equal steps of the axis angle, (beams, steps). The mean is that of lines which the start phase turns
+    all alike, all of them free.
+    """
+    counts, mean = np.zeros(turned.shape, np.int64), np.zeros(len(directions))
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
     flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
-    turn = 2 * np.pi
+    turn, count = 2 * np.pi, first[1]
     for i in range(len(directions)):
         x, y, z = directions[i]
         across = np.hypot(x, y)
         t = np.arctan2(across, z)
-        p = np.arctan2(y, x) - turned[i]
-        mine = lines[first[listed[i]] : first[listed[i] + 1]]
+        p = np.arctan2(y, x)
         for b in range(np.searchsorted(polar, t - ball - 1e-7), len(polar)):
             if polar[b] > t + ball + 1e-7:
                 break
+            if blocked.shape[1] == 1 and blocked[b, 0]:
+                continue
             # the law of cosines: cos(ball) = z z_b + across across_b cos(azimuth between them at the edge of the ball)
             free = 2 * (z * upright[b] + across * flat[b] - cos_ball)
             if ball < SMALL_RAD:  # the same without a difference of cosines, which would lose digits
@@ -298,29 +331,44 @@ def _counts(
             around = 4 * across * flat[b]
             if free < 0:
                 continue
-            if free >= around:
-                counts[i] += _free(mine, 0, len(mine), turned[i], blocked[b])
-                continue
-            half = 2 * np.arcsin(np.sqrt(free / around))
-            low = (p - azimuth[b] - half) % turn
-            high = low + 2 * half
-            last = np.searchsorted(mine, high, side="right")
-            counts[i] += _free(mine, np.searchsorted(mine, low), last, turned[i], blocked[b])
-            if high > turn:
-                last = np.searchsorted(mine, high - turn, side="right")
-                counts[i] += _free(mine, 0, last, turned[i], blocked[b])
-    return counts
+            half = np.pi if free >= around else 2 * np.arcsin(np.sqrt(free / around))
+            start = p - azimuth[b] - half
+            mean[i] += count * half / np.pi
+            for k in range(turned.shape[1]):
+                mine = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
+                if half == np.pi:
+                    counts[i, k] += _free(mine, 0, len(mine), turned[i, k], blocked[b])
+                    continue
+                low = (start - turned[i, k]) % turn
+                high = low + 2 * half
+                last = np.searchsorted(mine, high, side="right")
+                counts[i, k] += _free(mine, np.searchsorted(mine, low), last, turned[i, k], blocked[b])
+                if high > turn:
+                    last = np.searchsorted(mine, high - turn, side="right")
+                    counts[i, k] += _free(mine, 0, last, turned[i, k], blocked[b])
+    return counts, mean
 
 
-def _moments(objective: str, counts: Ints, value: Array, area: Array, required: Array) -> Array:
+def _moments(objective: str, sample: _Sample) -> Array:
     """What `_joined` takes: integrals over the weight, and over what has one."""
-    weight, logs = value * area, np.log(1 + counts)
+    value, area = sample.value, sample.area
+    required = sample.required[:, None]
+    weight = value * area
+
+    def mean_of(g: Callable[[Array], Array]) -> Array:
+        """Mean of g over the start phases, shape (n,): the count's deviation from its mean is a control variate."""
+        mean = sample.mean[:, None]
+        slope = g(mean + 0.5) - g(mean - 0.5)
+        control = np.where(np.isnan(mean), 0.0, slope * (sample.counts - mean))
+        return np.asarray((g(sample.counts) - control).mean(axis=1))
+
     if objective == "required":
-        return np.array([weight @ np.maximum(0, 1 - counts / required), weight.sum()])
+        return np.array([weight @ mean_of(lambda d: np.maximum(0, 1 - d / required)), weight.sum()])
     if objective == "homogeneity":
-        return np.array([weight @ counts**2, weight @ counts, weight.sum()])
+        return np.array([weight @ mean_of(np.square), weight @ mean_of(lambda d: 1.0 * d), weight.sum()])
+    logs = mean_of(np.log1p)
     if objective == "kl":
-        return np.array([weight @ (np.log(value) - logs), weight.sum(), area @ (1 + counts)])
+        return np.array([weight @ (np.log(value) - logs), weight.sum(), area @ mean_of(lambda d: 1.0 + d)])
     return np.array([-(weight @ logs), weight.sum()])
 
 

@@ -11,6 +11,7 @@ from scanwright.design.task.shapes import AllRegion, BandRegion, BoxRegion, Cone
 from scanwright.design.task.task import LoadedTask
 
 ROUNDING = 1e-12
+BY_WEIGHT = 0.75  # of the cells drawn; the others are drawn by area
 ON_EDGE = ON_EDGE_DEG = ON_EDGE_M = 1e-9  # edges are inclusive: nodes of the paper's grid lie on them, but for rounding
 
 
@@ -27,13 +28,19 @@ class Nodes:
 class Layer:
     """One region: which directions it holds, its value there, what it requires; directions drawn in it, their area.
 
-    `required` is a number, or a table like `table`.
+    Attributes:
+        region: shape of the task; None for a surface.
+        table: values of cells, shape (rows, columns), if it is made of cells.
+        value: of the region; entries of the table are multiplied by it.
+        required: count, a number or a table like `table`.
+        chances: of drawing each cell of the table, shape (rows, columns).
     """
 
     region: object
     table: Array | None
     value: float
     required: float | Array
+    chances: Array | None = None
 
     def holds(self, d: Array) -> Mask:
         """Whether directions (n, 3) lie in it, shape (n,)."""
@@ -80,14 +87,16 @@ class Layer:
         if isinstance(region, BandRegion):
             z = tuple(np.cos(np.radians(region.theta_deg[::-1])))
             phi = tuple(np.radians(region.phi_deg))
-        if self.table is not None:
-            rows, columns = self.table.shape
-            edges = np.cos(np.pi * np.arange(rows + 1) / rows)
-            r, c = np.nonzero(self.table)
-            cell = np.minimum((u[:, 0] * len(r)).astype(int), len(r) - 1)
-            inside = u[:, 0] * len(r) - cell
-            area = (edges[r] - edges[r + 1])[cell]
-            return _at(edges[r + 1][cell] + inside * area, 2 * np.pi * (c[cell] + u[:, 1]) / columns), float("nan")
+        if self.chances is not None:
+            rows, columns = self.chances.shape
+            z_edges = np.cos(np.pi * np.arange(rows + 1) / rows)
+            ends = np.cumsum(self.chances)
+            ends /= ends[-1]
+            cell = np.searchsorted(ends, u[:, 0], side="right")
+            inside = 1 - (ends[cell] - u[:, 0]) / (self.chances.ravel()[cell])
+            r, c = np.divmod(cell, columns)
+            z_drawn = z_edges[r + 1] + np.clip(inside, 0, 1) * (z_edges[r] - z_edges[r + 1])
+            return _at(z_drawn, 2 * np.pi * (c + u[:, 1]) / columns), float("nan")
         return _at(z[0] + (z[1] - z[0]) * u[:, 0], phi[0] + (phi[1] - phi[0]) * u[:, 1]), (z[1] - z[0]) * (
             phi[1] - phi[0]
         )
@@ -96,13 +105,23 @@ class Layer:
         """Of drawing each direction, per steradian."""
         if isinstance(self.region, PlaneRegion):
             return _On(self.region).chance(d)
-        if self.table is None:
+        if self.chances is None:
             return np.where(self.holds(d), 1 / area, 0.0)
-        rows, columns = self.table.shape
-        edges = np.cos(np.pi * np.arange(rows + 1) / rows)
-        r = np.minimum((np.arccos(np.clip(d[:, 2], -1, 1)) / np.pi * rows).astype(int), rows - 1)
-        cells = np.count_nonzero(self.table) * (edges[r] - edges[r + 1]) * 2 * np.pi / columns
-        return np.where(self.value_at(d) > 0, 1 / cells, 0.0)
+        return _of_cells(self.chances / _cell_areas(*self.chances.shape), d)
+
+
+def _cell_areas(rows: int, columns: int) -> Array:
+    """Area of a cell in each row [sr], shape (rows, 1)."""
+    edges = np.cos(np.pi * np.arange(rows + 1) / rows)
+    return (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / columns
+
+
+def _chances(table: Array) -> Array:
+    """Chance of drawing each cell: by its weight, and a share by its area alone, which the objective `kl` needs."""
+    areas = np.where(table > 0, _cell_areas(*table.shape), 0.0)
+    weights = areas * table
+    total = weights.sum()
+    return BY_WEIGHT * weights / total + (1 - BY_WEIGHT) * areas / areas.sum() if total > 0 else areas
 
 
 def _of_cells(table: Array, d: Array) -> Array:
@@ -170,7 +189,8 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
 
     def layer(region: object, value: float, required: float) -> Layer:
         mapped = not isinstance(region, AllRegion | BandRegion | ConeRegion | BoxRegion | PlaneRegion)
-        return Layer(region, maps.pop(0) if mapped else None, value, required)
+        table = maps.pop(0) if mapped else None
+        return Layer(region, table, value, required, None if table is None else _chances(table))
 
     weights = [Layer(every, None, task.density.background, asked)]
     weights += [layer(r, r.value, asked if r.required is None else r.required) for r in task.weight]
@@ -196,7 +216,7 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
     for one in masks:
         hidden |= one.holds(d) & (one.value_at(d) > 0)
     table = np.where(in_range.ravel() & ~hidden, painted, 0.0).reshape(shape)
-    return [Layer(None, table, 1.0, required.reshape(shape))], []
+    return [Layer(None, table, 1.0, required.reshape(shape), _chances(table))], []
 
 
 def value_and_required(layers: tuple[list[Layer], list[Layer]], d: Array) -> tuple[Array, Array]:

@@ -69,8 +69,8 @@ def holes(problem: Problem, angles_rad: Setting) -> tuple[Hole, ...]:
     Raises:
         TaskError: no direction has a weight.
     """
-    found = _of_spin(problem, angles_rad) if problem.sweep is None else _of_sweep(problem, angles_rad)
-    return tuple(sorted((hole for hole in found if hole.weight > NO_BLIND_WEIGHT), key=lambda hole: -hole.weight))
+    result = _of_spin(problem, angles_rad) if problem.sweep is None else _of_sweep(problem, angles_rad)
+    return tuple(sorted((hole for hole in result if hole.weight > NO_BLIND_WEIGHT), key=lambda hole: -hole.weight))
 
 
 def _of_spin(problem: Problem, angles_rad: Setting) -> list[Hole]:

@@ -98,10 +98,10 @@ def kl(field: Field, loaded: LoadedTask) -> Objective:
     support = _mapped(field, lambda w: (w > 0).astype(float))
     least = _least(field)  # in units of it no weight has a negative logarithm
     logarithms = _mapped(field, lambda w: w * (np.log(np.where(w > 0, w, least)) - np.log(least)))
-    logs, whole, held = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
-    shift = logs / whole + np.log(least) - np.log(whole / held)
+    logs, full, held = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
+    shift = logs / full + np.log(least) - np.log(full / held)
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
-    error = 0.0 if grid_step_deg else RELATIVE_ERROR * (2 * abs(logs / whole) + 2)
+    error = 0.0 if grid_step_deg else RELATIVE_ERROR * (2 * abs(logs / full) + 2)
     return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift, error)
 
 

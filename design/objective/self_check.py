@@ -23,15 +23,17 @@ from scanwright.design.task.task import LoadedTask
 SURE = 4.0 / 3.0  # times the three standard errors that a count states
 NEAR = 5e-3  # a wrong field is off by far more
 SETS = 16
-FIRST, FINER = 256, 4  # directions of each set, in all regions together, and times more until the count is near enough
-MOST_WORK = 2e5  # directions of one set times the beams that are near to each: 0.3 s of processor in all
+FIRST = 256  # directions of each set, in all regions together: their spread tells how many are needed
+AIM = 0.8  # of NEAR: the spread of few directions is itself uncertain
+MOST_WORK = 2.4e5  # directions of one set times what each costs: 0.3 s of processor in all
+PER_LAYER = 4.0  # what a direction costs for each region that may contain it, in beams
 AGAIN = 8  # times more before a difference is an error: one count in a thousand is off by more than it states
 
 
 def require_counted(
     loaded: LoadedTask,
     angles_rad: Setting,
-    found: Score,
+    result: Score,
     shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = NO_LEVER,
 ) -> None:
@@ -43,7 +45,7 @@ def require_counted(
     Args:
         loaded: the task, with the motion of the score.
         angles_rad: the setting.
-        found: its score, with the parts if `shadow` is given.
+        result: its score, with the parts if `shadow` is given.
         shadow: the beams that its parts block.
         lever: of the optical centre off the axis, as in `design.objective.problem.Problem`.
 
@@ -55,43 +57,44 @@ def require_counted(
     if objective == "worst" or objective not in COUNTED:
         if shadow is None and lever == NO_LEVER:
             if objective == "worst":
-                _require_least(loaded, angles_rad, found)
+                _require_least(loaded, angles_rad, result)
             _require_log(loaded, angles_rad)
         return
-    points = FIRST
-    for more in (1, AGAIN):
-        J, J_error, points = _counted(loaded, angles_rad, more * points, shadow, lever)
-        if J == found.J or abs(J - found.J) <= found.J_error + J_error:
-            return
-    raise NumericalError(
-        f"J = {found.J:.6g} +- {found.J_error:.1g}, but a count over simulated beams gives {J:.6g} +- {J_error:.1g}"
-    )
+    J, J_error, points = _counted(loaded, angles_rad, shadow, lever)
+    if J != result.J and abs(J - result.J) > result.J_error + J_error:
+        again = counted_J(loaded, angles_rad, AGAIN * points, AGAIN * points, SETS, shadow=shadow, lever=lever)
+        J, J_error = again.J, SURE * again.J_error
+    if J != result.J and abs(J - result.J) > result.J_error + J_error:
+        raise NumericalError(
+            f"J = {result.J:.6g} +- {result.J_error:.1g}, "
+            f"but a count over simulated beams gives {J:.6g} +- {J_error:.1g}"
+        )
 
 
 def _counted(
-    loaded: LoadedTask,
-    angles_rad: Setting,
-    points: int,
-    shadow: SelfOcclusion | None,
-    lever: tuple[float, float, float],
+    loaded: LoadedTask, angles_rad: Setting, shadow: SelfOcclusion | None, lever: tuple[float, float, float]
 ) -> tuple[float, float, int]:
     """J by counting, four standard errors of it, and the directions of each set that it took."""
-    ball_deg = loaded.task.density.ball_radius_deg
-    near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, ball_deg / 60))
-    while True:
-        try:
-            count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
-        except TaskError as error:
-            raise TaskError("weight: masks leave too little of the regions to count beams in: widen them") from error
-        if SURE * count.J_error <= NEAR or FINER * points * near > MOST_WORK:
-            return count.J, SURE * count.J_error, points
-        points *= FINER
+    task = loaded.task
+    points = FIRST
+    try:
+        count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
+    except TaskError as error:
+        raise TaskError("weight: masks leave too little of the regions to count beams in: widen them") from error
+    near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, task.density.ball_radius_deg / 60))
+    cost = near + PER_LAYER * (len(task.weight) + len(task.mask)) / max(count.weighted, 1e-3)
+    needed = points * (SURE * count.J_error / (AIM * NEAR)) ** 2 if np.isfinite(count.J_error) else np.inf
+    more = 2 ** int(min(np.ceil(np.log2(max(needed, 1.0))), np.log2(MOST_WORK / cost)))  # as a net has points
+    if more > points:
+        points = more
+        count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
+    return count.J, SURE * count.J_error, points
 
 
-def _require_least(loaded: LoadedTask, angles_rad: Setting, found: Score) -> None:
+def _require_least(loaded: LoadedTask, angles_rad: Setting, result: Score) -> None:
     count = counted_J(loaded, angles_rad, 0, FIRST, 2)
-    if found.J + found.J_error < count.J:
-        raise NumericalError(f"min_density = {found.least}, but a count over simulated beams finds {count.least}")
+    if result.J + result.J_error < count.J:
+        raise NumericalError(f"min_density = {result.least}, but a count over simulated beams finds {count.least}")
 
 
 def _require_log(loaded: LoadedTask, angles_rad: Setting) -> None:

@@ -21,9 +21,10 @@ from scanwright.design.density.beams import beam_directions_rot, polar_and_azimu
 from scanwright.design.density.spin import mean_count, zones
 from scanwright.design.objective.named_objectives import Objective
 from scanwright.design.objective.problem import Problem
+from scanwright.design.progress import Progress
 from scanwright.design.search.constraints import AtMost, Constraint, NoHole, fan_reach
 from scanwright.design.search.grid_classes import Folded
-from scanwright.design.search.plane_axis_product import Lowest, both_ways, gathered, lowest
+from scanwright.design.search.plane_axis_product import Lowest, both_orientations, gathered, lowest
 from scanwright.design.sphere.outline import reach_about
 from scanwright.design.sphere.polar_weights import weights_over_polar
 from scanwright.design.sphere.regions import Field
@@ -38,8 +39,6 @@ REPORT = 1000  # planes between two lines of progress
 SCOUTED = 0.05  # what a bound over the scouts may be above that over all axes: else all are visited twice
 SCOUTS = 1500  # axes that tell how low a plane's bound comes, before all are visited
 
-Progress = Callable[[str], None]
-
 
 @dataclass(frozen=True, slots=True)
 class Landscape:
@@ -52,7 +51,7 @@ class Landscape:
         blind: whether nodes are beyond a ball radius of the fan of a plane class, 1 or 0, (planes, nodes).
         constraints: what settings must keep.
         plain: lowest J of all settings.
-        kept: lowest J of those that keep the constraints.
+        feasible: lowest J of those that keep the constraints.
     """
 
     objective: Objective
@@ -61,7 +60,7 @@ class Landscape:
     blind: Array
     constraints: tuple[Constraint, ...]
     plain: Lowest
-    kept: Lowest
+    feasible: Lowest
 
     def about_axes(self, planes: slice) -> Float[ndarray, "planes ways axes"]:
         """J of plane classes, not flipped, about each axis class, not flipped and flipped, shape (planes, 2, axes)."""
@@ -73,8 +72,8 @@ class Landscape:
 
     def broken(self, planes: slice) -> Bool[ndarray, "planes ways axes"]:
         """Settings of those plane classes that break a constraint, shape (planes, 2, axes)."""
-        found = [np.stack(constraint.broken(planes, slice(None)), axis=1) for constraint in self.constraints]
-        return np.any(found, axis=0) if found else np.zeros((1, 1, 1), dtype=bool)
+        result = [np.stack(constraint.broken(planes, slice(None)), axis=1) for constraint in self.constraints]
+        return np.any(result, axis=0) if result else np.zeros((1, 1, 1), dtype=bool)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +122,7 @@ def coarse_landscape(
             over[id(field)] = weights_over_polar(field, axes.representatives, nodes, circles, problem.grid_step_deg)
         return over[id(field)]
 
+    progress("weights and outline of the region")
     weights = tuple(weights_of(moment.field) for moment in moments)
     shown = np.radians(planes.settings_deg[planes.first])
     means = in_chunks(lambda chunk: _means(problem, polar, shown[chunk]), len(shown), smallest=8)
@@ -144,17 +144,19 @@ def coarse_landscape(
     open_planes = planes.has | planes.own
 
     def lowest_of(these: slice | Ints, every: slice) -> tuple[Lowest, Lowest]:
-        ways = [both_ways(m, of_g[these], w[every]) for m, of_g, w in zip(moments, g, weights, strict=True)]
-        kept = [constraint.of(these, every) for constraint in constraints]
-        return lowest(problem.objective, ways, open_planes[:, these], axes.has[:, every], kept)
+        orientations = [
+            both_orientations(m, of_g[these], w[every]) for m, of_g, w in zip(moments, g, weights, strict=True)
+        ]
+        feasible = [constraint.of(these, every) for constraint in constraints]
+        return lowest(problem.objective, orientations, open_planes[:, these], axes.has[:, every], feasible)
 
     def look(batch: Ints) -> None:
         g[:, batch], least[batch] = _exact(problem, polar, shown[batch])
         if limits.min_density is not None:
             thin[batch] = least[batch] < limits.min_density
 
-    plain, kept, exact = settled(lowest_of, look, (g.shape[1], len(axes.first)), BATCH, effort.margin, progress)
-    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), exact
+    plain, feasible, exact = settled(lowest_of, look, (g.shape[1], len(axes.first)), BATCH, effort.margin, progress)
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, feasible), exact
 
 
 def settled(
@@ -173,7 +175,7 @@ def settled(
         size: numbers of planes and axes.
         batch_size: planes that are made exact before the bounds are asked again.
         margin: what J may be off by.
-        progress: is told every `REPORT` planes.
+        progress: called every `REPORT` planes, with the share of the planes that are exact: not all need to be.
     """
     step = max(1, size[1] // SCOUTS)
     everything, scouts = slice(None), slice(None, None, step)
@@ -187,16 +189,16 @@ def settled(
             if not len(batch):
                 continue
             if exact.sum() // REPORT > (exact.sum() - batch_size) // REPORT:
-                progress(f"exact densities: {exact.sum()} of at most {len(exact):,} scan planes")
+                progress("exact densities of the scan planes", exact.mean())
             look(batch)
             exact[batch] = True
             best = np.minimum(best, _by_plane(lowest_of(batch, scouts)).min(axis=1))
-        progress(f"all axes of all {len(exact):,} scan planes")
-        plain, kept = lowest_of(everything, everything)
-        bounds = _by_plane((plain, kept))
+        progress("all axes of all scan planes")
+        plain, feasible = lowest_of(everything, everything)
+        bounds = _by_plane((plain, feasible))
         best = np.where(exact, bounds, np.inf).min(axis=1)
         if not np.any(_may_win(bounds, best + margin) & ~exact):
-            return plain, kept, int(exact.sum())
+            return plain, feasible, int(exact.sum())
 
 
 def _by_plane(both: tuple[Lowest, Lowest]) -> Float[ndarray, "2 planes"]:
@@ -242,5 +244,5 @@ def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) ->
         return np.stack(out), z.least
 
     parts = in_chunks(lambda chunk: [rows(plane) for plane in planes_rad[chunk]], len(planes_rad), smallest=1)
-    found = [row for part in parts for row in part]
-    return np.stack([g for g, _ in found], axis=1), np.stack([least for _, least in found])
+    result = [row for part in parts for row in part]
+    return np.stack([g for g, _ in result], axis=1), np.stack([least for _, least in result])

@@ -17,10 +17,11 @@ from scanwright.design.errors import TaskError
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import blind_to_sweep
-from scanwright.design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, Progress, settled
+from scanwright.design.progress import Progress
+from scanwright.design.search.coarse import BLIND_MARGIN, USUAL, Effort, Landscape, settled
 from scanwright.design.search.constraints import AtMost, Constraint
 from scanwright.design.search.grid_classes import Folded
-from scanwright.design.search.plane_axis_product import Lowest, lowest, one_way
+from scanwright.design.search.plane_axis_product import Lowest, lowest, one_orientation
 from scanwright.design.sphere.directions import EMPTY, spiral, weighted_samples
 from scanwright.design.sphere.regions import Field
 from scanwright.design.task.task import Limits
@@ -77,9 +78,9 @@ def swept_landscape(
 
     def lowest_of(these: slice | Ints, every: slice) -> tuple[Lowest, Lowest]:
         moments = zip(problem.objective.moments, g, weights, strict=True)
-        ways = [one_way(moment, of_g[these], w[every]) for moment, of_g, w in moments]
-        kept = [constraint.of(these, every) for constraint in constraints]
-        return lowest(problem.objective, ways, planes.has[:, these], axes.has[:, every], kept)
+        orientations = [one_orientation(moment, of_g[these], w[every]) for moment, of_g, w in moments]
+        feasible = [constraint.of(these, every) for constraint in constraints]
+        return lowest(problem.objective, orientations, planes.has[:, these], axes.has[:, every], feasible)
 
     def look(batch: Ints) -> None:
         for c in batch:
@@ -87,8 +88,8 @@ def swept_landscape(
             if limits.min_density is not None:
                 thin[c] = least < limits.min_density
 
-    plain, kept, exact = settled(lowest_of, look, (len(beams), len(axes.first)), BATCH, effort.margin, progress)
-    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, kept), exact
+    plain, feasible, exact = settled(lowest_of, look, (len(beams), len(axes.first)), BATCH, effort.margin, progress)
+    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, feasible), exact
 
 
 def _mean(problem: Problem, directions: Array, beams: Array) -> Array:

@@ -116,13 +116,13 @@ class Requirements:
         named = tuple(np.asarray(angles_deg).tolist())
         if named not in self._known:
             self._known[named] = score(self.problem, np.radians(angles_deg))
-        found = self._known[named]
-        return found if self.keeps(found, angles_deg) and self._reaches_all(np.radians(angles_deg)) else None
+        result = self._known[named]
+        return result if self.keeps(result, angles_deg) and self._reaches_all(np.radians(angles_deg)) else None
 
     def J(self, angles_deg: Setting, nodes: int) -> float:
         """J on a number of nodes; inf where the setting is refused."""
-        found = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
-        return found.J if self.keeps(found, angles_deg) else np.inf
+        result = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
+        return result.J if self.keeps(result, angles_deg) else np.inf
 
     def _reaches_all(self, angles_rad: Setting) -> bool:
         """Whether a fan reaches all of a region of many edges: between directions that stand for it is some of it."""
@@ -133,11 +133,11 @@ class Requirements:
         both = NoHole(fan_reach(problem, angles_rad[None, 2:]), reach_about(problem.field, axis))
         return not both.broken(slice(None), slice(None))[0].any()
 
-    def keeps(self, found: Score, angles_deg: Setting) -> bool:
+    def keeps(self, result: Score, angles_deg: Setting) -> bool:
         """Whether a scored setting keeps the limits and, where they are to be avoided, has no hole."""
         blind = 0.0 if self.avoid_holes else self.limits.max_blind_weight
-        if blind is not None and found.blind_weight > blind + NO_BLIND_WEIGHT:
+        if blind is not None and result.blind_weight > blind + NO_BLIND_WEIGHT:
             return False
-        if found.least < (self.limits.min_density or 0):
+        if result.least < (self.limits.min_density or 0):
             return False
         return bool(planes_keep(self.problem, np.radians(angles_deg[None, 2:]), self.limits)[0])

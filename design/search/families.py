@@ -1,8 +1,7 @@
-"""From the coarse landscape of J to the few answers a person wants: leaders, rescored exactly and refined."""
+"""From the coarse landscape of J to the few answers a person wants: candidates, rescored exactly and refined."""
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, replace
 from itertools import chain, count
 
@@ -16,7 +15,8 @@ from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import NODES, Problem
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_within
-from scanwright.design.search.coarse import Landscape, Progress
+from scanwright.design.progress import Progress, no_progress
+from scanwright.design.search.coarse import Landscape
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.grid_classes import Folded
 from scanwright.design.search.refinement import INDIFFERENT, REFINE_ROUNDS, allowed_setting, refined_setting
@@ -29,7 +29,7 @@ VALLEY_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one answ
 VALLEY_J = 2e-2
 NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
 PIECE = 128  # planes whose J are made together
-MOST_LOOKS = 80  # for local minima, before the list is left shorter
+MOST_TRIES = 80  # for local minima, before the list is left shorter
 MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
 
 
@@ -56,7 +56,7 @@ class Family:
 
 
 @dataclass(frozen=True, slots=True)
-class Leader:
+class Candidate:
     """Settings of equal coarse J, shown by the one that builds best.
 
     `score` is the exact one of what is shown; only minima have it: none is on the slope of a better one.
@@ -70,31 +70,31 @@ class Leader:
     every_axis: bool
 
 
-def find_leaders(
+def find_candidates(
     land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], required: Requirements
-) -> list[Leader]:
+) -> list[Candidate]:
     """Local minima of J over what keeps the constraints, lowest first, then settings on their slopes.
 
     Equal ones are one. A minimum takes its valley with it: settings about nearly the same axis with nearly the same J,
     whatever the plane. What turns out to break a constraint between the nodes of the landscape is left out.
     """
     pieces = [slice(i, i + PIECE) for i in range(0, len(planes.first), PIECE)]
-    J = np.concatenate([_J_kept(land, planes, axes, piece) for piece in pieces])
+    J = np.concatenate([_feasible_J(land, planes, axes, piece) for piece in pieces])
     every = _distinct(axes.points)
     left = J.reshape(len(J), -1).copy()
     low = left.min(axis=1)  # of each plane
     q = planes.representatives
     cosines = axes.representatives @ axes.representatives.T
     next_to, opposite = cosines >= np.cos(NEAR_RAD), cosines <= -np.cos(NEAR_RAD)
-    minima: list[Leader] = []
-    slopes: list[Leader] = []
-    looks = refused = 0
-    while looks < MOST_LOOKS and refused < MOST_REFUSED and len(minima) < FAMILIES:
+    minima: list[Candidate] = []
+    slopes: list[Candidate] = []
+    tries = refused = 0
+    while tries < MOST_TRIES and refused < MOST_REFUSED and len(minima) < FAMILIES:
         lowest = low.min()
         if not np.isfinite(lowest):
             break
         c = int((low <= lowest + EQUAL).argmax())
-        way, axis = divmod(int((left[c] <= lowest + EQUAL).argmax()), J.shape[2])
+        orientation, axis = divmod(int((left[c] <= lowest + EQUAL).argmax()), J.shape[2])
         same = J[c] <= lowest + EQUAL
         around = np.stack([side[same[0]].any(axis=0) for side in (next_to, opposite)])
         around |= np.stack([side[same[1]].any(axis=0) for side in (opposite, next_to)])
@@ -104,15 +104,15 @@ def find_leaders(
             for sign, there in ((1, around), (-1, around[::-1]))
         ]
         beaten = any((J.reshape(left.shape)[block] < lowest - EQUAL).any() for block in near)
-        leader = _leader(J[c], planes, axes, c, way, axis, every)
-        exact = None if beaten else required.score(leader.angles_deg)
+        candidate = _candidate(J[c], planes, axes, c, orientation, axis, every)
+        exact = None if beaten else required.score(candidate.angles_deg)
         if not beaten and exact is None:
             J[c][same] = left[c][same.ravel()] = np.inf
             low[c] = left[c].min()
             refused += 1
             continue
-        looks += 1
-        (slopes if beaten else minima).append(replace(leader, score=exact))
+        tries += 1
+        (slopes if beaten else minima).append(replace(candidate, score=exact))
         changed = low <= lowest + (EQUAL if beaten else VALLEY_J)
         if not beaten:
             block = np.ix_(changed, (around | around[::-1]).ravel())
@@ -124,41 +124,43 @@ def find_leaders(
     return minima + slopes
 
 
-def best_leader(
-    land: Landscape, planes: Folded, axes: Folded, required: Requirements, kept: bool = True
-) -> Leader | None:
+def best_candidate(
+    land: Landscape, planes: Folded, axes: Folded, required: Requirements, feasible: bool = True
+) -> Candidate | None:
     """The lowest entry of a landscape too large to be looked at whole, or of all that keep no constraint.
 
     None where the first `MOST_REFUSED` all break a constraint between the nodes of the landscape.
     """
-    lowest = (land.kept if kept else land.plain).by_plane.min(axis=0)
+    lowest = (land.feasible if feasible else land.plain).by_plane.min(axis=0)
     rows: dict[int, Array] = {}
     every = _distinct(axes.points)
     refused = 0
     while refused < MOST_REFUSED and np.isfinite(lowest.min()):
         c = int((lowest <= lowest.min() + SINGLE).argmax())
         if c not in rows:
-            rows[c] = _J_kept(land, planes, axes, slice(c, c + 1), kept)[0]
+            rows[c] = _feasible_J(land, planes, axes, slice(c, c + 1), feasible)[0]
         J = rows[c]
         if J.min() > lowest[c] + SINGLE:  # what was lowest has been refused
             lowest[c] = J.min()
             continue
-        way, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
-        leader = _leader(J, planes, axes, c, int(way), int(axis), every)
-        exact = required.score(leader.angles_deg)
+        orientation, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
+        candidate = _candidate(J, planes, axes, c, int(orientation), int(axis), every)
+        exact = required.score(candidate.angles_deg)
         if exact is not None:
-            return replace(leader, score=exact)
+            return replace(candidate, score=exact)
         J[J.min() + EQUAL >= J] = np.inf
         lowest[c] = J.min()
         refused += 1
     return None
 
 
-def _J_kept(land: Landscape, planes: Folded, axes: Folded, piece: slice, kept: bool = True) -> Array:
+def _feasible_J(land: Landscape, planes: Folded, axes: Folded, piece: slice, feasible: bool = True) -> Array:
     """Coarse J of a piece of the plane classes, (planes, ways round, axes): inf where the grid has none, or breaks."""
     p = planes.has[:, piece, None]
-    there = np.stack([(p[0] & axes.has[way]) | (p[1] & axes.has[1 - way]) for way in (0, 1)], axis=1)
-    return np.where(there & ~land.broken(piece) if kept else there, land.about_axes(piece), np.inf)
+    there = np.stack(
+        [(p[0] & axes.has[orientation]) | (p[1] & axes.has[1 - orientation]) for orientation in (0, 1)], axis=1
+    )
+    return np.where(there & ~land.broken(piece) if feasible else there, land.about_axes(piece), np.inf)
 
 
 def _distinct(points: Float[ndarray, "n 3"]) -> int:
@@ -166,16 +168,18 @@ def _distinct(points: Float[ndarray, "n 3"]) -> int:
     return len(np.unique(np.round(points, 9) + 0.0, axis=0))
 
 
-def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: int, every: int) -> Leader:
+def _candidate(
+    J: Array, planes: Folded, axes: Folded, plane: int, orientation: int, axis: int, every: int
+) -> Candidate:
     """All grid settings that equal one entry by symmetry, shown by the one that builds best.
 
-    `J` is that of the plane class about all axes, shape (2, axes); `way` is 1 where just one of plane and axis is
+    `J` is that of the plane class about all axes, shape (2, axes); `orientation` is 1 if just one of plane and axis is
     flipped; `every` is how many different axes the grid has.
     """
-    same = np.abs(J - J[way, axis]) <= EQUAL
+    same = np.abs(J - J[orientation, axis]) <= EQUAL
     p = np.flatnonzero(planes.classes == plane)
-    ways = planes.flip[p][:, None] ^ axes.flip[None, :]
-    member = same[ways.astype(int), axes.classes[None, :]]
+    orientations = planes.flip[p][:, None] ^ axes.flip[None, :]
+    member = same[orientations.astype(int), axes.classes[None, :]]
     which_p, which_a = np.nonzero(member)
     angles = np.hstack([axes.settings_deg[which_a], planes.settings_deg[p[which_p]]])
     u = axes.points[which_a]
@@ -194,30 +198,33 @@ def _leader(J: Array, planes: Folded, axes: Folded, plane: int, way: int, axis: 
     )
     best = angles[np.lexsort(preference)[0]]
     any_axis = len(axes.settings_deg) > 1 and distinct == every
-    return Leader(best, float(J[way, axis]), None, len(angles), distinct, any_axis)
+    return Candidate(best, float(J[orientation, axis]), None, len(angles), distinct, any_axis)
 
 
-def refine_leaders(
+def refine_candidates(
     problem: Problem,
     ranges: AngleRanges,
-    leaders: list[Leader],
+    candidates: list[Candidate],
     required: Requirements,
     rounds: int = len(REFINE_ROUNDS),
-    progress: Progress = lambda _: None,
+    progress: Progress = no_progress,
 ) -> tuple[Family, ...]:
     """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
-    start, done = time.perf_counter(), count(1)
-    different = {tuple(leader.angles_deg): (leader.score, leader) for leader in leaders if leader.score is not None}
+    done = count(1)
+    different = {
+        tuple(candidate.angles_deg): (candidate.score, candidate)
+        for candidate in candidates
+        if candidate.score is not None
+    }
     ordered = sorted(different.values(), key=lambda pair: pair[0].J)
 
     def minimum(k: int) -> tuple[Setting, Score | None]:
-        leader = ordered[k][1]
+        candidate = ordered[k][1]
         its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
-        refined = refined_setting(ranges, leader.angles_deg, leader.every_axis, its_rounds, required)
-        allowed = allowed_setting(refined, leader.angles_deg, required)
+        refined = refined_setting(ranges, candidate.angles_deg, candidate.every_axis, its_rounds, required)
+        allowed = allowed_setting(refined, candidate.angles_deg, required)
         ready = next(done)
-        left_s = (time.perf_counter() - start) * (len(apart) - ready) / ready
-        progress(f"refined {ready} of {max(ready, len(apart))} minima, about {max(0.0, left_s):.0f} s left")
+        progress("refining the minima", ready / max(ready, len(apart)))
         return allowed
 
     # all at once, but those that are in the winner's valley already
@@ -229,22 +236,24 @@ def refine_leaders(
     pieces = in_chunks(lambda some: [minimum(k) for k in apart[some]], len(apart), smallest=1)
     at_once = dict(zip(apart, chain.from_iterable(pieces), strict=True))
     families: list[Family] = []
-    for k, (exact, leader) in enumerate(ordered):
+    for k, (exact, candidate) in enumerate(ordered):
         if len(families) == FAMILIES:
             break
-        if not any(_same_valley(leader.angles_deg, exact.J, better) for better in families):
+        if not any(_same_valley(candidate.angles_deg, exact.J, better) for better in families):
             refined, again = at_once.get(k) or minimum(k)
             # the rounder angles of the grid are as good
             if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not ranges.tolerance_deg):
-                families.append(_family(leader.angles_deg, exact, leader))
+                families.append(_family(candidate.angles_deg, exact, candidate))
             elif not any(_same_valley(refined, again.J, better) for better in families):
-                families.append(_family(refined, again, leader))
-    for leader in leaders:
+                families.append(_family(refined, again, candidate))
+    for candidate in candidates:
         if len(families) == FAMILIES:
             break
-        if leader.score is None and not any(_same_valley(leader.angles_deg, leader.J_coarse, x) for x in families):
-            found = required.score(leader.angles_deg)
-            families += [] if found is None else [_family(leader.angles_deg, found, leader)]
+        if candidate.score is None and not any(
+            _same_valley(candidate.angles_deg, candidate.J_coarse, x) for x in families
+        ):
+            result = required.score(candidate.angles_deg)
+            families += [] if result is None else [_family(candidate.angles_deg, result, candidate)]
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
@@ -254,14 +263,14 @@ def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> t
     """Families in the order of their highest J when one angle is off by the tolerance of the mounting."""
     worst = [worst_within(problem, family.angles_rad, off_rad, NODES) for family in families]
     order = np.argsort(worst, kind="stable")
-    told = [f"J <= {J:.4f} within {np.degrees(off_rad):g} deg" for J in worst]
-    words = [", ".join(filter(None, [family.word, more])) for family, more in zip(families, told, strict=True)]
+    text = [f"J <= {J:.4f} within {np.degrees(off_rad):g} deg" for J in worst]
+    words = [", ".join(filter(None, [family.word, more])) for family, more in zip(families, text, strict=True)]
     return tuple(replace(families[i], word=words[i]) for i in order)
 
 
-def _family(angles_deg: Array, exact: Score, leader: Leader) -> Family:
-    word = "any axis" if leader.every_axis else f"{leader.axes} axes" if leader.axes > 1 else ""
-    return Family(_four(angles_deg), exact, leader.members, word)
+def _family(angles_deg: Array, exact: Score, candidate: Candidate) -> Family:
+    word = "any axis" if candidate.every_axis else f"{candidate.axes} axes" if candidate.axes > 1 else ""
+    return Family(_four(angles_deg), exact, candidate.members, word)
 
 
 def _four(angles_deg: Array) -> tuple[float, float, float, float]:
@@ -269,7 +278,7 @@ def _four(angles_deg: Array) -> tuple[float, float, float, float]:
     return alpha_rot, beta_rot, alpha_laser, beta_laser
 
 
-def _same_valley(angles_deg: Array, J: float, better: Family | Leader) -> bool:
+def _same_valley(angles_deg: Array, J: float, better: Family | Candidate) -> bool:
     """Whether a setting has nearly the axis and nearly the J of a better one: the scan plane is then indifferent."""
     assert better.score is not None
     u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]

@@ -87,14 +87,14 @@ def line_gaps_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[
 def _only(planes: Folded, keep: Bool[ndarray, " classes"]) -> Folded:
     """The classes that are kept, with their settings."""
     numbers = np.cumsum(keep) - 1
-    kept = keep[planes.classes]
-    places = np.cumsum(kept) - 1
+    feasible = keep[planes.classes]
+    places = np.cumsum(feasible) - 1
     return replace(
         planes,
-        settings_deg=planes.settings_deg[kept],
-        points=planes.points[kept],
-        classes=numbers[planes.classes[kept]],
-        flip=planes.flip[kept],
+        settings_deg=planes.settings_deg[feasible],
+        points=planes.points[feasible],
+        classes=numbers[planes.classes[feasible]],
+        flip=planes.flip[feasible],
         first=places[planes.first[keep]],
         has=planes.has[:, keep],
         own=planes.own[keep],

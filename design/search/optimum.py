@@ -17,7 +17,7 @@ from scanwright.design.objective.holes import holes, percent
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.self_check import require_counted
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.gain import Gain, gain_lines, gains
 from scanwright.design.search.mounts.reference import TunedMount, angles_used, reference_mounts

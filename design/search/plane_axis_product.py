@@ -19,7 +19,7 @@ from scanwright.design.search.constraints import Constraint
 
 PIECE, PART = 128, 4096  # planes and axes per tile of the product: the cache holds it until it is looked through
 
-BothWays = Callable[[slice, slice], tuple[Array, Array]]
+BothOrientations = Callable[[slice, slice], tuple[Array, Array]]
 """A moment of some planes about some axes, (planes, axes): straight, and with the planes turned round."""
 
 
@@ -52,7 +52,7 @@ class Lowest:
 
 def lowest(
     objective: Objective,
-    ways: list[BothWays],
+    orientations: list[BothOrientations],
     has_plane: Mask,
     has_axis: Mask,
     constraints: Sequence[Constraint] = (),
@@ -61,31 +61,31 @@ def lowest(
 
     Args:
         objective: joins the moments.
-        ways: of each moment.
+        orientations: both of each moment.
         has_plane: whether the grid has a plane class not flipped, and flipped, (2, planes).
         has_axis: the same of axes, (2, axes).
         constraints: what settings must keep; where none keeps them J is inf.
     """
     closed_axis, closed_plane = (np.where(has, 0, np.inf).astype(np.float32, "C") for has in (has_axis, has_plane))
-    plain, kept = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
+    plain, feasible = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
 
     def met(planes: slice) -> tuple[_Running, _Running]:
         """With some of the planes; the axes are those of all threads, so their lowest are kept apart."""
-        of_all, of_kept = plain.about_the_same_axes(), kept.about_the_same_axes()
+        of_all, of_feasible = plain.about_the_same_axes(), feasible.about_the_same_axes()
         for part in _slices(0, has_axis.shape[1], PART):
             for piece in _slices(planes.start, planes.stop, PIECE):
-                pairs = [way(piece, part) for way in ways]
+                pairs = [orientation(piece, part) for orientation in orientations]
                 straight, turned = (_joined(objective, [pair[i] for pair in pairs]) for i in (0, 1))
                 of_all.meets(straight, turned, piece, part)
                 for constraint in constraints:
                     for J, broken in zip((straight, turned), constraint.broken(piece, part), strict=True):
                         np.copyto(J, np.inf, where=broken)
                 if constraints:
-                    of_kept.meets(straight, turned, piece, part)
-        return of_all, of_kept
+                    of_feasible.meets(straight, turned, piece, part)
+        return of_all, of_feasible
 
     parts = in_chunks(met, has_plane.shape[1], smallest=PIECE)
-    lows = [side.lowest([part[i].by_axis for part in parts]) for i, side in enumerate((plain, kept))]
+    lows = [side.lowest([part[i].by_axis for part in parts]) for i, side in enumerate((plain, feasible))]
     return lows[0], lows[1] if constraints else lows[0]
 
 
@@ -189,7 +189,7 @@ def _lower_axes(
                 lowest[flip, a] = J if lowest[flip, a] > J else lowest[flip, a]
 
 
-def both_ways(moment: Moment, g: Array, weights: Array) -> BothWays:
+def both_orientations(moment: Moment, g: Array, weights: Array) -> BothOrientations:
     """A moment over polar nodes, an odd number of them, g (planes, nodes) and weights (axes, nodes).
 
     Reversing g changes the sign of its odd part only, so both ways round cost one product of the even parts and one
@@ -219,7 +219,7 @@ def both_ways(moment: Moment, g: Array, weights: Array) -> BothWays:
     return pair
 
 
-def one_way(moment: Moment, g: Array, weights: Array) -> BothWays:
+def one_orientation(moment: Moment, g: Array, weights: Array) -> BothOrientations:
     """A moment over directions that nothing turns round: both ways are the same, and the grid has only one."""
     if moment.gathered == "highest":
         seen = weights > 0

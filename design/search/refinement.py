@@ -87,14 +87,14 @@ def refined_setting(
     return _rounded(angles, free, limits, finest, required, angles_deg)
 
 
-def allowed_setting(refined: Setting, leader: Setting, required: Requirements) -> tuple[Setting, Score | None]:
-    """A refined setting and its score; where all nodes refuse it, the next one on the way back to its leader."""
+def allowed_setting(refined: Setting, candidate: Setting, required: Requirements) -> tuple[Setting, Score | None]:
+    """A refined setting and its score; where all nodes refuse it, the next one on the way back to its candidate."""
     for share in STEPS_BACK:
-        setting = ((1 - share) * refined + share * leader).round(2) + 0.0
-        found = required.score(setting)
-        if found is not None:
-            return setting, found
-    return leader, None
+        setting = ((1 - share) * refined + share * candidate).round(2) + 0.0
+        result = required.score(setting)
+        if result is not None:
+            return setting, result
+    return candidate, None
 
 
 def lowest_by_simplex(
@@ -130,10 +130,10 @@ def lowest_by_simplex(
             return corners[0]
         middle = corners[:-1].mean(axis=0)
         away = middle - corners[-1]
-        found, low = tried(middle + away)
+        result, low = tried(middle + away)
         if low < values[0]:
             further, lower = tried(middle + 2 * away)
-            found, low = (further, lower) if lower < low else (found, low)
+            result, low = (further, lower) if lower < low else (result, low)
         elif low >= values[-2]:
             outside = low < values[-1]
             nearer, lower = tried(middle + (0.5 if outside else -0.5) * away)
@@ -142,8 +142,8 @@ def lowest_by_simplex(
                 for i in range(1, len(corners)):
                     corners[i], values[i] = tried(corners[i])
                 continue
-            found, low = nearer, lower
-        corners[-1], values[-1] = found, low
+            result, low = nearer, lower
+        corners[-1], values[-1] = result, low
 
 
 class _Chart:
@@ -169,15 +169,15 @@ class _Chart:
 
     def setting(self, moved: Array) -> Setting:
         """The setting of some coordinates, within the limits."""
-        found = self._angles.copy()
-        whole = np.zeros(4)
-        whole[self._free] = moved
+        result = self._angles.copy()
+        full = np.zeros(4)
+        full[self._free] = moved
         for k, pair in enumerate(PAIRS):
             if self._on_sphere[k]:
-                found[pair] = (_axis_of, _plane_of)[k](_walked(self._frames[k], np.radians(whole[pair])))
+                result[pair] = (_axis_of, _plane_of)[k](_walked(self._frames[k], np.radians(full[pair])))
             else:
-                found[pair] = np.where(self._free[pair], whole[pair], found[pair])
-        return np.clip(found, *self._limits.T)
+                result[pair] = np.where(self._free[pair], full[pair], result[pair])
+        return np.clip(result, *self._limits.T)
 
 
 def _pole_of_axis(pair_deg: Array) -> Vector:

@@ -14,18 +14,19 @@ from scanwright.design.left_out import LeftOut
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.named_objectives import Moment, Objective
 from scanwright.design.objective.problem import Problem
-from scanwright.design.search.coarse import USUAL, Effort, Landscape, Progress, coarse_landscape
+from scanwright.design.progress import Progress, no_progress
+from scanwright.design.search.coarse import USUAL, Effort, Landscape, coarse_landscape
 from scanwright.design.search.coarse_sweep import swept_landscape
 from scanwright.design.search.constraints import Requirements
-from scanwright.design.search.families import Family, Leader, best_leader, find_leaders, refine_leaders
+from scanwright.design.search.families import Candidate, Family, best_candidate, find_candidates, refine_candidates
 from scanwright.design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
 from scanwright.design.search.limits import allowed_planes, blinding_words
 from scanwright.design.search.mounts.simplest import simplest_first
-from scanwright.design.search.plane_axis_product import Lowest, both_ways, lowest, one_way
+from scanwright.design.search.plane_axis_product import Lowest, both_orientations, lowest, one_orientation
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.task import Limits
 
-LEADERS_STEP_DEG = 5.0
+CANDIDATES_STEP_DEG = 5.0
 NONE = Limits()
 DENSER = 1.05  # where a density is not kept between the nodes
 
@@ -64,7 +65,7 @@ class SearchResult:
 def search(
     problem: Problem,
     ranges: AngleRanges,
-    progress: Progress = lambda _: None,
+    progress: Progress = no_progress,
     limits: Limits = NONE,
     effort: Effort = USUAL,
 ) -> SearchResult:
@@ -81,25 +82,25 @@ def search(
     avoid = ranges.holes == "avoid"
     least_blind = None
     required = Requirements(problem, limits, avoid)
-    found = _best(required, fine, progress, effort)
-    if avoid and found.leader is None:  # nothing is free of holes: the lowest J of all
+    result = _best(required, fine, progress, effort)
+    if avoid and result.candidate is None:  # nothing is free of holes: the lowest J of all
         _refuse_limits_that_blind(required, ranges, progress, effort)
-        least_blind = _least_blind(problem, found.land, fine)
+        least_blind = _least_blind(problem, result.land, fine)
         progress("no setting of the grid sees all of the region: the lowest J of all")
         avoid, required = False, replace(required, avoid_holes=False)
-        found = _best(required, fine, progress, effort)
-    land, winner = found.land, found.leader
+        result = _best(required, fine, progress, effort)
+    land, winner = result.land, result.candidate
     if winner is None:
         raise TaskError(_none_keeps(problem, land, fine, limits))
-    if ranges.step_deg >= LEADERS_STEP_DEG or problem.sweep is not None:
-        leaders = find_leaders(land, *fine, mirrors, required)
-    else:  # a basin is wider than the fine grid: look for the leaders on a coarse one, for the winner on both
-        coarse = _grid(problem, ranges.model_copy(update={"step_deg": LEADERS_STEP_DEG}), limits)
-        leaders = find_leaders(
-            _landscape(problem, coarse, progress, found.asked, avoid, effort)[0], *coarse, mirrors, required
+    if ranges.step_deg >= CANDIDATES_STEP_DEG or problem.sweep is not None:
+        candidates = find_candidates(land, *fine, mirrors, required)
+    else:  # a basin is wider than the fine grid: look for the candidates on a coarse one, for the winner on both
+        coarse = _grid(problem, ranges.model_copy(update={"step_deg": CANDIDATES_STEP_DEG}), limits)
+        candidates = find_candidates(
+            _landscape(problem, coarse, progress, result.asked, avoid, effort)[0], *coarse, mirrors, required
         )
     progress("refining the minima")
-    families = refine_leaders(problem, ranges, [winner, *leaders], required, effort.rounds, progress)
+    families = refine_candidates(problem, ranges, [winner, *candidates], required, effort.rounds, progress)
     simple = ranges.prefer == "simple"
     covered = len(fine[1].settings_deg) * len(fine[0].settings_deg)
     different = _different(*fine)
@@ -110,7 +111,7 @@ def search(
         covered=covered,
         evaluated=different,
         seconds=time.perf_counter() - start,
-        left_out=_left_out(ranges, covered, different, len(fine[0].first) - found.exact),
+        left_out=_left_out(ranges, covered, different, len(fine[0].first) - result.exact),
         lowest=families[0] if simple else None,
         planes=_plane_table(*fine, land.plain),
         axes=np.column_stack([fine[1].settings_deg, land.plain.by_axis[fine[1].flip.astype(int), fine[1].classes]]),
@@ -129,24 +130,24 @@ class _Best:
         land: what it is the lowest of.
         exact: scan planes that were looked at.
         asked: limits of the nodes; those of a task, or more where what keeps them at the nodes does not between them.
-        leader: it; None where no setting keeps what is asked.
+        candidate: it; None where no setting keeps what is asked.
     """
 
     land: Landscape
     exact: int
     asked: Limits
-    leader: Leader | None
+    candidate: Candidate | None
 
 
 def _best(required: Requirements, grid: Grid, progress: Progress, effort: Effort) -> _Best:
     problem, asked, avoid = required.problem, required.limits, required.avoid_holes
     land, exact = _landscape(problem, grid, progress, asked, avoid, effort)
-    leader = best_leader(land, *grid, required)
-    while leader is None and asked.min_density is not None and np.isfinite(land.kept.by_plane).any():
+    candidate = best_candidate(land, *grid, required)
+    while candidate is None and asked.min_density is not None and np.isfinite(land.feasible.by_plane).any():
         asked = asked.model_copy(update={"min_density": DENSER * asked.min_density})
         land, exact = _landscape(problem, grid, progress, asked, avoid, effort)
-        leader = best_leader(land, *grid, required)
-    return _Best(land, exact, asked, leader)
+        candidate = best_candidate(land, *grid, required)
+    return _Best(land, exact, asked, candidate)
 
 
 def _refuse_limits_that_blind(required: Requirements, ranges: AngleRanges, progress: Progress, effort: Effort) -> None:
@@ -159,8 +160,8 @@ def _refuse_limits_that_blind(required: Requirements, ranges: AngleRanges, progr
     if limits == required.limits:
         return
     free = _best(replace(required, limits=limits), _grid(required.problem, ranges, limits), progress, effort)
-    if free.leader is not None:
-        raise TaskError(blinding_words(required.problem, required.limits, free.leader.angles_deg))
+    if free.candidate is not None:
+        raise TaskError(blinding_words(required.problem, required.limits, free.candidate.angles_deg))
 
 
 def _grid(problem: Problem, ranges: AngleRanges, limits: Limits) -> Grid:
@@ -189,10 +190,10 @@ def _plain(
 ) -> Family | None:
     """The optimum of J alone, where it has a hole: what the answer is compared with."""
     required = Requirements(problem, limits, avoid_holes=False)
-    leader = best_leader(land, *grid, required, kept=False)
-    if leader is None or leader.score is None or leader.score.blind_weight <= NO_BLIND_WEIGHT:
+    candidate = best_candidate(land, *grid, required, feasible=False)
+    if candidate is None or candidate.score is None or candidate.score.blind_weight <= NO_BLIND_WEIGHT:
         return None
-    plain = refine_leaders(problem, ranges, [leader], required, rounds=1)[0]
+    plain = refine_candidates(problem, ranges, [candidate], required, rounds=1)[0]
     return plain if plain.score.J < best.score.J else None
 
 
@@ -203,17 +204,19 @@ def _least_blind(problem: Problem, land: Landscape, grid: Grid) -> float:
     blind = Objective("blind", problem.field, (moment,), lambda moments: np.asarray(moments[0]))
     shared = zip(land.objective.moments, land.weights, strict=True)
     weights = np.sum([each.share * w for each, w in shared if each.share], axis=0)
-    ways = (both_ways if problem.sweep is None else one_way)(moment, land.blind, weights)
-    low, _ = lowest(blind, [ways], planes.has | planes.own, axes.has)
-    least = replace(land, objective=blind, g=land.blind[None], weights=(weights,), constraints=(), plain=low, kept=low)
-    leader = best_leader(least, planes, axes, Requirements(problem, NONE, avoid_holes=False))
-    assert leader is not None and leader.score is not None
-    return leader.score.blind_weight
+    orientations = (both_orientations if problem.sweep is None else one_orientation)(moment, land.blind, weights)
+    low, _ = lowest(blind, [orientations], planes.has | planes.own, axes.has)
+    least = replace(
+        land, objective=blind, g=land.blind[None], weights=(weights,), constraints=(), plain=low, feasible=low
+    )
+    candidate = best_candidate(least, planes, axes, Requirements(problem, NONE, avoid_holes=False))
+    assert candidate is not None and candidate.score is not None
+    return candidate.score.blind_weight
 
 
 def _none_keeps(problem: Problem, land: Landscape, grid: Grid, limits: Limits) -> str:
     """Why a search has no answer, with what the setting of the lowest J reaches."""
-    nearest = best_leader(land, *grid, Requirements(problem, NONE, avoid_holes=False), kept=False)
+    nearest = best_candidate(land, *grid, Requirements(problem, NONE, avoid_holes=False), feasible=False)
     if nearest is None or nearest.score is None:
         return "weight: no setting of the grid brings a beam near the region: widen it, the angles, or ball_radius_deg"
     asked = ", ".join(
@@ -230,8 +233,8 @@ def _none_keeps(problem: Problem, land: Landscape, grid: Grid, limits: Limits) -
 
 def _different(planes: Folded, axes: Folded) -> int:
     """Number of different J: every pair of classes both ways round, but once where both come in one way only."""
-    one_way = int((~(planes.has | planes.own).all(axis=0)).sum()) * int((~axes.has.all(axis=0)).sum())
-    return 2 * len(planes.first) * len(axes.first) - one_way
+    one_orientation = int((~(planes.has | planes.own).all(axis=0)).sum()) * int((~axes.has.all(axis=0)).sum())
+    return 2 * len(planes.first) * len(axes.first) - one_orientation
 
 
 def _plane_table(planes: Folded, axes: Folded, low: Lowest) -> Float[ndarray, "planes 5"]:

@@ -14,7 +14,7 @@ from scanwright.design.motion import Shortest, Spin
 from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.objective.score import score
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.limits import line_gaps_deg
@@ -84,8 +84,8 @@ def shortest_period_s(
 
     def enough(count: int) -> bool:
         lines = ScanLines(count, 2 * np.pi / count)
-        found = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
-        return bool(found.least.min() >= least)
+        results = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
+        return bool(results.least.min() >= least)
 
     upper = 1
     while not enough(upper):

@@ -1,4 +1,4 @@
-"""The optimum with what the parts hide: bounds first, solids only for the leaders.
+"""The optimum with what the parts hide: bounds first, solids only for the candidates.
 
 The J of a setting without parts is a lower bound of its J with them, and so is the J without the beams that its parts
 hide in any case. Families are taken in the order of the first, their equivalent settings in that of the second, and
@@ -23,7 +23,7 @@ from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.self_check import require_counted
-from scanwright.design.search.coarse import Progress
+from scanwright.design.progress import Progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.grid_classes import mirrors_of
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -143,11 +143,11 @@ def choose_with_parts(
             if limits.max_blocked is not None and hidden > limits.max_blocked:
                 refused.append(f"{_shown(angles_deg)}: the parts hide {hidden:.1%} of the beams (limits.max_blocked)")
                 continue
-            found = score_with(problem, np.radians(angles_deg), shadow)
-            rank = _blind(found, avoid), first, found.J
+            result = score_with(problem, np.radians(angles_deg), shadow)
+            rank = _blind(result, avoid), first, result.J
             if lowest is None or rank < lowest:
                 lowest = rank
-                chosen = replace(family, angles_deg=angles_deg, score=found)
+                chosen = replace(family, angles_deg=angles_deg, score=result)
                 best = Chosen(chosen, family.score, shadow, 0, 0, (), 0)
     if best is None:
         raise BuildError(f"none of the {len(families)} best families can be built: {refused[0]}")
@@ -188,9 +188,9 @@ def checked_score(loaded: LoadedTask, problem: Problem, angles_rad: Setting, sha
     Raises:
         NumericalError: they differ by more than their errors.
     """
-    found = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
-    require_counted(loaded, angles_rad, found, shadow, problem.lever)
-    return found
+    result = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
+    require_counted(loaded, angles_rad, result, shadow, problem.lever)
+    return result
 
 
 def equivalents(
@@ -201,16 +201,16 @@ def equivalents(
     if problem.sweep is not None:
         return [angles_deg]
     turned = round((a + 360.0) % 360.0 - 180.0, 9)  # with -b the axis points the other way; no 179.97000000000003
-    found: list[tuple[float, float, float, float]] = []
+    result: list[tuple[float, float, float, float]] = []
     for beta, alpha in np.diagonal(mirrors_of(problem.bearings_rad), axis1=1, axis2=2).tolist():
         plane = 0.0 + alpha * c, 0.0 + beta * d  # q0 has the sign of beta_laser, q1 that of alpha_laser
-        found += [(a, b, *plane), (turned, 0.0 - b, 0.0 - plane[0], 0.0 - plane[1])]
-    return list(dict.fromkeys([found[0], *filter(ranges.hold, found[1:])]))
+        result += [(a, b, *plane), (turned, 0.0 - b, 0.0 - plane[0], 0.0 - plane[1])]
+    return list(dict.fromkeys([result[0], *filter(ranges.hold, result[1:])]))
 
 
-def _blind(found: Score, avoid_holes: bool) -> bool:
+def _blind(result: Score, avoid_holes: bool) -> bool:
     """Whether a setting has holes that are to be avoided: it then comes after all that have none."""
-    return avoid_holes and found.blind_weight > NO_BLIND_WEIGHT
+    return avoid_holes and result.blind_weight > NO_BLIND_WEIGHT
 
 
 def _sampled(

@@ -42,8 +42,8 @@ def edge_corners(field: Field) -> Corners:
     points, sectors = _crossings(breaking_planes(field)[:MOST_CORNERED])
     if not len(points):
         return Corners(points, np.empty((0, 0)))
-    looks = np.concatenate([around(points), sectors], axis=1)
-    weights = field.weight_at(looks.reshape(-1, 3)).reshape(len(points), -1)
+    tries = np.concatenate([around(points), sectors], axis=1)
+    weights = field.weight_at(tries.reshape(-1, 3)).reshape(len(points), -1)
     edge = np.ptp(weights, axis=1) > 0
     return Corners(points[edge], weights[edge])
 

@@ -15,7 +15,7 @@ from scanwright.design.sphere.rectangle import seen_rectangle
 from scanwright.design.sphere.regions import Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
-MOST_LOOKS = 1_000_000  # directions looked at in one patch
+MOST_TRIES = 1_000_000  # directions looked at in one patch
 A_FEW = 100  # directions that show that a region is not empty
 EMPTY = "weight: the region is empty: no direction has a weight above 0 outside the masks"
 NO_WEIGHT = f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
@@ -64,12 +64,12 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: fl
         TaskError: no direction has a weight.
     """
     each = wanted // max(1, len(field.patches)) + 1
-    found = [_in_patch(field, k, each, turn_rad, shift) for k in range(len(field.patches))]
-    if not any(len(samples.weights) for samples, _ in found):
+    result = [_in_patch(field, k, each, turn_rad, shift) for k in range(len(field.patches))]
+    if not any(len(samples.weights) for samples, _ in result):
         raise TaskError(NO_WEIGHT)
-    directions = np.concatenate([samples.directions for samples, _ in found])
-    weights = np.concatenate([samples.weights for samples, _ in found])
-    return Samples(directions, weights / field.summed_at(directions, np.array([per_sr for _, per_sr in found])))
+    directions = np.concatenate([samples.directions for samples, _ in result])
+    weights = np.concatenate([samples.weights for samples, _ in result])
+    return Samples(directions, weights / field.summed_at(directions, np.array([per_sr for _, per_sr in result])))
 
 
 def require_weight(field: Field) -> None:
@@ -85,12 +85,12 @@ def require_weight(field: Field) -> None:
 
 @lru_cache(maxsize=8)
 def sample_sets(field: Field, grid_step_deg: float | None, wanted: int, count: int) -> tuple[Samples, ...]:
-    """The first so many of `sample_set`, kept: a search asks for the same ones for every setting.
+    """Return the first so many of `sample_set`, or the paper's grid once; cached, as all settings use the same.
 
     Raises:
         TaskError: no direction has a weight.
     """
-    return tuple(sample_set(field, grid_step_deg, wanted, index) for index in range(count))
+    return tuple(sample_set(field, grid_step_deg, wanted, index) for index in range(1 if grid_step_deg else count))
 
 
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:
@@ -123,9 +123,9 @@ def _in_patch(field: Field, index: int, wanted: int, turn_rad: float, shift: flo
             return Samples(np.empty((0, 3)), np.empty(0)), 0.0
         weights = field.weight_at(directions)
         hits = int((weights > 0).sum())
-        if hits >= wanted or count >= MOST_LOOKS:
+        if hits >= wanted or count >= MOST_TRIES:
             return Samples(directions[weights > 0], weights[weights > 0]), count / solid_angle
-        count = min(MOST_LOOKS, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)
+        count = min(MOST_TRIES, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)
 
 
 def _spread(field: Field, index: int, count: int, turn_rad: float, shift: float) -> tuple[Float[ndarray, "n 3"], float]:

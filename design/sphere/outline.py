@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from scanwright.design.concurrency.blocked_product import product
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.sphere.corners import around, edge_corners
+from scanwright.design.sphere.corners import LOOK_RAD, around, edge_corners
 from scanwright.design.sphere.painting import MAP
 from scanwright.design.sphere.regions import Field, frames_about
 
@@ -54,11 +54,13 @@ class _Arcs:
     offset: float
     azimuth_rad: Float[ndarray, " n"]
 
-    def points(self) -> Float[ndarray, "n 3"]:
-        """The same as unit vectors, shape (n, 3)."""
+    def sides(self) -> Float[ndarray, "both 3"]:
+        """Return unit vectors close to the circle, all of those inside it before all of those outside, (2 n, 3)."""
         e1, e2, normal = self.frame
         turn = self.azimuth_rad[:, None]
-        return self.offset * normal + self._radius * (np.cos(turn) * e1 + np.sin(turn) * e2)
+        out = np.cos(turn) * e1 + np.sin(turn) * e2
+        along = (np.arccos(np.clip(self.offset, -1, 1)) + np.array([-LOOK_RAD, LOOK_RAD]))[:, None, None]
+        return (np.cos(along) * normal + np.sin(along) * out).reshape(-1, 3)
 
     @property
     def _radius(self) -> float:
@@ -82,10 +84,10 @@ def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
     """Where the weight begins: arcs of edges, and points of cells of maps and all corners, shape (n, 3)."""
     arcs = []
     for plane in field.planes:
-        whole = _Arcs(frames_about(plane[None, :3])[0], float(plane[3]), 2 * np.pi * np.arange(AROUND) / AROUND)
-        begins = _begins(field, whole.points())
+        full = _Arcs(frames_about(plane[None, :3])[0], float(plane[3]), 2 * np.pi * np.arange(AROUND) / AROUND)
+        begins = _on_both_sides(field.weight_at(full.sides()).reshape(2, -1).T)
         if begins.any():
-            arcs.append(replace(whole, azimuth_rad=whole.azimuth_rad[begins]))
+            arcs.append(replace(full, azimuth_rad=full.azimuth_rad[begins]))
     cells = [
         _on_cells(layers.tables[int(row[1])], row)
         for layers in (field.weight, field.mask)
@@ -93,8 +95,8 @@ def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
     ]
     points = np.concatenate([np.empty((0, 3)), *cells])
     corners = edge_corners(field)
-    begun = corners.points[_on_both_sides(corners.weights)]
-    return tuple(arcs), np.concatenate([points[_begins(field, points)], begun])
+    started = corners.points[_on_both_sides(corners.weights)]
+    return tuple(arcs), np.concatenate([points[_begins(field, points)], started])
 
 
 def _begins(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:

@@ -33,7 +33,6 @@ from scanwright.design.sphere.total_weight import is_total, require_drawn, weigh
 
 GRID = 180  # segments of a region of many edges, for those who ask for all of its breaks
 MANY_CORNERS = 64  # above this segments between corners would cost more nodes than the bends
-NEARER = 4.0  # three times the nodes of a rule of order 1.3; of smooth pieces it is 2
 PER_NODE = 256  # directions for each node of a region of many edges or corners
 MOST_DIRECTIONS = 2_000_000
 FINER = 1, 3, 9, 27  # times the nodes, until their weights sum to the integral of the weight
@@ -48,14 +47,12 @@ class PolarRule:
         fine: what each node adds to `int w dO`, shape (n,).
         coarse: the same for the rule with a third of the nodes: zero on two of three, shape (n,).
         segment: the segment that each node belongs to, shape (n,).
-        nearer: how many times nearer than the coarse rule the fine one is, at least, on smooth pieces.
     """
 
     polar_rad: Float[ndarray, " n"]
     fine: Float[ndarray, " n"]
     coarse: Float[ndarray, " n"]
     segment: Int64[ndarray, " n"]
-    nearer: float = 1.0
 
     def own_error(self) -> float:
         """What its sum of weights is off by as its nodes are few, from the rule with a third of them."""
@@ -73,6 +70,7 @@ def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"
 
     Raises:
         NumericalError: weight is missing: the nodes sum to less or more than its integral.
+        TaskError: the same, and the region is thinner than what is resolved.
     """
     if not has_all_breaks(field):
         return _sampled_rule(field, axis, breaks_rad, nodes)
@@ -92,7 +90,7 @@ def _rule_on(field: Field, axis: Vector, ends: Float[ndarray, "segments 2"], nod
     width = length / 2 * np.sin(s) * step
     means, _ = field.on_circles(axis, t)
     fine = width * 2 * np.pi * np.sin(t) * means
-    return PolarRule(t, fine, np.where(k % 3 == 1, 3 * fine, 0.0), segment, NEARER)
+    return PolarRule(t, fine, np.where(k % 3 == 1, 3 * fine, 0.0), segment)
 
 
 def _sampled_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"], nodes: int) -> PolarRule:

@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from scanwright.design.errors import NumericalError
-from scanwright.design.sphere.corners import edge_corners, polar_about, touched_points
+from scanwright.design.errors import NumericalError, TaskError
+from scanwright.design.sphere.corners import LOOK_RAD, edge_corners, polar_about, touched_points
+from scanwright.design.sphere.painting import VALUE
 from scanwright.design.sphere.regions import Field
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -64,8 +65,13 @@ def is_total(field: Field, got: float, own_error: float) -> bool:
     return abs(got - expected) <= WEIGHT_OFF * expected + own_error
 
 
-def weight_error(field: Field, got: float, where: str) -> NumericalError:
-    """Return the error of a quadrature that loses weight, or has some of it twice."""
+def weight_error(field: Field, got: float, where: str) -> NumericalError | TaskError:
+    """Return the error of a quadrature that loses weight, or has some of it twice; or of a region that is too thin."""
+    if total_weight(field) < 2 * np.pi * field.edges * 2 * LOOK_RAD * field.patches[:, VALUE].max():
+        return TaskError(
+            f"weight: what the masks leave of the regions is thinner than {np.degrees(2 * LOOK_RAD):.0e} deg: "
+            "widen the regions, or narrow the masks"
+        )
     return NumericalError(f"weight: {where} it sums to {got:.6g}, and not to {total_weight(field):.6g}")
 
 
@@ -74,6 +80,7 @@ def require_drawn(field: Field, weights: Float[ndarray, " n"]) -> None:
 
     Raises:
         NumericalError: they differ by more than a draw of so many explains.
+        TaskError: the same, and the region is thinner than what is resolved.
     """
     got = float(weights.sum())
     if not is_total(field, got, SURE * float(np.linalg.norm(weights / weights.max()) * weights.max())):

@@ -38,7 +38,7 @@ from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import Block, straight
 
 _PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
-_LONGEST_LAG_S = 3600.0
+_LONGEST_LAG_S = 3600.0  # an hour: two clocks of the same day
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
 _STEP_ERROR = 0.02  # of a whole number of the sensor's steps: clusters are told as such, rounded

@@ -109,9 +109,9 @@ def _finished(cloud: Cloud, finish: Finish, where: SeenFrom) -> tuple[Cloud, dic
         dropped["outlier"] = int(stray.sum())
         cloud = cloud.select(np.flatnonzero(~stray))
     if finish.voxel_m is not None:
-        rows_kept = filters.one_to_a_voxel(cloud.points_m, finish.voxel_m)
-        dropped["another_point_of_the_voxel"] = len(cloud.points_m) - len(rows_kept)
-        cloud = cloud.select(rows_kept)
+        chosen = filters.one_to_a_voxel(cloud.points_m, finish.voxel_m)
+        dropped["another_point_of_the_voxel"] = len(cloud.points_m) - len(chosen)
+        cloud = cloud.select(chosen)
     if finish.normals:
         there = cloud.valid
         normal = np.full(cloud.points_m.shape, np.nan, np.float32)

@@ -33,10 +33,10 @@ from scanwright.firmware_io.samples import JointSample, PoseSample, Scan, blocks
 
 LOOK_AHEAD_S = 0.35
 MOST_WAITING = 400  # scans; ten seconds of the fastest sensors
-_MOST_POSES = 20_000
-_LONGEST_S = 10.0
-_MOST_RAD = 1e9
-_NORM_ERROR = 1e-2
+_MOST_POSES = 20_000  # 100 Hz for 200 s
+_LONGEST_S = 10.0  # of delays and look-ahead: what waits is held in memory
+_MOST_RAD = 1e9  # years of turns
+_NORM_ERROR = 1e-2  # a quaternion printed with three digits is as well normalised
 _NO_POSES = Trajectory(np.array([-(2**62), -(2**62) + 1]), np.zeros((2, 3)), np.array([[0.0, 0.0, 0.0, 1.0]] * 2))
 
 

@@ -18,7 +18,7 @@ from scanwright.firmware_io.calibration.model import Mount, beam_rays
 from scanwright.firmware_io.calibration.solve import Grouping
 from scanwright.firmware_io.calibration.tiles import FlatTiles
 
-_APART = 6.0
+_APART = 6.0  # standard deviations of a plane: noise does not look like an edge
 _OUT = 4.0  # 2 % of the beams that are 6 off come this near, and 1 of 16,000 that belong go with them
 _ACROSS = np.cos(np.radians(10.0))  # surfaces more alike than that are pieces of one
 _REACH_M = 1.0  # from a tile's middle to the edge of its surface

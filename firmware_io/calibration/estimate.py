@@ -38,7 +38,7 @@ from scanwright.firmware_io.calibration.tiles import FlatTiles, flat_tiles
 # (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
 _NARROW = ((0.12, 3.0), (0.06, 2.0), (0.03, 1.0), (0.03, 1.0))
-_STEPS = 4
+_STEPS = 4  # of Gauss-Newton
 _LAST_STEPS = 2  # with all beams, and again with those clear of edges
 _TRUST = 0.1  # times `near`: the standard deviation of tiles about planes that are wrong by up to `near`
 _ROUNDS = 2  # of grouping, with all beams

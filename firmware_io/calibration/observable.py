@@ -21,7 +21,7 @@ from scanwright.firmware_io.calibration.surfaces import seen_twice
 from scanwright.firmware_io.calibration.tiles import FlatTiles
 
 BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
-FLATTEST_FAN_RAD = np.radians(3.0)
+FLATTEST_FAN_RAD = np.radians(3.0)  # a plane turned into itself shows no angle; nearer, noise grows without bound
 _TWICE = 0.05  # share of the beams
 _ONE_LINE = 0.01  # share of the surface that faces across it
 _JOINED = 0.5  # of the flat patches: three of 100 furnished rooms have 0.57 or 0.58, and none of these is wrong

@@ -17,7 +17,7 @@ from scanwright.firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETE
 from scanwright.firmware_io.calibration.scene_motion.overlapping_views import OverlappingViews, overlapping_views
 from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
 
-_WALLS = 3
+_WALLS = 3  # largest ones, whose straightness is reported
 _FEW = 3  # beams that a slim thing may leave where others went through
 _RESIDUAL = 1.5  # times the noise within small patches
 _LESS_CRISP = "the entropy says that the cloud has become less crisp: do not trust this calibration"

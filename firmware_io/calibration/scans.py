@@ -9,7 +9,7 @@ import numpy as np
 from scanwright.design.arrays import Floats, Ints, Mask
 from scanwright.firmware_io.calibration.model import ReturnedBeams
 
-_ROW_RAD = 4 * np.pi
+_ROW_RAD = 4 * np.pi  # two turns: bearings of one scan never reach the next row
 
 
 @dataclass(frozen=True, slots=True, eq=False)

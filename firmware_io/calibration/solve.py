@@ -27,8 +27,8 @@ _U = COUNT + 3
 _E = COUNT + 4
 WIDTH = COUNT + 5
 _MEDIAN_CHI2 = 0.4549  # of one degree of freedom
-KINK = 3.0
-_REFITS = 4
+KINK = 3.0  # standard deviations beyond which residuals count linearly (Huber)
+_REFITS = 4  # of the robust weights
 
 
 @dataclass(frozen=True, slots=True, eq=False)

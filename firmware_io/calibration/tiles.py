@@ -22,7 +22,7 @@ from scanwright.firmware_io.samples import AxisCurve
 _WINDOWS_RAD = tuple(np.radians([6.0, 3.0, 1.5]))
 _LEAST = 12  # beams in a tile: three make a plane, the rest say whether it is one
 _FEWEST = 50  # windows: their median roughness is the noise
-_FLICKER_RAD = np.radians(1.0)
+_FLICKER_RAD = np.radians(1.0)  # more than the backlash of any servo: smaller reversals are none
 _ROUGHEST = 1.5  # times the noise: far or dark surfaces are noisier than most, edges are far rougher
 _STEEPEST = np.cos(np.radians(84.0))  # flatter looks along a surface are all roughness and beam width
 

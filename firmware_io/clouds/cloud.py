@@ -26,7 +26,7 @@ COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring":
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
 _COLUMN_KINDS = {"f4", "f8", *(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
-_EVER_NS = 2**63
+_EVER_NS = 2**63  # an int64 ends there, in 2262
 _FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
 

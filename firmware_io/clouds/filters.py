@@ -11,8 +11,8 @@ from numpy import ndarray
 from scanwright.design.arrays import Floats
 from scanwright.firmware_io.clouds.voxels import voxel_of, voxel_sums
 
-NEIGHBOURS = 12
-_AT_ONCE = 1 << 16
+NEIGHBOURS = 12  # of a point: enough for a plane, few enough for an edge
+_AT_ONCE = 1 << 16  # points: bounds the memory of their neighbours
 
 
 def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = NEIGHBOURS) -> Bool[ndarray, " n"]:

@@ -23,7 +23,7 @@ from scanwright.firmware_io.foreign import foreign
 _HEADER = struct.Struct("<94xHII")  # size of the header, byte of the first point, number of records before it
 _RECORD_BYTES = 54  # of the head of each
 _STEPS_M = (1e-4, 1e-3, 1e-2)
-_MOST_STEPS = 2**31 - 1
+_MOST_STEPS = 2**31 - 1  # LAS stores coordinates as int32
 _PACKED = 1000  # times smaller than its points LAZ never gets
 _OURS = "scanwright"
 _EXACT = "intensity_exact"

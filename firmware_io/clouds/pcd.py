@@ -32,8 +32,8 @@ from scanwright.firmware_io.clouds.cloud import (
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 
-_LONGEST_HEADER = 1 << 16
-_DIGITS = 16
+_LONGEST_HEADER = 1 << 16  # bytes: hundreds of fields
+_DIGITS = 16  # of a count: more than any file has points
 _MOST_PACKED = 100  # times smaller LZF never gets: 264 bytes in 3
 _KINDS = {"<f4", "<f8", *(f"<{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
 _AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
@@ -122,8 +122,8 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     entries.setdefault("COUNT", ["1"] * len(names))
     for key in ("SIZE", "TYPE", "COUNT"):
         if len(entries.get(key, [])) != len(names):
-            given = " ".join(entries.get(key, []))[:80]
-            raise RecordingError(f"{path}: {key} {given}: must be one for each of {len(names)} fields")
+            entry = " ".join(entries.get(key, []))[:80]
+            raise RecordingError(f"{path}: {key} {entry}: must be one for each of {len(names)} fields")
     fields = []
     for k, name in enumerate(names):
         kind = f"<{entries['TYPE'][k].lower()}{entries['SIZE'][k]}"

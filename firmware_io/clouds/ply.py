@@ -37,8 +37,8 @@ _WORDS = {
 }
 _SIZED = {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
 _TYPES = {word: code for code, word in _WORDS.items()} | _SIZED | {"float32": "f4", "float64": "f8"}
-_DIGITS = 20
-_LONGEST_HEADER = 1 << 20
+_DIGITS = 20  # of a count: an int64 has 19
+_LONGEST_HEADER = 1 << 20  # bytes: thousands of comments
 
 
 class PlyWriter:
@@ -203,8 +203,8 @@ def read_header(path: Path) -> PlyHeader:
     if not end or not form:
         raise RecordingError(f"{path}: no '{'format' if end else 'end_header'}' in the first {len(text):,} bytes")
     comments = [line.strip().removeprefix("comment ") for line in lines if line.startswith("comment ")]
-    kept = tuple(comment for comment in comments if comment.strip("-"))
-    header = PlyHeader(form, tuple(elements), kept, end.end(), len(lines) + 1)
+    shown = tuple(comment for comment in comments if comment.strip("-"))
+    header = PlyHeader(form, tuple(elements), shown, end.end(), len(lines) + 1)
     if not any(element.name == "vertex" for element in elements):
         raise RecordingError(f"{path}: no element vertex: {', '.join(element.name for element in elements)[:200]}")
     if header.vertex.lists or not {*"xyz"} <= set(header.vertex.properties):

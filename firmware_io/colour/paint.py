@@ -34,12 +34,12 @@ from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 COLOURS = ("red", "green", "blue", "alpha")
 """Columns of a coloured cloud, bytes; alpha is 255 where there is a colour and 0 where not."""
-_AT_ONCE = 1 << 18
-_NOISE_M = 0.05
+_AT_ONCE = 1 << 18  # rows: bounds the memory
+_NOISE_M = 0.05  # of a range: points so near behind another are not hidden
 _SLANTS = (1.0, 3.0, 10.0)  # tangent of a surface's slant to the camera: at least, where it is unknown, at most
 _BASE_RAD = np.radians(2.0)  # between the points that tell how a surface lies: noise must not decide it
 _STEEP = 6.0  # times as far apart as at normal incidence; beyond it they lie on two surfaces
-_WIDEST_PX = 50
+_WIDEST_PX = 50  # of a disc: nearer surfaces are drawn coarser
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,14 +238,14 @@ def _draw(
 def _write(
     path: Path, rows: NDArray[np.void], rgb: UInt8[ndarray, "n 3"], coloured: Bool[ndarray, " n"], *, organised: bool
 ) -> None:
-    fields_kept = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
-    fields = np.dtype([*fields_kept, *((name, "|u1") for name in COLOURS)])
+    fields_copied = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
+    fields = np.dtype([*fields_copied, *((name, "|u1") for name in COLOURS)])
     comments = [line for line in read_header(path).comments if organised or line.split()[0] not in ("width", "height")]
     with PlyWriter(path, fields, comments) as cloud:
         for begin in range(0, rows.size, _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
             out = np.empty(rows[part].size, fields)
-            for name, _ in fields_kept:
+            for name, _ in fields_copied:
                 out[name] = rows[part][name]
             for channel, name in enumerate(COLOURS[:3]):
                 out[name] = rgb[part, channel]

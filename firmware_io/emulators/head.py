@@ -11,6 +11,8 @@ import numpy as np
 from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Rotation, Vector
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.products import SlipRing
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.servo_plant import Load
 
@@ -45,7 +47,16 @@ def read_load(out: Path, angles: AngleSet) -> Load:
         inertia_kg_m2=float(inertia_kg_m2),
         gravity_nm=float(np.hypot(*moment_kg_m[:2]) * np.hypot(*g_rot[:2])),
         gravity_phase_rad=phase_rad,
+        bearing_nm=_friction_nm(angles),
     )
+
+
+def _friction_nm(angles: AngleSet) -> float:
+    """Middle of the friction that the catalogue states for the ring; that of a light bearing if it states none."""
+    ring = load_catalogue().products.get(angles.slip_ring or "")
+    if not isinstance(ring, SlipRing) or ring.friction_nm is None:
+        return Load().bearing_nm
+    return sum(ring.friction_nm) / 2
 
 
 def _inertial(link: ElementTree.Element) -> tuple[float, Vector, Rotation]:

@@ -14,9 +14,9 @@ import numpy as np
 from scanwright.design.catalogue.products import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
-from scanwright.firmware_io.emulators.world import turned_deg
+from scanwright.firmware_io.emulators.world import spun_up, turned_deg
 
-BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
+BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
 _POINTS = 12  # LD19 development manual
 _BYTES = 47  # LD19 development manual
 _BACKLOG = 1 << 10  # bytes [assumed]: some packets
@@ -67,6 +67,7 @@ class LdrobotMachine:
 
     def __post_init__(self) -> None:
         self._packet = 0
+        self._from_rest = False
 
     @property
     def scanning(self) -> object:
@@ -90,7 +91,8 @@ class LdrobotMachine:
         """Packets of the next milliseconds."""
         number = _POINTS * self._packet + np.arange(_POINTS * self._together)
         since_ns = number * self.point_ns
-        angle_deg, speed_deg_s = turned_deg(self.lidar.scan_rate_hz, since_ns / 1e9)
+        turning_s, share = spun_up(since_ns / 1e9) if self._from_rest else (since_ns / 1e9, np.ones(since_ns.size))
+        angle_deg, speed_deg_s = turned_deg(self.lidar.scan_rate_hz, turning_s)
         time_ns = self.began_ns + np.rint(since_ns).astype(np.int64)
         range_m, intensity = self.ranging(time_ns, -np.radians(angle_deg % 360))  # clockwise
         measured = np.isfinite(range_m) & (range_m > 0) & (range_m < 65.0)
@@ -101,7 +103,7 @@ class LdrobotMachine:
             last = first + _POINTS - 1
             stamp_ms = self.first_ms + math.floor(since_ns[last] * (1 + self.rate_error) / 1e6)
             points = np.stack([range_mm, level], axis=1)[first : last + 1].tolist()
-            data = write_packet(speed_deg_s[first], angle_deg[first], angle_deg[last], stamp_ms, points)
+            data = write_packet(share[first] * speed_deg_s[first], angle_deg[first], angle_deg[last], stamp_ms, points)
             packets.append((int(time_ns[last]) + round(_BYTES * 10 / self.baud * 1e9), data))
         self._packet += self._together
         return packets
@@ -112,7 +114,8 @@ class LdrobotMachine:
         self._packet += max(math.floor(behind), 0)
 
     def power_cycle(self, now_ns: int) -> None:
-        """Silent for as long as it starts, its clock at 0."""
+        """Silent for as long as it starts; its clock is at 0 and its motor stands."""
+        self._from_rest = True
         self.began_ns, self.first_ms, self._packet = now_ns + _BOOT_NS, 0, 0
 
     @property

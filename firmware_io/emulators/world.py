@@ -24,6 +24,7 @@ from scanwright.design.scene.ray_caster import Hits, Scene, build_scene, cast, l
 
 _MOST_NOISE_MM = 1e5  # more is a wrong unit
 _WANDER = 0.01  # of the speed [assumed]
+SPIN_UP_S = 0.5  # time constant of a motor [assumed]: after 1.5 s it has 95 % of its speed
 _WANDER_S = 1.7  # period of it [assumed]
 
 
@@ -32,14 +33,14 @@ class RangeModel:
     """How a sensor turns a distance into a range.
 
     Attributes:
-        sigma_m: standard deviation of the noise.
+        sigma_m: standard deviation of the noise, or that at ranges in metres.
         quantum_m: step of the ranges that it sends.
         range_min_m: nothing nearer is measured.
         range_max_m: nothing farther comes back.
         incidence_max_rad: a surface that is met at a flatter angle (from its normal) sends nothing back.
     """
 
-    sigma_m: float
+    sigma_m: float | Callable[[Floats], Floats]
     quantum_m: float
     range_min_m: float
     range_max_m: float
@@ -70,7 +71,7 @@ def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
     if sigma_mm is not None and not 0 <= sigma_mm <= _MOST_NOISE_MM:
         raise TaskError(f"noise {sigma_mm} mm: 0 to {_MOST_NOISE_MM:g}")
     return RangeModel(
-        sigma_m=(lidar.range_sigma_mm if sigma_mm is None else sigma_mm) / 1000,
+        sigma_m=(lambda range_m: lidar.sigma_mm(1000 * range_m) / 1000) if sigma_mm is None else sigma_mm / 1000,
         quantum_m=0.001,
         range_min_m=lidar.range_min_mm / 1000,
         range_max_m=lidar.range_max_mm / 1000,
@@ -97,7 +98,8 @@ def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> M
 
     The intensity falls with the cosine of incidence and with range: plausible, but no model of a certain sensor.
     """
-    noise_m = model.sigma_m * rng.standard_normal(hits.range_m.size)
+    sigma_m = model.sigma_m(hits.range_m) if callable(model.sigma_m) else model.sigma_m
+    noise_m = sigma_m * rng.standard_normal(hits.range_m.size)
     range_m = np.rint((hits.range_m + noise_m) / model.quantum_m) * model.quantum_m
     lost = ~(hits.incidence_rad <= model.incidence_max_rad) | (range_m > model.range_max_m)
     near = ~lost & (range_m < model.range_min_m)
@@ -136,6 +138,15 @@ def turned_deg(rate_hz: float, since_s: Floats) -> tuple[Floats, Floats]:
     usual_deg_s, phase = 360 * rate_hz, 2 * np.pi * since_s / _WANDER_S
     wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
     return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
+
+
+def spun_up(since_s: Floats) -> tuple[Floats, Floats]:
+    """Time [s] at full speed in which a motor turns as far as since its start from rest, and its share of that speed.
+
+    It nears its speed exponentially.
+    """
+    share = -np.expm1(-since_s / SPIN_UP_S)
+    return since_s - SPIN_UP_S * share, share
 
 
 def furnished_room() -> Float64[ndarray, "triangles 3 3"]:

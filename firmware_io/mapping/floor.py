@@ -10,9 +10,9 @@ from numpy import ndarray
 
 from scanwright.design.errors import RecordingError
 
-_CELL_M = 0.25
+_CELL_M = 0.25  # narrower than free floor between furniture
 _THICK_M = 0.1  # of the layer that is taken for one level: three sigmas of the noisiest sensor either way, and a carpet
-_LEAST_M2 = 1.0
+_LEAST_M2 = 1.0  # smaller levels are tables
 _MOST_BELOW = 0.05  # of all points: reflections hang below a floor, a room does not
 _MOST_TILT_RAD = math.radians(1.0)  # a wall of 0.1 m, six metres away
 _GIVE_IT = "pass its height as floor_m"

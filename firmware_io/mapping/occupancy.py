@@ -18,7 +18,7 @@ UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 """Values of a cell, as nav_msgs/OccupancyGrid has them."""
 _MOST_CELLS = 1 << 26  # 400 x 400 m at 0.05 m
 _FINEST_M, _COARSEST_M = 1e-3, 10.0
-_HIGHEST_M = 100.0
+_HIGHEST_M = 100.0  # no robot is as high: a value beyond is a mistake
 
 
 @dataclass(frozen=True, slots=True)

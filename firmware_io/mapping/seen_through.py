@@ -19,10 +19,10 @@ from scanwright.design.errors import RecordingError
 
 _BEAMS = 10  # fewer lie on one side of a point, or all miss a thin thing: benchmarks/firmware_io/mapping/
 _REACH = 2.0  # times the usual angle to the tenth beam: where they are farther off, nobody looked
-_SAMPLE = 2000
-_NEIGHBOURS = 8
+_SAMPLE = 2000  # beams that show the step between neighbours
+_NEIGHBOURS = 8  # of a point: a moved surface has more than its half
 _NEAR_M = 0.15  # what is farther is of another thing
-_AT_ONCE = 1 << 16
+_AT_ONCE = 1 << 16  # points: bounds the memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

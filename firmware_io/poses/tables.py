@@ -15,7 +15,7 @@ from scanwright.firmware_io.foreign import foreign
 Row = tuple[int, Sequence[float]]
 """Time [ns], and the numbers beside it."""
 _UNITS = re.compile(r"\s*\[.*?\]\s*$")
-_EVER_NS = 2**63
+_EVER_NS = 2**63  # an int64 ends there, in 2262
 _TIME_DIGITS = 20  # a decimal may have a million more, and an int of it as many
 _SECONDS = {"t", "time", "time_s", "timestamp", "timestamp_s", "stamp"}
 _NANOSECONDS = {"time_ns", "timestamp_ns", "stamp_ns"}

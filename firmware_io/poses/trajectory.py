@@ -21,7 +21,7 @@ from scanwright.design.errors import RecordingError
 
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _FARTHEST_M = 1e8  # from 0: maps of the Earth's coordinates are 6.4e6 m from its centre
-_EVER_NS = 2**62
+_EVER_NS = 2**62  # half of an int64: differences of two times still fit
 
 
 class PosePieces(NamedTuple):

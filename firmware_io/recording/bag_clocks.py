@@ -55,8 +55,8 @@ def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
     """Choose the times of scans and angles, each shape (n,)."""
     ahead_s = [_ahead_s(stamps) if stamps.complete() else 0.0 for stamps in (scans, angles)]
     if max(ahead_s) > _AHEAD_S and max(ahead_s) < 1e-9 * _SAME_CLOCK_NS and _overlap(scans.stamp_ns, angles.stamp_ns):
-        who = "scans" if ahead_s[0] >= ahead_s[1] else "angles"
-        note = f"the stamps of {who} lie {max(ahead_s):.3f} s after they were received: another clock"
+        subject = "scans" if ahead_s[0] >= ahead_s[1] else "angles"
+        note = f"the stamps of {subject} lie {max(ahead_s):.3f} s after they were received: another clock"
         return OneClock(scans.receive_ns, angles.receive_ns, note + _RECEIPT)
     if scans.complete() and angles.complete() and _overlap(scans.stamp_ns, angles.stamp_ns):
         return OneClock(scans.stamp_ns, angles.stamp_ns, "")

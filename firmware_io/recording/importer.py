@@ -85,7 +85,7 @@ class ImportSummary:
     def lines(self) -> list[str]:
         """Return the summary as lines of text."""
         low, high = self.angle_deg
-        said = [
+        texts = [
             line
             for finding in self.findings
             for line in (
@@ -94,7 +94,7 @@ class ImportSummary:
             )
         ]
         return [
-            *said,
+            *texts,
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
             f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
             f"{high:z.2f} deg, {self.duration_s:.1f} s, to {self.out}",
@@ -153,8 +153,8 @@ def import_bag(
             raise RecordingError("angle_unit: write deg or rad, as the bag has it, or counts such as 4096/turn")
         headers = survey.headers
         increment_s = _time_increment_s(headers, corrections)
-        told_s = headers.time_increment_s if increment_s is None else increment_s
-        arc_ns = np.rint(1e9 * told_s * (headers.beams - 1)).astype(np.int64)
+        stated_s = headers.time_increment_s if increment_s is None else increment_s
+        arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
         clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps), survey, arc_ns, corrections)
         in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
         if not in_time.any():
@@ -170,8 +170,8 @@ def import_bag(
         )
         still = hold or rests_in_scans(note_in(opened))
         findings = [_remark("clock", note) for note in (clock.note, survey.angle_note) if note]
-        doubts = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
-        findings += [_remark("angle_unit", doubt) for doubt in doubts]
+        unit_notes = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
+        findings += [_remark("angle_unit", note) for note in unit_notes]
         if not still:
             in_order = clock.angle_ns[order], survey.angle[order] * unit_rad
             findings += angle_findings(*in_order, dropped=corrections.drop_outliers, timed=not clock.note)

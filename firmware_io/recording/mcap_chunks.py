@@ -29,9 +29,9 @@ from scanwright.firmware_io.foreign import foreign
 
 CHUNK_S = 0.25
 """What damage may cost: a chunk holds no more."""
-_RUN_BYTES = 1_000_000
+_RUN_BYTES = 1_000_000  # unpacked: smaller chunks are handed over together
 _MAGIC = b"\x89MCAP"
-_MESSAGE = 0x05
+_MESSAGE = 0x05  # opcode of a message (MCAP specification, Message)
 _RECORD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 

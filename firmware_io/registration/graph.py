@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from scanwright.design import frames
 from scanwright.design.arrays import Pose
 
-_MAX_STEPS = 30
-_SETTLED = 1e-9
+_MAX_STEPS = 30  # of Gauss-Newton: an end to a graph that does not settle
+_SETTLED = 1e-9  # rad and m: far below the noise of any pose
 _OUTLIER = 36.0  # times the median of what the edges are off by, in squared sigmas: 6 sigma
 _MEDIAN_CHI2 = 5.35  # of six degrees of freedom
 
@@ -57,19 +57,19 @@ def solve_graph(T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]) -> Gr
     Raises:
         ValueError: the edges do not connect all poses.
     """
-    edges_kept, left_out = list(edges), []
+    edges_used, left_out = list(edges), []
     while True:
-        if not connected(len(T_world), edges_kept):
+        if not connected(len(T_world), edges_used):
             raise ValueError("the edges do not connect all poses")
-        poses, covariance, chi2 = _least_squares(T_world, edges_kept)
+        poses, covariance, chi2 = _least_squares(T_world, edges_used)
         limit = _OUTLIER * max(1.0, float(np.median(chi2)) / _MEDIAN_CHI2)
         worst = int(np.argmax(chi2))
-        rest = edges_kept[:worst] + edges_kept[worst + 1 :]
+        rest = edges_used[:worst] + edges_used[worst + 1 :]
         if chi2[worst] <= limit or not connected(len(T_world), rest):
             break
-        left_out.append(edges_kept[worst])
-        edges_kept = rest
-    freedom = 6 * (len(edges_kept) - len(T_world) + 1)
+        left_out.append(edges_used[worst])
+        edges_used = rest
+    freedom = 6 * (len(edges_used) - len(T_world) + 1)
     scale = max(1.0, float(np.sqrt(chi2.sum() / freedom))) if freedom else 1.0
     return Graph(poses, scale**2 * covariance, tuple(left_out), scale)
 

@@ -21,23 +21,23 @@ from scanwright.firmware_io.registration.cube_map import cells_of
 from scanwright.firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
 from scanwright.firmware_io.registration.surfels.adjust import adjust
 
-_COARSE_REACH_M = 1.0
+_COARSE_REACH_M = 1.0  # of the first alignment: a start may be so far off
 _COARSE_NEAR = 3  # times the spacing
 _FINE_REACH = 1.5  # times the spacing: farther neighbours pull towards surfaces that the other one did not see
 _STEP_RAD = 1e-5  # small_gicp's own 0.1 deg and 1 mm stop an order of magnitude before the answer
-_STEP_M = 1e-4
-_MAX_STEPS = 40
+_STEP_M = 1e-4  # smaller than the noise of a mean of points
+_MAX_STEPS = 40  # of small_gicp: an end to a pair that does not settle
 
-_NEARLY_ALL = 0.97
-_FEW = 100
-_JUDGED = 20_000
+_NEARLY_ALL = 0.97  # share: taking the rest away would change nothing
+_FEW = 100  # points: fewer make no statistics
+_JUDGED = 20_000  # points of a pair: chance in a share of them is below 0.4 %
 _ALIKE = 0.5  # cosine between normals of one surface: two noisy normals, or a curved surface
 
-MIN_OVERLAP = 0.2
-MAX_CONTRADICTION = 0.07
+MIN_OVERLAP = 0.2  # share of the points; a pair with less is not used
+MAX_CONTRADICTION = 0.07  # share of the points in free space; a pair with more is not used
 _BLOCK = 10  # times the spacing: ten neighbours make a normal, and voxels are targets of several
 _CLEARLY = 0.3  # of what a surface square to the motion does
-_MIN_RESIST = 0.03
+_MIN_RESIST = 0.03  # share of the points; a motion that fewer resist counts as free
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,10 +16,10 @@ from scanwright.firmware_io.registration.cube_map import DepthMap, depth_map
 from scanwright.firmware_io.registration.surfels.beams import Beams
 from scanwright.firmware_io.registration.thin import beam_step_rad, thin, voxel_means
 
-THREADS = os.cpu_count() or 1
+THREADS = os.cpu_count() or 1  # all processors
 _NEIGHBOURS = 10  # more of them round off corners: benchmarks/firmware_io/registration.py
 _COARSE = 4  # times the spacing
-_MIN_POINTS = 200
+_MIN_POINTS = 200  # fewer make no surfaces to register
 _DEPTH_SIDE = 30  # cells of 3 deg: finer ones take mixed pixels at edges, and gaps between lines, for contradictions
 
 

@@ -21,22 +21,22 @@ from scanwright.design.arrays import Floats, Pose
 from scanwright.firmware_io.registration.pairwise import Pair, align, align_coarsely, coarse_merit, refused
 from scanwright.firmware_io.registration.sensor_view import SensorView
 
-_CELL_M = 0.25
+_CELL_M = 0.25  # of the map that is correlated: wider than an error of heading moves near walls
 _HEADINGS = 120  # 3 deg apart: within a cell of the truth up to 10 m
 _MAX_CELLS = 512  # of a plan's edge: larger halls get larger cells
 _PEAKS = 30  # looked at for each heading; neighbouring cells count
-_POINTS = 20_000
+_POINTS = 20_000  # of a view: more do not change the map of cells
 _WALL = np.sin(np.radians(30))  # a normal may point up or down by this
 _FLOOR = np.cos(np.radians([30, 15, 7, 7]))  # how far a floor's normal may be off, as the guess gets better
 _MIN_FLOOR = 0.05  # share of the points; with less of it a cloud is taken as it stands
-_HEIGHT_M = 0.05
+_HEIGHT_M = 0.05  # of a bin: finer than a step of a stair
 _HEIGHTS = 1200  # bins: 30 m up and down
 _STARTS = 60  # a corridor fits itself at every metre, better than it does where there is more to disagree about
-_SETTLED = 10
-_APART_M = 0.8
-_APART_RAD = np.radians(8)
+_SETTLED = 10  # guesses that are refined
+_APART_M = 0.8  # starts nearer than this settle at one place
+_APART_RAD = np.radians(8)  # the same for the heading
 _WORTH = 0.5  # of the best one's merit, at the coarse scale; others are not aligned finely
-_TRIED = 3
+_TRIED = 3  # of the refined guesses: each costs a whole alignment
 _RIVAL = 0.7  # a second pose of this share of the best one's merit leaves it open which is right
 
 Complexes = NDArray[np.complex128]

@@ -16,8 +16,8 @@ from scanwright.firmware_io.servo.fitness import ServoSetupError
 
 _log = logging.getLogger(__name__)
 
-AGAIN_S = 3.0
-_POLL_S = 1.0
+AGAIN_S = 3.0  # a device that was unplugged is there again after some seconds
+_POLL_S = 1.0  # for a parameter that starts the scanner
 
 
 class Interrupted(Exception):  # noqa: N818 - it is no error

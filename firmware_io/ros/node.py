@@ -48,10 +48,10 @@ from scanwright.firmware_io.ros.turns import Turns
 from scanwright.firmware_io.samples import JointSample, Scan
 
 PointsFrame = Literal["world", "rot"]
-_DIAGNOSED_S = 1.0
+_DIAGNOSED_S = 1.0  # between two messages: diagnostics are read at 1 Hz (REP 107)
 _SILENT_S = 2.0  # without a scan the diagnostics call the scanner stale
 _SETTLED_S = 1.0  # without a further subscription
-_FLUSHED_S = 5.0
+_FLUSHED_S = 5.0  # for subscribers that are slow
 _LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 

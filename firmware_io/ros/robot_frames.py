@@ -24,7 +24,7 @@ from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 
 URDF = "scanner.urdf"
-_RANGE_M = 10.0
+_RANGE_M = 10.0  # at which a difference of frames is stated
 
 
 @dataclass(frozen=True, slots=True, eq=False)

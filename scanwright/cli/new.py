@@ -95,13 +95,13 @@ def _prompted(
     scan_s: float | None,
 ) -> tuple[str, str, float, str, list[str], float]:
     """Ask the questions that no option answers, each again until its answer is valid."""
-    from scanwright.design.catalogue.table import DOUBT, chosen, table_lines
+    from scanwright.design.catalogue.table import MARK, chosen, table_lines
     from scanwright.pipeline.new_task import Answers, check_answers
 
     def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:
         of_kind = chosen(products, kind=kind)
         show(table_lines(of_kind)[:-2])
-        print(f"{DOUBT}: unverified number; -: unknown")
+        print(f"{MARK}: unverified number; -: unknown")
         return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
 
     def checked(**answers: Any) -> None:

@@ -194,16 +194,15 @@ def _chosen_and_made(
 ) -> tuple[Chosen, Scanner, Packed[Assembly]]:
     """Choose the mount, and make the scanner and its parts."""
     from scanwright.cad.assembly.shadow import PartsWorkshop
-    from scanwright.cad.layout.layout import mount_offset_mm
     from scanwright.design.search.optimum import angle_set
 
     loaded = optimum.loaded
     workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
     chosen = _chosen(optimum, workshop, _at(progress, "shadow"))
     angles = angle_set(loaded, chosen.family).model_copy(update={"task_sha256": task_sha256})
-    offset = mount_offset_mm(loaded.scanner(angles))
-    scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": offset}))
-    return chosen, scanner, Packed.of(workshop.assembly(scanner))
+    assembly = workshop.assembly(loaded.scanner(angles))
+    scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": assembly.layout.deck.t_world_rot}))
+    return chosen, scanner, Packed.of(assembly)
 
 
 def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
@@ -234,11 +233,10 @@ def _exported(
 def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
     """Return the files of the drawings."""
     from scanwright.cad.drawings.files import drawing_files
-    from scanwright.cad.layout.layout import config_hash
 
     progress("drawing the parts")
     made = parts.open()
-    return drawing_files(scanner, made.assembly, made.masses_g(), config_hash(scanner))
+    return drawing_files(scanner, made.assembly, made.masses_g(), made.assembly.layout.digest)
 
 
 def _at(progress: Progress, stage: str) -> Progress:

@@ -8,12 +8,11 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from scanwright.cad.layout.direct.adapter import adapter_of
-from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.layout import drive_of
+from scanwright.cad.layout.placement import placement_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.electrics.cautions import data_fault
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
@@ -116,32 +115,35 @@ def _require_strength(lidar: Lidar, servo: Servo) -> None:
     """Reject a lidar whose weight, off a level axis, needs more than the continuous torque of the servo."""
     off_m = abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
     needed = lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * off_m
-    if needed > servo.lasting_torque_nm:
+    if needed > servo.continuous_torque_nm:
         raise TaskError(
             f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * off_m:.0f} mm off "
-            f"a level axis, need {needed:.2g} N m, and the servo gives {servo.lasting_torque_nm:.2g} N m all day"
+            f"a level axis, need {needed:.2g} N m, and the servo gives {servo.continuous_torque_nm:.2g} N m all day"
         )
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
-    """Return the slip ring for continuous rotation; None for a servo that cannot rotate continuously.
+    """Return the slip ring for continuous rotation; None for a servo that must sweep.
 
-    Rings with a bore come first, since the servo turns them without a belt, and of those the ones whose speed is known.
+    Rings that are rated for the lidar's data come first, then those with a bore, which need no belt, and of those the
+    ones whose speed is known. A servo that does not read its angle all around sweeps, and so does one that no ring of
+    the catalogue can be laid out with.
 
     Raises:
-        TaskError: none can be laid out with these two.
+        TaskError: these two cannot be laid out without a ring either.
     """
-    if servo.position_feedback_deg < 360:
-        return None
-    rings = [product for product in products if isinstance(product, SlipRing)]
-    why = "the catalogue has no slip ring"
-    for ring in sorted(rings, key=lambda ring: (ring.bore_mm == 0, ring.max_rpm is None, ring.name)):
-        angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=ring.name)
-        scanner = scanner_of(angles, "fdm-0.4", products)
+
+    def order(ring: SlipRing) -> tuple[bool, bool, bool, str]:
+        return bool(data_fault(ring, lidar)), ring.bore_mm == 0, ring.max_rpm is None, ring.name
+
+    rings = sorted((product for product in products if isinstance(product, SlipRing)), key=order)
+    strong = [ring for ring in rings if ring.friction_nm is None or ring.friction_nm[1] <= servo.continuous_torque_nm]
+    why = ""
+    for ring in (*(strong if servo.position_feedback_deg == 360 else ()), None):
+        name = None if ring is None else ring.name
+        angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=name)
         try:
-            stack = drive_of(scanner).stack
-            if isinstance(stack, DirectStack) and stack.bearing is None:
-                adapter_of(scanner, stack)
+            placement_of(scanner_of(angles, "fdm-0.4", products))
         except BuildError as error:
             why = str(error)
         else:
@@ -159,9 +161,12 @@ def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
             'mode = "spin"',
             f"period_s = {answers.scan_s:g}    # one full turn is one full scan: longer is denser",
         ]
+    why = f"{servo.name} does not read its angle all around"
+    if servo.position_feedback_deg == 360:
+        why = f"no slip ring of the catalogue fits {servo.name}"
     return [
         "",
-        f"[motion]  # {servo.name} does not read its angle all around: it sweeps back and forth without a slip ring",
+        f"[motion]  # {why}: it sweeps back and forth, and its cable hangs in a loop",
         'mode = "sweep"',
         "limits_deg = [-90, 90]",
         f"period_s = {answers.scan_s:g}    # out and back is one full scan: longer is denser",

@@ -178,7 +178,7 @@ def without(key):
     [
         ("", ["not a JSON file"]),
         ("{", ["not a JSON file"]),
-        ("[1, 2]", ["whole file"]),
+        ("[1, 2]", ["entire file"]),
         (full_table() | {"sensr": "x"}, ["sensr", "unknown key", "did you mean 'sensor'"]),
         (without("sensor"), ["sensor", "required"]),
         (full_table() | {"schema": "scanwright/angles/2"}, ["schema", "scanwright/angles/1"]),

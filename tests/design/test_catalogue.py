@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
+from scanwright.design.catalogue.holes import Pattern, mounting_holes
 from scanwright.design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
 from scanwright.design.catalogue.table import FIGURES, chosen, table_lines
 from scanwright.design.errors import TaskError
@@ -47,6 +48,9 @@ def test_all_products_of_the_issue_are_there(shipped):
         "RPLIDAR S1",
         "RPLIDAR S2",
         "RPLIDAR C1",
+        "RPLIDAR S2L",
+        "RPLIDAR S3",
+        "STL-19P",
     }
     assert by_kind[Lidar] == {*hokuyo, *sick, *cheap}
     assert by_kind[Servo] == {
@@ -139,9 +143,10 @@ def test_what_the_issue_says_of_the_rings(shipped):
     uh = shipped.get("UH1256-02-0610-06S", SlipRing)
     assert (uh.bore_mm, uh.outer_diameter_mm) == (12.7, 56)
     assert "length_mm" in uh.unverified()
+    assert (uh.friction_nm, uh.data) == ((0.16, 0.2), "usb2")
     snu = shipped.get("SNU11-P0210", SlipRing)
     assert snu.price_usd == 130
-    assert {"bore_mm", "outer_diameter_mm", "length_mm"} <= set(snu.unverified())
+    assert "length_mm" in snu.unverified() and snu.friction_nm == (0.1, 0.13)
 
 
 @pytest.mark.parametrize(
@@ -261,24 +266,13 @@ def test_every_product_tells_its_values_in_words():
     assert any('"count": 6' in line for line in load_catalogue().named("SRC022A-6").lines())
 
 
-SQUARE_THAT_IS_NONE = {
-    *("LD06", "LD19", "STL27L", "RPLIDAR A1", "RPLIDAR A2", "RPLIDAR A3", "LMS111", "LMS151"),
-    *("URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX"),
-    *("XL430-W250", "XM430-W350", "XH430-W350", "XM540-W270", "XL330-M288", "STS3215"),
-}
-"""Their hole pattern does not exist on the device."""
-OTHER_MISFITS = {
-    *("MX-106", "AX-12A", "TiM551", "TiM561", "TiM571", "TiM781"),
-    *("UH1256-02-0610-06S", "SNU11-P0210", "SRC022A-6"),
-}
+MISFITS = {"RPLIDAR A1", "UH1256-02-0610-06S", "SNU11-P0210"}
+"""Products whose records hold something that the printed parts do not fit."""
 
 
 def test_every_product_that_parts_do_not_fit_says_so_and_no_other(shipped):
     misfits = {product.name: " ".join(product.misfit()) for product in shipped if product.misfit()}
-    assert set(misfits) == SQUARE_THAT_IS_NONE | OTHER_MISFITS
-    assert {name for name, words in misfits.items() if "hole pattern that does not exist" in words} == (
-        SQUARE_THAT_IS_NONE
-    )
+    assert set(misfits) == MISFITS
     assert "88.5 mm long" in misfits["UH1256-02-0610-06S"] and "43.5 mm more" in misfits["UH1256-02-0610-06S"]
     for right in ("UTM-30LX", "MX-64R"):
         assert shipped.named(right).known_wrong == ()
@@ -288,19 +282,112 @@ def test_a_known_error_names_a_value_that_the_record_has(shipped):
     for product in shipped:
         for error in product.known_wrong:
             words = error.words(product)
-            assert error.device in words and error.field in words
-            if error.field != "drag torque":
-                assert f"{error.field} = " in words, (product.name, error.field)
-    catalogue = "\n".join(shipped.named("STL27L").lines())
-    assert "! mount_holes_mm = [[15.0, 15.0]" in catalogue and "three through holes" in catalogue
+            assert error.device in words and f"{error.field} = " in words, (product.name, error.field)
 
 
 def test_a_product_of_ones_own_replaces_its_known_errors(tmp_path, shipped):
-    text = (SHIPPED / "ld19.toml").read_text(encoding="utf-8")
-    mine = load_catalogue(write(tmp_path, text[: text.index("known_wrong")])).get("LD19", Lidar)
-    assert mine.misfit() == [] and shipped.get("LD19", Lidar).misfit()
+    text = (SHIPPED / "rplidar-a1.toml").read_text(encoding="utf-8")
+    mine = load_catalogue(write(tmp_path, text[: text.index("known_wrong")])).get("RPLIDAR A1", Lidar)
+    assert mine.misfit() == [] and shipped.get("RPLIDAR A1", Lidar).misfit()
     with pytest.raises(TaskError, match="known_wrong"):
         load_catalogue(write(tmp_path, text.replace("{ field = ", "{ feild = ")))
+
+
+def entry(value, verified=True):
+    return f'{{ value = {value}, source = "calliper", verified = {str(verified).lower()} }}'
+
+
+def old_fields(text, old):
+    """A product file of version 0.1: its mounting holes by other fields."""
+    lines = [line for line in text.splitlines() if not line.startswith("holes = ")]
+    return "\n".join([*lines, *(f"{field} = {value}" for field, value in old.items())]) + "\n"
+
+
+def test_a_lidar_file_of_version_0_1_states_threads_in_the_base(tmp_path):
+    text = old_fields(
+        LIDAR,
+        {
+            "mount_screw": entry('"M2.5"'),
+            "mount_holes_mm": entry("[[10, 20], [-10, 20], [0, -20]]", verified=False),
+            "mount_thread_depth_mm": entry("5.0"),
+        },
+    )
+    lidar = load_catalogue(write(tmp_path, text)).get("UTM-30LX", Lidar)
+    assert lidar.base == Pattern("M2.5", "tapped", ((10, 20), (-10, 20), (0, -20)), 0.0, 5.0)
+    assert "holes" in lidar.unverified()
+    assert set(lidar.provenance()) >= {"holes"} and "mount_screw" not in lidar.provenance()
+
+
+def test_a_servo_file_of_version_0_1_states_ears_for_nuts(tmp_path):
+    text = old_fields(
+        (SHIPPED / "mx-64r.toml").read_text(encoding="utf-8"),
+        {
+            "case_screw": entry('"M3"'),
+            "case_holes_mm": entry("[[11, 4], [-11, 4]]"),
+            "case_holes_z_mm": entry("-6.0"),
+            "case_rear_holes_mm": entry("[[9, 4], [-9, 4], [9, -4], [-9, -4]]"),
+            "case_rear_holes_z_mm": entry("-30.0"),
+        },
+    )
+    servo = load_catalogue(write(tmp_path, text)).get("MX-64R", Servo)
+    assert servo.front == Pattern("M3", "through", ((11, 4), (-11, 4)), -6.0, 2.0)
+    assert (len(servo.rear.places), servo.rear.z_mm) == (4, -30.0)
+    assert "holes" not in servo.unverified()
+
+
+def test_an_old_file_that_lacks_one_of_the_fields_is_refused(tmp_path):
+    text = old_fields(LIDAR, {"mount_screw": entry('"M3"'), "mount_thread_depth_mm": entry("5.0")})
+    with pytest.raises(TaskError, match="holes"):
+        load_catalogue(write(tmp_path, text))
+
+
+def test_no_screw_of_a_case_no_pin_and_no_slot_is_ever_used(shipped):
+    for product in shipped:
+        for hole in getattr(product, "holes", ()):
+            if hole.kind in ("case_screw", "pin", "slot"):
+                pattern = mounting_holes([hole], hole.axis)
+                assert pattern.places == (), product.name
+
+
+# typed from the makers' drawings
+@pytest.mark.parametrize(
+    ("name", "screw", "kind", "places"),
+    [
+        ("STL27L", "M2", "through", {(0, 23.4), (23.4, -8.5), (-23.4, -8.5)}),
+        ("UST-10LX", "M3", "tapped", {(20, 20), (-20, -20)}),
+        ("RPLIDAR C1", "M2.5", "tapped", {(21.5, 21.5), (-21.5, 21.5), (-21.5, -21.5), (21.5, -21.5)}),
+        ("LMS111", "M3", "tapped", set()),
+    ],
+)
+def test_a_plate_uses_the_holes_that_the_base_of_a_lidar_has(shipped, name, screw, kind, places):
+    base = shipped.get(name, Lidar).base
+    assert (base.screw, base.kind, set(base.places)) == (screw, kind, places)
+
+
+def test_an_x_servo_is_held_by_its_front_alone(shipped):
+    for name, depth in (("XL430-W250", 3.8), ("XM430-W350", 3.0)):
+        servo = shipped.get(name, Servo)
+        assert servo.rear.places == ()
+        assert set(servo.front.places) == {(11, -8), (-11, -8)}
+        assert (servo.front.screw, servo.front.depth_mm, servo.front.z_mm) == ("M2.5", depth, -2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "range_mm", "sigma_mm"),
+    [
+        ("UST-10LX", [100, 9000], [30, 30]),
+        ("STL27L", [1000, 5000, 20000], [5, 15, 25]),
+        ("URG-04LX", [500, 2000, 4000], [10, 20, 40]),  # Schubert 2016, Table 1: 1 % beyond 1 m
+        ("RPLIDAR A1", [1500, 3000, 6000], [15, 60, 240]),  # square of the range
+    ],
+)
+def test_the_noise_of_a_range_depends_on_the_range(shipped, name, range_mm, sigma_mm):
+    assert shipped.get(name, Lidar).sigma_mm(range_mm) == pytest.approx(sigma_mm)
+
+
+def test_noise_without_an_end_is_that_at_the_end_of_the_range(shipped):
+    a1 = shipped.get("RPLIDAR A1", Lidar)
+    assert a1.sigma_mm(np.inf) == a1.sigma_mm(a1.range_max_mm)
 
 
 # typed from the makers' sheets: lowest and highest voltage at the device

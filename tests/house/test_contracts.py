@@ -15,6 +15,7 @@ INTRUDERS = {  # contract -> a file, and an import in it that breaks that one
     "design": ("design/sphere/regions.py", "import scanwright.design.search.limits"),
     "cad": ("cad/layout/deck.py", "import scanwright.cad.parts.base_mount"),
     "cad-layout": ("cad/layout/deck.py", "import scanwright.cad.solids"),
+    "cad-layout-steps": ("cad/layout/direct/stack.py", "import scanwright.cad.layout.deck"),
     "firmware_io": ("firmware_io/recording/recording.py", "import scanwright.firmware_io.assembly.turns"),
     "scanwright": ("scanwright/report/page.py", "import scanwright.pipeline.folder"),
     "door": ("firmware_io/samples.py", "import typer"),

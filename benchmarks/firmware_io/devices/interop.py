@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +28,6 @@ import numpy as np
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
-from scanwright.firmware_io.emulators.lidar_line import LidarLine
 from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import family_of
@@ -132,13 +131,13 @@ class Client:
     Attributes:
         name: of it.
         models: that it should run with.
-        command: its arguments for an emulator and the speed of its line.
+        command: its arguments, in which PORT, BAUD and MODEL stand for those of an emulator.
         pattern: matches angle [deg] and distance [mm] in what it prints, or a distance straight ahead.
     """
 
     name: str
     models: tuple[str, ...]
-    command: Callable[[LidarLine, int, str], list[str]]
+    command: tuple[str, ...]
     pattern: str = r"^(-?[\d.]+) ([\d.]+)$"
 
 
@@ -159,8 +158,7 @@ def clients(paths: dict[str, str], folder: Path) -> Iterator[Client]:
     """Return the programs at the paths that are given; `folder` is for what must be compiled."""
     if program := paths.get("sdk"):
         pattern = r"theta: ([\d.]+) Dist: ([\d.]+)"
-        serial = ["--channel", "--serial"]
-        yield Client("rplidar_sdk", _RPLIDARS, lambda e, baud, _: [program, *serial, e.port, str(baud)], pattern)
+        yield Client("rplidar_sdk", _RPLIDARS, (program, "--channel", "--serial", "PORT", "BAUD"), pattern)
     if python := paths.get("python"):
         scripts = {
             "rplidar-roboticia, normal": (_ROBOTICIA.replace("KIND", "normal"), _RPLIDARS),
@@ -169,14 +167,12 @@ def clients(paths: dict[str, str], folder: Path) -> Iterator[Client]:
             "lds2d": (_LDS2D, ("LD06", "LD19", "RPLIDAR A1", "RPLIDAR C1")),
         }
         for name, (script, models) in scripts.items():
-            text = _NO_DTR + script
-            yield Client(name, models, lambda e, baud, m, text=text: [python, "-c", text, e.port, str(baud), m])
+            yield Client(name, models, (python, "-c", _NO_DTR + script, "PORT", "BAUD", "MODEL"))
     if samples := paths.get("urg"):
         usb, ahead = ("URG-04LX", "URG-04LX-UG01", "UTM-30LX"), r"^()(\d+) \[mm\]"
         for name in ("get_distance", "get_distance_handshake", "sync_time_stamp"):
-            path = str(Path(samples, name))
             pattern = ahead if name != "sync_time_stamp" else r"^()()\d+"
-            yield Client(f"urg_library, {name}", usb, lambda e, _, __, path=path: [path, "-s", e.port], pattern)
+            yield Client(f"urg_library, {name}", usb, (str(Path(samples, name)), "-s", "PORT"), pattern)
     if sources := paths.get("ldlidar"):
         (folder / "main.cpp").write_text(_LDLIDAR)
         includes = [f"-I{path}" for path in Path(sources, "include").iterdir()]
@@ -186,7 +182,7 @@ def clients(paths: dict[str, str], folder: Path) -> Iterator[Client]:
             ["g++", "-O1", "-pthread", "-include", "pthread.h", *includes, folder / "main.cpp", *units, "-o", program],
             check=True,
         )
-        yield Client("ldlidar", ("LD06", "LD19"), lambda e, baud, _: [program, e.port, str(baud)])
+        yield Client("ldlidar", ("LD06", "LD19"), (program, "PORT", "BAUD"))
 
 
 def result(client: Client, model: str, folder: Path) -> tuple[bool, str]:
@@ -194,7 +190,8 @@ def result(client: Client, model: str, folder: Path) -> tuple[bool, str]:
     lidar, log = load_catalogue().get(model, Lidar), folder / "log"
     emulator = resolve_name(family_of(model).emulator)(lidar, _ranging, 0)
     with emulator, log.open("w") as out:
-        command = ["stdbuf", "-oL", *client.command(emulator, _baud(model), model)]
+        values = {"PORT": emulator.port, "BAUD": str(_baud(model)), "MODEL": model}
+        command = ["stdbuf", "-oL", *(values.get(part, part) for part in client.command)]
         program = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, cwd=folder)
         with suppress(subprocess.TimeoutExpired):
             program.wait(_RUN_S)

@@ -22,8 +22,8 @@ import numpy as np
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Lidar
+from scanwright.firmware_io.emulators import world
 from scanwright.firmware_io.emulators.lidar_line import Machine
-from scanwright.firmware_io.emulators.slamtec import machine as slamtec_emulator
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
@@ -123,7 +123,7 @@ def held_up(
     """The lidar, opened on a line whose reader is held up, and the stalls that are still to come."""
     line = HeldUpLine(model, stalls, buffer_bytes)
     clocks = [patch.object(module, "time", line) for module in (sensor_line, dialogue, slamtec, ldrobot, lms2xx)]
-    spun_up = patch.object(slamtec_emulator, "_SPIN_UP_S", 1e-6)  # turns are counted at full speed
+    spun_up = patch.object(world, "SPIN_UP_S", 1e-6)  # turns are counted at full speed
     with patch.object(sensor_line, "open_stream", lambda _: line), spun_up:
         for clock in clocks:
             clock.start()

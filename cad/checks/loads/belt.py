@@ -10,20 +10,23 @@ from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg
 from scanwright.cad.layout.names import BEARING, BELT
+from scanwright.cad.layout.placement import Placement
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
 
-def belt_loads(scanner: Scanner, stack: BeltStack, rotor: Inertial, weight: Weight, torque: float) -> list[Finding]:
-    """Check bearings, belt, horn, and the angle between servo and axis.
+def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float) -> list[Finding]:
+    """Check bearings, belt, horn, and the angle between servo and axis; no finding without a belt.
 
     Args:
-        scanner: angles and products.
-        stack: its layout.
+        layout: of the scanner.
         rotor: all that turns.
         weight: of it.
         torque: largest torque of the servo in operation [N m].
     """
+    scanner, stack = layout.scanner, layout.drive.of(BeltStack)
+    if stack is None:
+        return []
     pull = belt_pull(stack, torque)
     upper, lower = carrier_forces(stack, weight, 1000 * float(rotor.centre_m[2]), pull.shaft_n)
     name, limit = stack.carrier.name, stack.carrier.static_load_n

@@ -19,13 +19,9 @@ from scanwright.cad.assembly.masses import rotor_of
 from scanwright.cad.checks.limits import at_most, tidy
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.direct.cage import cage_of, stiffness_n_per_m
-from scanwright.cad.layout.direct.loads import shaft_modulus_pa
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.statics.sag import Sag, linkage_sag, with_shaft
-from scanwright.cad.statics.shaft import ShaftBend, belt_shaft_bend, shaft_bend
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
@@ -78,17 +74,7 @@ def sag_of(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial],
     seat = np.array([linkage.half_x, linkage.half_y, linkage.seat])
     printed = [meshes[name] for name in assembly.carriers()]
     sag = linkage_sag(stack, printed, seat, bodies["laser"], 1000 * printer.modulus_gpa, printer.density_g_cm3)
-    return with_shaft(sag, bend_of(assembly), stack, rotor_of(scanner, bodies))
-
-
-def bend_of(assembly: Assembly) -> ShaftBend:
-    """Return the bend of the shaft at the hub."""
-    layout = assembly.layout
-    stack, scanner = layout.stack, layout.scanner
-    if isinstance(stack, BeltStack):
-        return belt_shaft_bend(stack)
-    cage = cage_of(scanner, stack)
-    return shaft_bend(stack, shaft_modulus_pa(scanner, stack), 0.0 if cage is None else stiffness_n_per_m(cage))
+    return with_shaft(sag, layout.drive.bend, stack, rotor_of(scanner, bodies))
 
 
 def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[BeamError, BeamError]:

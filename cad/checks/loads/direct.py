@@ -9,26 +9,32 @@ from __future__ import annotations
 import math
 
 from scanwright.cad.checks.limits import at_most, horn_check, rated
-from scanwright.cad.layout.direct.cage import share_weight
+from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
 from scanwright.cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg, rated_moment_nm
 from scanwright.cad.layout.names import BEARING, SERVO, SERVO_SHAFT
+from scanwright.cad.layout.placement import Placement
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
 
 
-def direct_loads(scanner: Scanner, stack: DirectStack, weight: Weight) -> list[Finding]:
-    """Check horn, bearing and shaft under the weight of all that turns."""
-    shared = share_weight(scanner, stack, weight)
-    return [*_forces(scanner, stack, weight, shared), *_yields(scanner, stack), _slope(scanner, stack, shared)]
+def direct_loads(layout: Placement, weight: Weight) -> list[Finding]:
+    """Check horn, bearing and shaft under the weight of all that turns; no finding with a belt between."""
+    scanner, stack, cage = layout.scanner, layout.drive.of(DirectStack), layout.drive.of(BearingCage)
+    if stack is None:
+        return []
+    shared = share_weight(scanner, stack, cage, weight)
+    return [*_forces(scanner, stack, cage, weight, shared), *_yields(scanner, stack), _slope(scanner, stack, shared)]
 
 
-def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> list[Finding]:
+def _forces(
+    scanner: Scanner, stack: DirectStack, cage: BearingCage | None, weight: Weight, shared: Supported
+) -> list[Finding]:
     servo, axial = scanner.servo, f"load along the axis of {scanner.servo.name}"
     checks = [
-        _horn(scanner, stack, weight, shared),
+        _horn(scanner, cage, weight, shared),
         rated("axial_load", weight.along_n, servo.axial_load_n, "N", SERVO, axial),
     ]
     if stack.bearing is not None:
@@ -38,16 +44,16 @@ def _forces(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Suppor
     return checks
 
 
-def _horn(scanner: Scanner, stack: DirectStack, weight: Weight, shared: Supported) -> Finding:
+def _horn(scanner: Scanner, cage: BearingCage | None, weight: Weight, shared: Supported) -> Finding:
     """Check the horn: without a bearing under the weight alone, with one also under every misalignment."""
     servo, rating = scanner.servo, rated_moment_nm(scanner)
-    if stack.bearing is None:
+    if cage is None:
         hint = "support the shaft with a bearing near the hub; none of the catalogue fits it"
         return horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}", hint)
-    sums = worst_moment_nm(scanner, stack, weight)
+    sums = worst_moment_nm(cage, weight)
     parts = ", ".join(
         f"{each.what} {'' if each.off_mm is None else f'({each.off_mm:.3f} mm) '}{each.moment_nm:.3f}"
-        for each in contributions(scanner, stack, weight)
+        for each in contributions(cage, weight)
     )
     both = ", ".join(f"{total:.3g} in {name}" for name, total in sums.items())
     what = f"worst tilt moment on the horn of {servo.name}, {both}; in aluminium {parts}"

@@ -10,12 +10,10 @@ from scanwright.cad.checks.limits import at_most, note, tidy, with_error
 from scanwright.cad.checks.loads.belt import belt_loads
 from scanwright.cad.checks.loads.direct import direct_loads
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.balance.counterweight import RUBS_NM
-from scanwright.cad.layout.balance.imbalance import keeps_flank, play_matters
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.drive import Stack
-from scanwright.cad.layout.loads import FAR_MM, Weight
+from scanwright.cad.layout.loads import FAR_MM, Weight, friction_nm
 from scanwright.cad.layout.names import SERVO
+from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.imbalance import keeps_flank, play_matters
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
@@ -24,35 +22,33 @@ DEFAULT_PERIOD_S = 1.0  # if the angle set names no motion: the fastest turn of 
 BALANCE_AT_MM = 50.0  # from the axis, for which the message states a counterweight
 
 
-def mechanics_checks(scanner: Scanner, stack: Stack, bodies: Mapping[str, Inertial]) -> list[Finding]:
+def mechanics_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Finding]:
     """Check torques, backlash and loads.
 
     Args:
-        scanner: angles and products.
-        stack: its layout.
+        layout: of the scanner.
         bodies: of `masses.link_bodies`.
     """
+    scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
     error_m = off_axis_doubt_m(bodies)
     off = "centre of mass off the axis"
-    if isinstance(stack, BeltStack):
-        loads = belt_loads(scanner, stack, rotor, weight, spin_up_nm(scanner, rotor, weight))
-    else:
-        loads = direct_loads(scanner, stack, weight)
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * error_m),
         *_torques(scanner, rotor, weight, weight.across_n * error_m),
         _flanks(scanner, rotor, weight, error_m),
-        *loads,
+        *belt_loads(layout, rotor, weight, spin_up_nm(scanner, rotor, weight)),
+        *direct_loads(layout, weight),
     ]
 
 
 def _torques(scanner: Scanner, rotor: Inertial, weight: Weight, error_nm: float) -> list[Finding]:
     servo = scanner.servo
-    limit = servo.lasting_torque_nm
-    static = weight.across_n * weight.off_axis_m
+    limit = servo.continuous_torque_nm
+    rubs = friction_nm(scanner)[1]
+    static = weight.across_n * weight.off_axis_m + rubs
     spin_up = spin_up_nm(scanner, rotor, weight)
-    what = f"against a fifth of the stall torque of {servo.name}"
+    what = f"with {rubs:g} N m of friction, against a fifth of the stall torque of {servo.name}"
     holds, spins = f"torque of the imbalance, {what}", f"torque to full speed in {SPIN_UP_S:g} s, {what}"
     return [
         at_most("static_torque", static, limit, "N m", SERVO, holds, error_nm),
@@ -61,31 +57,33 @@ def _torques(scanner: Scanner, rotor: Inertial, weight: Weight, error_nm: float)
 
 
 def spin_up_nm(scanner: Scanner, rotor: Inertial, weight: Weight) -> float:
-    """Return the torque that brings the rotor to full speed in SPIN_UP_S against its imbalance."""
+    """Return the torque that brings the rotor to full speed in SPIN_UP_S against imbalance and friction."""
     motion = scanner.angles.motion
     period = DEFAULT_PERIOD_S if motion is None else getattr(motion, "period_s", DEFAULT_PERIOD_S)
     x, y = rotor.centre_m[:2]
     about_axis = float(rotor.inertia_kg_m2[2, 2] + rotor.mass_kg * (x**2 + y**2))
-    return weight.across_n * weight.off_axis_m + about_axis * 2 * math.pi / period / SPIN_UP_S
+    still = weight.across_n * weight.off_axis_m + friction_nm(scanner)[1]
+    return still + about_axis * 2 * math.pi / period / SPIN_UP_S
 
 
 def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, error_m: float) -> Finding:
     """Check whether gravity moves the load from one flank of the gears to the other, through their backlash.
 
-    The friction of ring and bearing, which would keep one flank, is in no data sheet: RUBS_NM is assumed.
+    The friction of ring and bearing keeps one flank: the least that the catalogue states.
     """
+    rubs = friction_nm(scanner)[0]
     servo, torque, error = scanner.servo, weight.across_n * weight.off_axis_m, weight.across_n * error_m
     moment = f"{SERVO}: gravity turns {servo.name} with {with_error(torque, error)} N m"
     severity: Severity = "warning" if play_matters(scanner) else "note"
-    limit: float | None = RUBS_NM
+    limit: float | None = rubs
     hint = ""
-    if torque + error <= RUBS_NM:
-        severity, what = "ok", f"at most the friction of ring and bearing ({RUBS_NM:g})"
+    if torque + error <= rubs:
+        severity, what = "ok", f"at most the friction of ring and bearing ({rubs:g})"
     elif keeps_flank(scanner, rotor.centre_m[:2], error_m):
         severity, what, limit = "ok", "in one direction in every position of the sweep", None
-    elif torque <= RUBS_NM:
+    elif torque <= rubs:
         what = (
-            f"less than the friction of ring and bearing ({RUBS_NM:g}), but the centre of mass of "
+            f"less than the friction of ring and bearing ({rubs:g}), but the centre of mass of "
             f"{scanner.lidar.name} is undocumented: within {LIDAR_DOUBT_MM:g} mm of the middle of its body (assumed)"
         )
         hint = "compare the ripple that `scanwright scan` prints, and move the balancing weight, if any, to reduce it"

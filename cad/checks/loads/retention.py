@@ -19,10 +19,9 @@ from scanwright.cad.checks.limits import at_least, tidy
 from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.names import DECK, LIDAR, TRIPOD
-from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, PRINTED, STEEL, Hold, Material, hold_of
+from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, SERVO_CASE, TRIPOD
+from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
@@ -34,13 +33,15 @@ AXIAL_COS = 0.9  # to the rotation axis, above which a screw does not point at i
 
 def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
     """Check margin and thread engagement of each joint."""
-    return [check for joint in joints_of(assembly.layout) for check in _of_joint(scanner, assembly, joint)]
+    return [check for joint in assembly.layout.joints for check in _of_joint(scanner, assembly, joint)]
 
 
 def material_of(assembly: Assembly, body: str) -> Material:
     """Return the material of a made part or a bought body."""
     if body not in assembly.parts:
-        return BOUGHT
+        scanner = assembly.layout.scanner
+        kinds = {SERVO_CASE: scanner.servo.front.kind, LIDAR_BODY: scanner.lidar.base.kind}
+        return MOULDED if kinds.get(body) == "self_tapping" else BOUGHT
     process = assembly.parts[body].process
     if process == "printed":
         return PRINTED
@@ -50,7 +51,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
 def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
     """Return the parts and products that have no path to the deck but through a joint."""
     layout = assembly.layout
-    links = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in joints_of(layout) if other != joint]
+    links = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in layout.joints if other != joint]
     links += layout.drive.borne
     everything = {name for link in links for name in link} | {assembly.thing(joint.part), assembly.thing(joint.onto)}
     reached, fresh = {DECK, TRIPOD}, {DECK, TRIPOD}
@@ -69,7 +70,7 @@ def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Fi
         yield Finding("retention", "error" if carries else "note", subject, message)
         return
     bare = joint.fixing == "thread" and not joint.inserts and material_of(assembly, joint.onto).plastic
-    if bare and carries:
+    if bare and carries and joint.onto in assembly.parts:
         message = f"{both}: the lidar hangs on threads in bare plastic, which creeps"
         yield Finding("retention", "error", subject, message, hint="use nuts or inserts")
     yield _margin(scanner, assembly, joint, hold, hanging)
@@ -126,7 +127,7 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
     start = np.array([axis.start for axis in joint.axes]) / 1000
     along = np.array([axis.along for axis in joint.axes])
     shares = np.broadcast_to(np.eye(3) / joint.count, (joint.count, 3, 3)).copy()
-    if joint.heel_mm is not None:
+    if joint.heel_mm is not None and joint.count == 1:
         arm, heel = centre_m - start[0], joint.heel_mm / 1000
         aside = float(np.linalg.norm(arm - (arm @ along[0]) * along[0]))
         return float(np.hypot(1 + aside / heel, arm @ along[0] / heel)), 1.0
@@ -136,6 +137,10 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
         turned = np.linalg.pinv(stiffness, rcond=1e-9) @ cross_matrix(centre_m - start.mean(axis=0))
         shares += np.array([-cross_matrix(arm) @ turned for arm in arms])
     pulls = np.linalg.norm(np.einsum("ni,nij->nj", along, shares), axis=1)
+    if joint.heel_mm is not None:  # a pair: what turns about its line is held by the edge and both screws
+        line, arm = start[1] - start[0], centre_m - start.mean(axis=0)
+        turning = np.cross(line / np.linalg.norm(line), arm)
+        pulls = pulls + float(np.linalg.norm(turning)) / (2 * joint.heel_mm / 1000)
     across = shares - np.einsum("ni,nj,njk->nik", along, along, shares)
     return float(pulls.max()), float(np.linalg.norm(across, ord=2, axis=(1, 2)).max())
 

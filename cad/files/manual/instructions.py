@@ -12,9 +12,11 @@ from scanwright.cad.checks.products import products_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.files.manual.scenes import StepScene, scenes_of
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.layout.joints import CASE_EAR, DECK_MM, Joint
-from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.cad.layout.joints import DECK_MM, Joint
+from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT
 from scanwright.cad.layout.tightening import hold_of
+from scanwright.design.catalogue.holes import CASE_EAR_MM
+from scanwright.design.catalogue.measuring import measure_first
 from scanwright.design.catalogue.products import Product
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
@@ -29,6 +31,7 @@ LOCKED = (
     "creeps. `checks.json` lists under `retention` and `screw` the margin of each joint."
 )
 LOOK = "Look, then wire"
+HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
 LAST = "Turn the linkage by hand through its range: nothing touches, no cable pulls tight. "
 TO_COMPUTER = "Then join the leads of the ring's stator to USB and power."
 THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
@@ -68,7 +71,7 @@ def instructions_text(
         f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
         "",
         *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
-        f"Lengths of screws with nuts assume {CASE_EAR:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
+        f"Lengths of screws with nuts assume {CASE_EAR_MM:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
         "mm; all others follow from the parts.",
         "",
     ]
@@ -100,7 +103,8 @@ def _joined(assembly: Assembly) -> str:
     """Return what to connect when all parts are together: leads with a path are connected in their own step."""
     if assembly.layout.scanner.slip_ring is None:
         return IN_A_LOOP
-    laid = assembly.leads and all(lead.path is not None for lead in assembly.leads)
+    leads = assembly.layout.leads
+    laid = leads and all(lead.path is not None for lead in leads)
     return TO_COMPUTER if laid else THROUGH_RING
 
 
@@ -136,7 +140,16 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         inserts = f", through {nuts} in its bore"
-    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}."
+    first = _measure_first(assembly.layout.scanner, joint)
+    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}.{first and f' {first}'}"
+
+
+def _measure_first(scanner: Scanner, joint: Joint) -> str:
+    """What is to be measured before the screws of a joint are bought or driven; empty if it is verified."""
+    if joint.onto in (SERVO_HORN, SERVO_OUTPUT):
+        return measure_first(scanner.servo, *HORN_FIELDS)
+    devices: dict[str, Product] = {LIDAR_BODY: scanner.lidar, SERVO_CASE: scanner.servo}
+    return measure_first(devices[joint.onto], "holes") if joint.onto in devices else ""
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:

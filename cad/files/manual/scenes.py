@@ -13,9 +13,9 @@ import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.steps import steps_of
-from scanwright.cad.layout.balance.counterweight import Counterweight
 from scanwright.cad.layout.joints import ALL_SCREWS, Joint, screws
-from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, ROTOR_LEADS, STANDING_LEADS
+from scanwright.cad.layout.names import DECK, FIXED_CABLES, LIDAR, LIDAR_BODY, ROTOR_LEADS
+from scanwright.cad.layout.rotor.counterweight import Counterweight
 from scanwright.cad.parts.part_spec import Step
 from scanwright.design.arrays import Rotation, Vector
 
@@ -123,7 +123,7 @@ def _from(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> t
     """Return the direction it comes from: as in the exploded view, from below if all present bodies are above it."""
     lifted = "lidar" if thing == LIDAR else assembly.parts[thing].lifted if thing in assembly.parts else "axis"
     R = assembly.layout.stack.R()
-    if thing in (ROTOR_LEADS, STANDING_LEADS):
+    if thing in (ROTOR_LEADS, FIXED_CABLES):
         return np.zeros(3), np.eye(3)
     if lifted == "lidar":
         return R[:, 2], R

@@ -5,10 +5,13 @@ SI units; lengths of the stack are millimetres.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.loads import Weight
+from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, Weight
 
 PRELOAD_N = 10.0  # least, of each strand: what a small belt needs to sit in its grooves; assumed
 PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack strand tight
@@ -59,6 +62,38 @@ def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: f
 def belt_nm_per_rad(stack: BeltStack) -> float:
     """Stiffness of both strands about the axis, the servo held."""
     return 2 * stack.belt.stiffness_n / (stack.centre / 1000) * (stack.pitch_radius / 1000) ** 2
+
+
+def belt_shaft_bend(stack: BeltStack) -> ShaftBend:
+    """Return how far the shaft gives way at the hub.
+
+    A tube on two rigid supports, its hub beyond the upper one; the belt is two springs against turning.
+    """
+    EI = ALUMINIUM_PA * _second_moment(stack)
+    span = (stack.upper_middle - stack.lower_middle) / 1000
+    over = (stack.hub_bottom - stack.upper_middle) / 1000
+    coupled = over * span / (3 * EI) + over**2 / (2 * EI)
+    area = math.pi * (stack.tube_diameter**2 - stack.shaft_bore**2) / 4e6
+    return ShaftBend(
+        compliance=np.array(
+            [
+                [over**2 * span / (3 * EI) + over**3 / (3 * EI), coupled],
+                [coupled, span / (3 * EI) + over / EI],
+            ]
+        ),
+        twist_rad_per_nm=1 / belt_nm_per_rad(stack) + _twist(stack),
+        stretch_m_per_n=over / (ALUMINIUM_PA * area),
+    )
+
+
+def _second_moment(stack: BeltStack) -> float:
+    """Of the tube [m4]."""
+    return math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12
+
+
+def _twist(stack: BeltStack) -> float:
+    shear = ALUMINIUM_PA / (2 + 2 * METAL_POISSON)
+    return (stack.hub_bottom - stack.belt_middle) / 1000 / (shear * 2 * _second_moment(stack))
 
 
 def run_out_rad(stack: BeltStack, fit_mm: float) -> float:

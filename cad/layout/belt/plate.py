@@ -36,23 +36,23 @@ def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
         BuildError: the case has no four front holes beside the horn.
     """
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.case_screw]
+    screw = SCREWS[servo.front.screw]
     hole = passing_hole(screw, printer)
     opening = max(pulley_foot_radius(servo), servo.horn_diameter_mm / 2) + HORN_ROOM
     least = opening + hole / 2 + printer.min_wall_mm
-    free = [(x, y) for x, y in servo.case_holes_mm if math.hypot(x, y) >= least]
+    free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
     ys = sorted(y for x, y in free if x == widest and (-x, y) in free)
     if len(ys) < 2:
-        doubt = servo.doubt("case_holes_mm")
+        doubt = servo.caution("holes")
         raise BuildError(
-            f"{DRIVE_PLATE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
+            f"{DRIVE_PLATE}: ears: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
             f"pairs of front holes at least {least:.2f} mm from its axis, beside the pulley"
         )
     return DrivePlate(
         stack=stack,
         opening=opening,
-        ears=stack.horn + servo.case_holes_z_mm,
+        ears=stack.horn + servo.front.z_mm,
         screw=screw,
         hole=hole,
         holes=tuple((side * widest, y) for y in (ys[0], ys[-1]) for side in (1.0, -1.0)),

@@ -16,7 +16,7 @@ from scanwright.cad.layout.belt.stack import (
     BeltStack,
     drive_corners,
 )
-from scanwright.cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rotor_radius, rows_of
+from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
 from scanwright.cad.screws import SCREWS
@@ -33,7 +33,7 @@ TEETH_LEAST = 80  # a smaller pulley makes more of its run-out
 QUARTERS = (3, 2, 0)  # not 1: there the shelf would hide the index groove at +y
 
 
-def belt_stack(scanner: Scanner) -> BeltStack:
+def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
     """Lay out the scanner of a capsule ring.
 
     Raises:
@@ -47,7 +47,7 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     belt = _belt(scanner, ring)
     hub = SPIGOT_DIAMETER / 2 + HUB_WALL
     alone = BeltStack(
-        h=hub_height(scanner.lidar, R, hub, 0.0),
+        h=hub_height(envelope, R, hub, 0.0),
         R_rot_laser=rows_of(R),
         ring_length=ring.length_mm,
         ring_radius=ring.outer_diameter_mm / 2,
@@ -83,8 +83,8 @@ def belt_stack(scanner: Scanner) -> BeltStack:
     stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
     if covered_screws(scanner.lidar, stack):
         axis = leaning_least(R)
-        stack = replace(stack, h=hub_height(scanner.lidar, R, hub, 0.0, axis), sub_plate=axis)
-    return replace(stack, quarter=_quarter(scanner, stack))
+        stack = replace(stack, h=hub_height(envelope, R, hub, 0.0, axis), sub_plate=axis)
+    return replace(stack, quarter=_quarter(scanner, stack, envelope.radius(stack.sub_plate)))
 
 
 def centre_of(belt_teeth: int, teeth: int, pitch_mm: float) -> float:
@@ -130,7 +130,7 @@ def _check_horn(stack: BeltStack) -> None:
     if stack.horn > stack.teeth_low:
         servo = stack.servo
         raise BuildError(
-            f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.doubt('case_max_mm')}: the horn of "
+            f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.caution('case_max_mm')}: the horn of "
             f"{servo.name} stands {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
             "servo whose horn lies lower"
         )
@@ -159,15 +159,15 @@ def _least_centre(stack: BeltStack, servo: Servo) -> float:
     return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
 
 
-def _quarter(scanner: Scanner, stack: BeltStack) -> int:
-    """The side of the axis where the servo asks for the lowest deck; of equal ones, beside the axis and not above."""
+def _quarter(scanner: Scanner, stack: BeltStack, rotor_radius: float) -> int:
+    """The side of the axis on which the servo needs the lowest deck; of equal ones, beside the axis and not above."""
     up = scanner.angles.T_world_rot(0.0)[2, :3]
     normal = up if up[2] >= -1e-6 else -up
-    rotor = rotor_radius(scanner.lidar, stack.sub_plate) + SWEEP_MARGIN
+    rotor = rotor_radius + SWEEP_MARGIN
 
-    def asks(quarter: int) -> tuple[float, float]:
+    def needs(quarter: int) -> tuple[float, float]:
         turned = replace(stack, quarter=quarter)
         below = max(rotor, float((drive_corners(turned) @ -normal).max()))
         return round(below, 3), round(abs(float(turned.turn()[:, 0] @ normal)), 3)
 
-    return min(QUARTERS, key=asks)
+    return min(QUARTERS, key=needs)

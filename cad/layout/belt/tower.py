@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from scanwright.cad import outlines
 from scanwright.cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, PLATE_SCREW, BeltStack
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
+from scanwright.design.catalogue.products import Flange
 from scanwright.design.scanner import Scanner
 
 DISC_SCREW = SCREWS["M3"]
@@ -49,7 +50,7 @@ def disc_azimuths(stack: BeltStack) -> list[float]:
     return [math.pi / stack.flange.holes + 2 * math.pi * k / DISC_SCREWS + math.pi / 2 for k in range(DISC_SCREWS)]
 
 
-def flange_centres(stack: BeltStack) -> list[tuple[float, float]]:
+def flange_centres(flange: Flange) -> list[tuple[float, float]]:
     """Of the flange's holes, servo's frame; one at its +y."""
-    centres = outlines.polygon(stack.flange.circle_mm / 2, stack.flange.holes, math.pi / 2)
+    centres = outlines.polygon(flange.circle_mm / 2, flange.holes, math.pi / 2)
     return [(float(x), float(y)) for x, y in centres]

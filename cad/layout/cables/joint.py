@@ -14,7 +14,7 @@ import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import farther
 from scanwright.cad.layout.cables.path import Path, PathPiece
-from scanwright.cad.layout.cables.way import GAP, LeadRoom
+from scanwright.cad.layout.cables.route import GAP, LeadRoom
 from scanwright.design.arrays import Array
 
 LENGTH = 12.0  # crimps beside each other, and a shrink tube over them

@@ -5,7 +5,6 @@ Distances from convex shapes are those from their planes: never more than the tr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -14,8 +13,7 @@ from scipy.spatial import ConvexHull
 
 from scanwright.design.arrays import Array, Mask
 
-HUB_SIDES = 24
-Way = Callable[[Array], Mask]
+Inside = Callable[[Array], Mask]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,26 +32,18 @@ def shape_of(corners: Array, carved: bool = False) -> Shape:
     return Shape(ConvexHull(corners).equations, middle, float(np.linalg.norm(corners - middle, axis=1).max()), carved)
 
 
-def around_axis(radius: float, low: float, high: float) -> Array:
-    """Corners around a cylinder about the axis, shape (n, 3)."""
-    turn = 2 * math.pi * np.arange(HUB_SIDES) / HUB_SIDES
-    around = radius / math.cos(math.pi / HUB_SIDES)
-    ring = around * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    return np.concatenate([np.column_stack([ring, np.full(HUB_SIDES, z)]) for z in (low, high)])
-
-
-def beside(shapes: Sequence[Shape], points: Array, room: float, through: Way | None = None) -> Mask:
+def clear_of(shapes: Sequence[Shape], points: Array, room: float, through: Inside | None = None) -> Mask:
     """Whether points (n, 3) are farther than `room` from every shape, or `through` lets them be in one that is carved.
 
-    A shape's planes are asked for what its sphere does not clear.
+    A shape's planes decide on what its sphere does not clear.
     """
     clear = np.ones(len(points), dtype=bool)
     middles = np.array([shape.middle for shape in shapes])
     near = _square(middles, points) < np.array([[(shape.reach + room) ** 2] for shape in shapes])
     for k in np.flatnonzero(near.any(axis=1)).tolist():
-        shape, asked = shapes[k], np.flatnonzero(near[k] & clear)
-        outside = (shape.planes[:, :3] @ points[asked].T + shape.planes[:, 3:]).max(axis=0) > room
-        clear[asked] = outside | through(points[asked]) if shape.carved and through else outside
+        shape, left = shapes[k], np.flatnonzero(near[k] & clear)
+        outside = (shape.planes[:, :3] @ points[left].T + shape.planes[:, 3:]).max(axis=0) > room
+        clear[left] = outside | through(points[left]) if shape.carved and through else outside
     return clear
 
 

@@ -66,12 +66,12 @@ class Path:
         along = np.diff(corners, axis=0)
         along /= np.linalg.norm(along, axis=1)[:, None]
         angles = np.concatenate([[0.0], turns(corners), [0.0]])
-        found, here = [], corners[0]
+        pieces, here = [], corners[0]
         for i, direction in enumerate(along):
             there = corners[i + 1] - tangents[i + 1] * direction
             length = float((there - here) @ direction)
             if length > 1e-6:
-                found.append(PathPiece(here, (here + there) / 2, there, length, True))
+                pieces.append(PathPiece(here, (here + there) / 2, there, length, True))
             here = there
             if angles[i + 1] > STRAIGHT:
                 here = corners[i + 1] + tangents[i + 1] * along[i + 1]
@@ -79,8 +79,8 @@ class Path:
                 inwards /= np.linalg.norm(inwards)
                 depth = self.radius * (1 / math.cos(angles[i + 1] / 2) - 1)
                 middle = corners[i + 1] + depth * inwards
-                found.append(PathPiece(there, middle, here, float(self.radius * angles[i + 1]), False))
-        return found
+                pieces.append(PathPiece(there, middle, here, float(self.radius * angles[i + 1]), False))
+        return pieces
 
     def length(self) -> float:
         """From end to end."""
@@ -88,28 +88,28 @@ class Path:
 
     def least_radius(self) -> float:
         """Of the circles through the ends and the middle of its arcs: what was drawn, not what was asked for."""
-        found = [math.inf]
+        radii = [math.inf]
         for piece in self.pieces():
             if not piece.straight:
                 chord = float(np.linalg.norm(piece.end - piece.start))
                 depth = float(np.linalg.norm((piece.start + piece.end) / 2 - piece.middle))
-                found.append(depth / 2 + chord**2 / (8 * depth))
-        return round(min(found), 6)
+                radii.append(depth / 2 + chord**2 / (8 * depth))
+        return round(min(radii), 6)
 
     def points(self, step: float) -> Array:
         """Points along it, no further apart than a step, shape (n, 3)."""
-        found = []
+        runs = []
         for piece in self.pieces():
             share = np.linspace(0.0, 1.0, max(2, math.ceil(piece.length / step) + 1))[:, None]
             if piece.straight:
-                found.append(piece.start + share * (piece.end - piece.start))
+                runs.append(piece.start + share * (piece.end - piece.start))
                 continue
             # on the circle: start and end seen from its centre, turned from one to the other
             chord = (piece.start + piece.end) / 2 - piece.middle
             centre = piece.middle + self.radius * chord / np.linalg.norm(chord)
             angle, one, other = piece.length / self.radius, piece.start - centre, piece.end - centre
-            found.append(centre + (np.sin((1 - share) * angle) * one + np.sin(share * angle) * other) / math.sin(angle))
-        return np.concatenate(found)
+            runs.append(centre + (np.sin((1 - share) * angle) * one + np.sin(share * angle) * other) / math.sin(angle))
+        return np.concatenate(runs)
 
 
 def turns(corners: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Where a lead may run on the rotor: beside all that turns with it, above all that stands still, out of the fan.
+"""Where a lead may run on the rotor: clear of all that turns with it, above all that does not, out of the fan.
 
 Rotation frame at gamma = 0, mm.
 """
@@ -6,22 +6,18 @@ Rotation frame at gamma = 0, mm.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.balance.counterweight import LONGER, Counterweight
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.obstacles import Shape, around_axis, beside, farther, shape_of
+from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
-from scanwright.cad.layout.envelope import Box, box_corners, envelope_of
-from scanwright.cad.layout.layout import Layout
-from scanwright.cad.layout.linkage import neck_corners
-from scanwright.cad.screws import SCREWS
+from scanwright.cad.layout.envelope import Box, box_corners
+from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.catalogue.products import Lidar
 
-BAR_SCREW = SCREWS["M4"]
 BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens
 
 
@@ -33,9 +29,9 @@ class RotorRoom:
         shapes: convex shapes that turn.
         channels: cut from the neck, from their lower ends upwards, in the laser frame.
         R_rot_laser: shape (3, 3).
-        bearings_rad: first and last beam; None where a lead may stand in the fan.
+        bearings_rad: first and last beam; None if a lead may be in the fan.
         hidden_half_angle: of the cone about -z in which no beam sees anything anyway [rad].
-        floor: height of all that stands still under the rotor.
+        floor: height of all that does not turn under the rotor.
         deck: that the rotor turns over.
         others: middles of leads that run already, shape (n, 3), and how far to keep from them.
     """
@@ -53,16 +49,16 @@ class RotorRoom:
         """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
         room = half + gap
         clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room)
-        for keeps in (  # what is told soonest first, and of what is left only
+        for is_clear in (  # the cheapest first, and of what is left only
             lambda some: ~self._in_fan(some, half),
-            lambda some: beside(self.shapes, some, room, lambda inside: self._carved(inside, room)),
-            self.beside_others,
+            lambda some: clear_of(self.shapes, some, room, lambda inside: self._carved(inside, room)),
+            self.clear_of_others,
         ):
             left = np.flatnonzero(clear)
-            clear[left] = keeps(points[left])
+            clear[left] = is_clear(points[left])
         return np.asarray(clear)
 
-    def beside_others(self, points: Array) -> Mask:
+    def clear_of_others(self, points: Array) -> Mask:
         """Whether each point, shape (n, 3), is far enough from the leads that run already, shape (n,)."""
         return farther(points, *self.others)
 
@@ -91,42 +87,31 @@ class RotorRoom:
         bearing = (np.arctan2(y, x) - first + wide) % (2 * math.pi)
         distance = np.linalg.norm(points, axis=1)
         polar = np.arccos(np.clip(-points[:, 2] / distance, -1.0, 1.0)) + np.arcsin(np.minimum(1.0, half / distance))
-        seen = (np.abs(z) < half + BEAM) & (bearing < last - first + 2 * wide)
-        return np.asarray(seen & (polar > self.hidden_half_angle))
+        near = (np.abs(z) < half + BEAM) & (bearing < last - first + 2 * wide)
+        return np.asarray(near & (polar > self.hidden_half_angle))
 
 
-def room_of(layout: Layout) -> RotorRoom:
-    """The room on the rotor of one scanner, no lead in it yet."""
-    stack, p = layout.stack, layout.linkage
-    R = stack.R()
-    envelope = envelope_of(layout.scanner.lidar, stack.sub_plate)
-    boxes = [envelope.body, envelope.plate, envelope.under]
-    corners = [box_corners(box) @ R.T for box in (*boxes, *_stubs(layout.scanner.lidar))]
-    corners.append(around_axis(stack.hub_radius, stack.shoulder, -stack.h))
-    corners += [tie.corners(tie.inner) @ R.T for tie in p.plate_ties]
-    if p.hub_tie is not None:
-        corners.append(p.hub_tie.corners(stack.hub_radius))
-    if isinstance(layout.counterweight, Counterweight):
-        corners.extend(_bar(layout.counterweight))
-    bearings = layout.scanner.lidar.bearings_rad()
+def room_of(place: Placement, avoid: Iterable[Shape]) -> RotorRoom:
+    """The room on the rotor of one scanner, no lead in it yet.
+
+    Args:
+        place: where everything is.
+        avoid: what the parts that turn fill.
+    """
+    stack, envelope, lidar = place.stack, place.drive.envelope, place.scanner.lidar
+    R, sub_plate = stack.R(), stack.sub_plate
+    boxes = (envelope.body, envelope.plate(sub_plate), envelope.under(sub_plate), *_stubs(lidar))
+    bearings = lidar.bearings_rad()
     return RotorRoom(
-        shapes=(*(shape_of(points) for points in corners), shape_of(neck_corners(p, 0), carved=True)),
+        shapes=(*(shape_of(box_corners(box) @ R.T) for box in boxes), *avoid),
         channels=envelope.cables,
         R_rot_laser=R,
         bearings_rad=(float(bearings.min()), float(bearings.max())),
         hidden_half_angle=stack.sure_half_angle,
-        floor=_floor(layout),
-        deck=layout.deck,
+        floor=place.drive.floor,
+        deck=place.deck,
         others=(np.zeros((0, 3)), 0.0),
     )
-
-
-def _floor(layout: Layout) -> float:
-    """Height over all that stands still, or is as wide, below the hub."""
-    stack = layout.stack
-    if isinstance(stack, BeltStack):
-        return stack.pulley_top
-    return stack.ring_top if stack.bearing is None else stack.cage_top
 
 
 def _stubs(lidar: Lidar) -> list[Box]:
@@ -135,18 +120,3 @@ def _stubs(lidar: Lidar) -> list[Box]:
     return [
         ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm
     ]
-
-
-def _turned(corners: Array, azimuth: float) -> Array:
-    c, s = math.cos(azimuth), math.sin(azimuth)
-    return np.asarray(corners @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T)
-
-
-def _bar(bar: Counterweight) -> list[Array]:
-    """Corners of the room of a counterweight on its ear, and of the heads of its screws wherever it slides."""
-    ear, half = bar.ear, max(bar.ear.half_width, bar.section[0] / 2)
-    above, below = ear.high + bar.section[1], ear.low - BAR_SCREW.head_height
-    wide = BAR_SCREW.head_diameter / 2
-    boxes: list[Box] = [((0.0, -half, ear.low), (max(bar.end + LONGER, ear.end), half, above))]
-    boxes += [((first - wide, -wide, below), (last + wide, wide, ear.low)) for first, last in ear.slots]
-    return [_turned(box_corners(box), ear.azimuth) for box in boxes]

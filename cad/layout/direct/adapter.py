@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scanwright.cad.layout.direct.cage import FOOT_RADIUS, BearingCage, plate_half_x
+from scanwright.cad.layout.direct.cage import FOOT_RADIUS, Ears, plate_half_x
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.names import SLIP_RING_ADAPTER
-from scanwright.cad.screws import SCREWS, Screw, passing_hole
+from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.design.catalogue.products import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 PLATE = 6.0
-PLAY = 0.25  # between arm and stator, on the radius
+ARM_GAP = 0.25  # between arm and stator, on the radius
 ARM = 5.0
 ARM_HALF_WIDTH = 10.0
 UNDER_ROOF = 12.0  # how far the arms end below the ring's top, under a cage
@@ -21,56 +21,52 @@ UNDER_ROOF = 12.0  # how far the arms end below the ring's top, under a cage
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipRingAdapter:
-    """Lengths in mm; the servo's x and y are those of the rotation frame."""
+    """The arms around the ring, and the fork that they stand on, unless that is the base of a cage."""
 
     stack: DirectStack
-    front: float  # z of the case's front
-    ears: float  # z of the planes around the front holes
-    opening: float  # half width of the fork
-    half_x: float
-    screw: Screw
-    hole: float  # diameter
-    holes: tuple[tuple[float, float], ...]
+    fork: Ears | None
 
 
-def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter:
-    """Parameters of the adapter of one scanner whose axis no bearing carries: with one it is the base of its cage.
+def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter | None:
+    """Parameters of the adapter of one scanner; None without a ring.
 
     Raises:
-        BuildError: the case has no four holes beside the turning flange.
+        BuildError: no bearing carries the axis, and the case has no four holes beside the turning flange.
     """
+    if scanner.slip_ring is None:
+        return None
+    if stack.bearing is not None:
+        return SlipRingAdapter(stack=stack, fork=None)
     servo = scanner.servo
-    screw = SCREWS[servo.case_screw]
-    hole = passing_hole(screw, scanner.printer)
+    screw = SCREWS[servo.front.screw]
     holes = fork_holes(servo, stack)
     if not holes:
-        doubt = servo.doubt("case_holes_mm")
+        doubt = servo.caution("holes")
         raise BuildError(
-            f"{SLIP_RING_ADAPTER}: fork: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
+            f"{SLIP_RING_ADAPTER}: fork: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
             f"pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
         )
-    return SlipRingAdapter(
-        stack=stack,
-        front=stack.horn + servo.case_max_mm[2],
-        ears=stack.horn + servo.case_holes_z_mm,
+    fork = Ears(
+        front=servo.case_max_mm[2],
+        seats=servo.front.z_mm,
         opening=_opening(stack),
         half_x=plate_half_x(servo, screw),
         screw=screw,
-        hole=hole,
+        hole=passing_hole(screw, scanner.printer),
         holes=holes,
     )
+    return SlipRingAdapter(stack=stack, fork=fork)
 
 
-def arm_top(stack: DirectStack, holder: SlipRingAdapter | BearingCage) -> float:
+def arm_top(p: SlipRingAdapter) -> float:
     """Height of the arms' upper ends."""
-    below = 5.0 if isinstance(holder, SlipRingAdapter) else UNDER_ROOF
-    return stack.ring_bottom + min(30.0, stack.ring_length - below)
+    return p.stack.ring_bottom + min(30.0, p.stack.ring_length - (UNDER_ROOF if p.fork is None else 5.0))
 
 
 def fork_holes(servo: Servo, stack: DirectStack) -> tuple[tuple[float, float], ...]:
-    """The nearest and the furthest pair of front holes behind the turning flange; none where there are no two pairs."""
-    behind = sorted({y for _, y in servo.case_holes_mm if y < _behind(stack)}, reverse=True)
-    rows = [sorted(hole for hole in servo.case_holes_mm if hole[1] == y) for y in behind]
+    """The nearest and the furthest pair of front holes behind the turning flange; none if there are no two pairs."""
+    behind = sorted({y for _, y in servo.front.places if y < _behind(stack)}, reverse=True)
+    rows = [sorted(hole for hole in servo.front.places if hole[1] == y) for y in behind]
     widest = max((row[-1][0] for row in rows), default=0.0)
     rows = [row for row in rows if len(row) == 2 and row[-1][0] == widest]
     return (*rows[0], *rows[-1]) if len(rows) > 1 else ()

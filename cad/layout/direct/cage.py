@@ -32,18 +32,25 @@ POISSON = 0.35
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BearingCage:
-    """Lengths in mm, azimuths in rad; the servo's x and y are those of the rotation frame."""
+class Ears:
+    """The front holes of a servo that a plate is screwed to, heights above the horn; x and y of the rotation frame."""
 
-    stack: DirectStack
-    bearing: Bearing
-    front: float  # z of the case's front
-    ears: float  # z of the planes around the front holes
-    opening: float  # radius, around the horn flange
-    half_x: float
+    front: float  # of the case
+    seats: float  # of the planes around the holes
+    opening: float  # radius, or half width of a fork, around the horn flange
+    half_x: float  # of the plate
     screw: Screw
     hole: float  # diameter
     holes: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingCage:
+    """Lengths in mm, azimuths in rad."""
+
+    stack: DirectStack
+    bearing: Bearing
+    ears: Ears
     cage_hole: float  # diameter, in the legs
     thread: Thread  # of the radial screws, in the boss
     legs: tuple[float, ...]  # azimuths of the bell's radial screws
@@ -52,7 +59,7 @@ class BearingCage:
     @property
     def low(self) -> float:
         """Height of the base's lower face."""
-        return self.front + SEAT_GAP
+        return _base_low(self.stack, self.ears)
 
     @property
     def high(self) -> float:
@@ -65,52 +72,63 @@ class BearingCage:
         return (self.low + self.high) / 2
 
 
-def cage_of(scanner: Scanner, stack: DirectStack) -> BearingCage | None:
-    """Parameters of the cage of one scanner; None where the horn carries the rotor alone.
+def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
+    """The holes for the base of a cage.
 
     Raises:
         BuildError: the case has no four holes beside the turning flange.
     """
-    if stack.bearing is None:
-        return None
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.case_screw]
+    screw = SCREWS[servo.front.screw]
     hole = passing_hole(screw, printer)
     opening = stack.flange_radius + 1.0
     least = opening + hole / 2 + printer.min_wall_mm
-    free = [(x, y) for x, y in servo.case_holes_mm if math.hypot(x, y) >= least]
+    free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
     if len(holes) < 4:
-        doubt = servo.doubt("case_holes_mm")
+        doubt = servo.caution("holes")
         raise BuildError(
-            f"{CAGE_BASE}: ears: case_holes_mm = {list(servo.case_holes_mm)}{doubt}: {servo.name} needs two "
+            f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
             f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
-    thread = thread_in_part(CAGE_SCREW, printer, carries=True)
-    front = stack.horn + servo.case_max_mm[2]
-    if thread.trap is not None and not has_room(thread.trap, stack, front + SEAT_GAP, printer.min_wall_mm):
-        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False, carries=True)
-    return BearingCage(
-        stack=stack,
-        bearing=stack.bearing,
-        front=front,
-        ears=stack.horn + servo.case_holes_z_mm,
+    return Ears(
+        front=servo.case_max_mm[2],
+        seats=servo.front.z_mm,
         opening=opening,
         half_x=plate_half_x(servo, screw),
         screw=screw,
         hole=hole,
         holes=holes,
+    )
+
+
+def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | None:
+    """Parameters of the cage of one scanner; None if the horn carries the rotor alone."""
+    if stack.bearing is None:
+        return None
+    printer = scanner.printer
+    thread = thread_in_part(CAGE_SCREW, printer, carries=True)
+    if thread.trap is not None and not has_room(thread.trap, stack, _base_low(stack, ears), printer.min_wall_mm):
+        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False, carries=True)
+    return BearingCage(
+        stack=stack,
+        bearing=stack.bearing,
+        ears=ears,
         cage_hole=passing_hole(CAGE_SCREW, printer),
         thread=thread,
-        legs=tuple(_leg_screw(middle, holes, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
+        legs=tuple(_leg_screw(middle, ears.holes, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
         fit=printer.fit_clearance_mm,
     )
 
 
 def plate_half_x(servo: Servo, screw: Screw) -> float:
     """Half width of a plate on the servo's front: that of the case, or what the heads of the ears' screws need."""
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.case_holes_mm) + screw.head_room + HEAD_WALL)
+    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.head_room + HEAD_WALL)
+
+
+def _base_low(stack: DirectStack, ears: Ears) -> float:
+    return stack.horn + ears.front + SEAT_GAP
 
 
 def _boss_top(stack: DirectStack, low: float) -> float:
@@ -123,24 +141,27 @@ def has_room(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
     return 3 * quarter - trap.corner >= wall and trap.corner <= quarter + RING_ABOVE_BASE / 2
 
 
-def stiffness_n_per_m(p: BearingCage) -> float:
-    """Sideways stiffness at the bearing, of legs (shear, bending, rocking) and base by beam formulas, halved.
+def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
+    """Sideways stiffness of a cage at the bearing: legs (shear, bending, rocking) and base by beam formulas, halved.
 
-    Screws and plates are stiffer or softer than beams: taken for right within a factor of two.
+    Screws and plates are stiffer or softer than beams: assumed to be right within a factor of two.
     """
-    stack, E = p.stack, PLASTIC_PA * 1e-6  # N/mm2
+    E = PLASTIC_PA * 1e-6  # N/mm2
     G = E / (2 + 2 * POISSON)
+    low = _base_low(stack, ears)
+    high = _boss_top(stack, low)
+    foot = (low + high) / 2
     radius, wall = (stack.cage_inner + stack.cage_outer) / 2, stack.cage_outer - stack.cage_inner
     half_window = math.asin(WINDOW_HALF_WIDTH / stack.cage_inner) if stack.ring_length > 0 else 0.0
     width = radius * (math.pi / 2 - 2 * half_window)
-    length, lever = stack.cage_roof - p.foot, stack.bearing_middle - p.foot
+    length, lever = stack.cage_roof - foot, stack.bearing_middle - foot
     # four legs at 45 deg: two of them bend and shear across their width, all four stretch
     bending = length**3 / (2 * E * wall * width**3)
     shear = length / (2 * 5 / 6 * G * wall * width)
     rocking = (lever - length / 2) ** 2 * length / (4 * E * wall * width * radius**2 / 2)
     reach, span = radius * math.sqrt(0.5), 2 * radius * math.sqrt(0.5)
-    beyond = reach - max(y for _, y in p.holes)
-    second_moment = (stack.cage_inner - p.opening) * 2 * (p.high - p.low) ** 3 / 12
+    beyond = reach - max(y for _, y in ears.holes)
+    second_moment = (stack.cage_inner - ears.opening) * 2 * (high - low) ** 3 / 12
     base = (lever / span) ** 2 * beyond**3 / (3 * E * second_moment)
     return 0.5e3 / (bending + shear + rocking + base)
 
@@ -156,9 +177,8 @@ def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius
     return max((math.radians(middle_deg + turn) for turn in (0.0, 15.0, -15.0)), key=lambda a: round(clearance(a), 6))
 
 
-def share_weight(scanner: Scanner, stack: DirectStack, weight: Weight) -> Supported:
+def share_weight(scanner: Scanner, stack: DirectStack, cage: BearingCage | None, weight: Weight) -> Supported:
     """How horn and bearing share the weight of all that turns."""
-    cage = cage_of(scanner, stack)
     if cage is None:
         return hanging(weight, stack, shaft_modulus_pa(scanner, stack))
-    return supported(weight, stack, stiffness_n_per_m(cage))
+    return supported(weight, stack, stiffness_n_per_m(stack, cage.ears))

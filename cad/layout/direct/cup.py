@@ -9,36 +9,45 @@ from __future__ import annotations
 
 import math
 
+from scanwright.cad.layout.direct.frame import heads_over_horn_mm, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.envelope import hub_height, lidar_pose, rows_of
+from scanwright.cad.layout.envelope import Envelope, hub_height, rows_of
 from scanwright.cad.layout.hub import CUP_HUB_WALL
-from scanwright.cad.screws import SCREWS
+from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE, horn_thread_mm
+from scanwright.cad.screws import SCREWS, passing_hole
+from scanwright.design.arrays import Array
+from scanwright.design.catalogue.products import Servo
 from scanwright.design.scanner import Scanner
 
 CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it
 FLOOR = 4.0  # on the horn
+ROUND_HOLE = 0.05  # what the facets of a hole take from the wall beside it
+FLOOR_ON_FOOT = 3.0  # over the foot of a cup on a servo frame
 OVER_BOSS = 2.0  # of the horn: play, and a floor that is no skin
 
 
-def cup_stack(scanner: Scanner) -> DirectStack:
-    """Lay out the stack of one scanner without a ring and a bearing.
-
-    Raises:
-        BuildError: the lidar would hang upside down.
-    """
-    servo, R = scanner.servo, lidar_pose(scanner)
+def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
+    """Lay out the stack of one scanner without a ring and a bearing; R is the laser in the rotation frame, (3, 3)."""
+    servo = scanner.servo
     floor = max(FLOOR, servo.horn_boss_height_mm + OVER_BOSS)
     bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].head_room
     diameter = float(math.ceil(bore + 2 * CUP_WALL))
-    hub_radius = diameter / 2 + CUP_HUB_WALL
+    hub_radius = flange = diameter / 2 + CUP_HUB_WALL
+    foot, foot_height, grip = 0.0, 0.0, 0.0
+    if needs_frame(servo):  # it must widen above the heads of the frame's screws
+        foot = (servo.horn_circle_mm + passing_hole(SCREWS[servo.horn_screw], scanner.printer)) / 2
+        foot += scanner.printer.min_wall_mm + ROUND_HOLE
+        foot_height, flange = heads_over_horn_mm(servo), diameter / 2
+        grip = _grip(servo, max(floor, foot_height + FLOOR_ON_FOOT))
+        floor = max(grip, foot_height + flange - foot)  # a cone of 45 deg needs no support
     return DirectStack(
-        h=hub_height(scanner.lidar, R, hub_radius, 0.0),
+        h=hub_height(envelope, R, hub_radius, 0.0),
         R_rot_laser=rows_of(R),
         ring_length=0.0,
         ring_radius=0.0,
         ring_bore=0.0,
         shaft_diameter=diameter,
-        flange_radius=hub_radius,
+        flange_radius=flange,
         flange_thickness=floor,
         collar_radius=servo.horn_circle_mm / 2,
         collar_height=floor,
@@ -47,4 +56,14 @@ def cup_stack(scanner: Scanner) -> DirectStack:
         bearing=None,
         sub_plate=None,
         cup_bore=bore,
+        foot_radius=foot,
+        foot_height=foot_height,
+        grip=grip,
     )
+
+
+def _grip(servo: Servo, least: float) -> float:
+    """Return the thickness from a least one on at which a screw of a standard length fills the horn's thread."""
+    deep = horn_thread_mm(servo) - THREAD_FREE
+    lengths = LENGTHS[servo.horn_screw]
+    return max(least, next((length for length in lengths if length >= least + deep), lengths[-1]) - deep)

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from scanwright.cad.layout import names
+from scanwright.cad.layout.direct.adapter import adapter_of
+from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
+from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, frame_of, needs_frame, no_rear_holes
+from scanwright.cad.layout.direct.leads import lead_exits, stator_exit
+from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mass, Mounted, Need, Rod
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station
+from scanwright.cad.layout.envelope import Envelope
+from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.products import Servo
-from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
 # The order that always works: what comes over the shaft follows what carries it.
 BUILT = (
+    names.SERVO_FRAME,
     names.BASE_MOUNT,
     names.TRIPOD_FOOT,
     names.DECK,
@@ -28,106 +36,163 @@ BUILT = (
     names.RING,
     names.JOURNAL_SLEEVE,
     names.BEARING_CAGE,
-    names.STANDING_LEADS,
+    names.FIXED_CABLES,
     names.LIDAR,
     names.SUB_PLATE,
     names.COUNTERWEIGHT,
     names.ALIGNMENT_LINKAGE,
     names.ROTOR_LEADS,
 )
-STACKED = (
-    names.BASE_MOUNT,
-    names.SERVO,
-    names.SERVO_SHAFT,
-    names.HORN_CUP,
-    names.CAGE_BASE,
-    names.SLIP_RING_ADAPTER,
-    names.RING,
-    names.BEARING_CAGE,
-    names.BEARING,
-    names.JOURNAL_SLEEVE,
-    names.ALIGNMENT_LINKAGE,
-)
 ADAPTER_ARMS = 8.0  # beyond the ring
 CAGE_HEADS = 4.0  # of the screws of the cage, beyond it
 
 
-def direct_drive(scanner: Scanner) -> DriveLayout:
+def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     """The drive of a scanner whose ring lets the shaft through, or that has none.
 
     Raises:
         BuildError: it cannot be laid out.
     """
-    stack, ring = direct_stack(scanner), scanner.slip_ring
-    (x0, y0, z0), (x1, y1, z1) = scanner.servo.case_min_mm, scanner.servo.case_max_mm
-    case = Cuboid((x0, y0, stack.horn + z0), (x1, y1, stack.horn + z1))
-    masses = [Mass(names.SERVO, scanner.servo.mass_g, Cuboid(case.low, (x1, y1, stack.horn)))]  # with its horn
-    rods: list[Rod] = []
-    if ring is not None:
-        rods.append(Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top))
-        masses.append(Mass(names.RING, ring.mass_g, rods[0].cuboid(), turning=0.5))
-    if stack.bearing is not None:
-        top = stack.bearing_top
-        bearing = Rod(stack.bearing.outer_mm / 2, top - stack.bearing.width_mm, top)
-        masses.append(Mass(names.BEARING, stack.bearing.mass_g, bearing.cuboid(), turning=0.5))
+    stack, ears = direct_stack(scanner, envelope)
+    frame = frame_of(scanner, stack) if needs_frame(scanner.servo) else None
+    mounted = _mounted(scanner.servo, stack, frame)
+    adapter = adapter_of(scanner, stack)
+    cage = None if ears is None else cage_of(scanner, stack, ears)
+    leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
+    cage_n_per_m = 0.0 if cage is None else stiffness_n_per_m(stack, cage.ears)
+    height = stack.ring_top if stack.bearing is None else stack.cage_top
     return DriveLayout(
+        envelope=envelope,
         stack=stack,
+        stations=tuple(_stations(scanner, stack, frame, cage)),
+        records=tuple(record for record in (stack, frame, adapter, cage) if record is not None),
         shaft=stack.shaft,
-        products=() if stack.bearing is None else (stack.bearing,),
-        mounted=_mounted(scanner.servo, stack),
-        masses=tuple(masses),
-        shapes=(case, *rods),
+        bend=shaft_bend(stack, shaft_modulus_pa(scanner, stack), cage_n_per_m),
+        mounted=mounted,
+        servo_pose=(np.eye(3), np.array([0.0, 0.0, stack.horn])),
+        floor=height,
+        ceiling=height,
+        lead_exits=partial(lead_exits, stack),
+        leads_leave=leads_leave,
+        tied_to="neck",
+        no_hub_tie="",
+        stator_exit=stator_exit(scanner, stack, mounted.rear),
+        bears=partial(_bears, scanner, stack),
         built=BUILT,
-        stacked=STACKED,
         left_out=tuple(_left_out(scanner, stack)),
-        borne=() if stack.bearing is None else ((names.JOURNAL_SLEEVE, names.SERVO_SHAFT),),
-        needs=tuple(_needs(scanner, stack)),
+        borne=() if cage is None else ((names.JOURNAL_SLEEVE, names.SERVO_SHAFT),),
     )
 
 
-def _needs(scanner: Scanner, stack: DirectStack) -> Iterator[Need]:
-    if scanner.slip_ring is not None:
-        yield Need("wiring", "cable tie", "cable tie around the ring's stator", "groove of the adapter")
-    if stack.bearing is not None:
-        ring = f"retaining ring DIN 471 - {stack.retaining_ring}"
-        compound = "retaining compound for metal, medium strength"
-        yield Need("consumable", "retaining ring", ring, "groove of the shaft, under the bearing's sleeve")
-        yield Need("consumable", "retaining compound", compound, "sleeve on the shaft")
-        yield Need("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat")
+def _stations(
+    scanner: Scanner, stack: DirectStack, frame: ServoFrame | None, cage: BearingCage | None
+) -> Iterator[Station]:
+    servo, ring, bearing = scanner.servo, scanner.slip_ring, stack.bearing
+    (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
+    low, half_x = (x0, y0, stack.horn + z0), max(-x0, x1)
+    case = Cuboid(low, (x1, y1, stack.horn + z1))
+    yield Station(
+        name=names.SERVO,
+        body="base",
+        z_mm=(low[2], stack.horn),
+        radius_mm=max(half_x, -y0, y1),
+        product=servo,
+        box=Cuboid(low, (x1, y1, stack.horn)),  # with its horn
+        shape=case,
+    )
+    if frame is not None:
+        yield Station(name=names.SERVO_FRAME, body="base", z_mm=(frame.low, frame.high), radius_mm=frame.reach_x)
+    yield Station(
+        name=stack.shaft, body="servo_horn", z_mm=(stack.horn, stack.spigot_top), radius_mm=stack.flange_radius
+    )
+    if cage is not None and ring is None:
+        yield Station(name=names.CAGE_BASE, body="base", z_mm=(cage.low, cage.high), radius_mm=stack.cage_outer)
+    if ring is not None:
+        rod = Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top)
+        around, z = stack.ring_radius + ADAPTER_ARMS, (stack.horn, stack.ring_top)
+        yield Station(name=names.SLIP_RING_ADAPTER, body="base", z_mm=z, radius_mm=around)
+        yield Station(
+            name=names.RING,
+            body="base",
+            z_mm=(rod.low, rod.high),
+            radius_mm=rod.radius,
+            product=ring,
+            box=rod.cuboid(),
+            turning=0.5,
+            shape=rod,
+        )
+    if cage is not None and bearing is not None:
+        rod = Rod(bearing.outer_mm / 2, stack.bearing_top - bearing.width_mm, stack.bearing_top)
+        z = (cage.foot, stack.cage_top)
+        yield Station(name=names.BEARING_CAGE, body="base", z_mm=z, radius_mm=stack.cage_outer)
+        yield Station(
+            name=names.BEARING,
+            body="base",
+            z_mm=(rod.low, rod.high),
+            radius_mm=rod.radius,
+            product=bearing,
+            box=rod.cuboid(),
+            turning=0.5,
+        )
+        z = (stack.hub_bottom, stack.shoulder)
+        yield Station(name=names.JOURNAL_SLEEVE, body="rotor", z_mm=z, radius_mm=bearing.bore_mm / 2)
+    z = (stack.shoulder, -stack.h)
+    yield Station(name=names.ALIGNMENT_LINKAGE, body="rotor", z_mm=z, radius_mm=stack.hub_radius)
 
 
-def _mounted(servo: Servo, stack: DirectStack) -> Mounted:
-    """The servo's case.
+def _bears(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
+    """Only a horn without a bearing can have too much by a bar; if it has too much without one, the check says so."""
+    if stack.bearing is not None or not horn_bears(scanner, stack):
+        return True
+    return horn_bears_balanced(scanner, stack, bar_g, bar_z)
+
+
+def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Mounted:
+    """The servo's case, or the frame that holds it.
 
     Raises:
-        BuildError: it has no holes on its back.
+        BuildError: it has no holes that may carry it.
     """
-    holes = servo.case_rear_holes_mm
-    if len(holes) < 4:
-        doubt = servo.doubt("case_rear_holes_mm")
-        raise BuildError(
-            f"{names.BASE_MOUNT}: deck: case_rear_holes_mm = {list(holes)}{doubt}: {servo.name} has no "
-            "four holes on its back to stand on; take a capsule ring, whose plate holds its front, or another servo"
-        )
+    if len(servo.rear.places) < 4 and frame is None:
+        raise no_rear_holes(servo)
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
         around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
+    discs = ((around, stack.horn), (around, top))
+    if frame is not None:
+        x, z = frame.reach_x, (frame.low, frame.high)
+        return Mounted(
+            onto=names.SERVO_FRAME,
+            rear=frame.low,
+            ears=frame.low,
+            screw=FOOT_SCREW,
+            holes=frame.feet,
+            fixing="nut",
+            corners=np.array([(sign * x, y, height) for sign in (-1, 1) for y in frame.ends_y for height in z]),
+            discs=discs,
+            on_flat_deck=True,
+            thread_mm=FOOT,
+        )
     return Mounted(
         onto=names.SERVO_CASE,
         rear=stack.horn + servo.case_min_mm[2],
-        ears=stack.horn + servo.case_rear_holes_z_mm,
-        screw=SCREWS[servo.case_screw],
-        holes=_corner_holes(holes),
+        ears=stack.horn + servo.rear.z_mm,
+        screw=SCREWS[servo.rear.screw],
+        holes=_corner_holes(servo.rear.places),
+        fixing=fixing_of(servo.rear),
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
-        discs=((around, stack.horn), (around, top)),
-        stands_alone=True,
+        discs=discs,
+        on_flat_deck=True,
+        thread_mm=servo.rear.depth_mm,
     )
 
 
 def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
     if scanner.slip_ring is None:
         yield LeftOut(names.SLIP_RING_ADAPTER, "this scanner has no slip ring", 1, "parts")
+    if not needs_frame(scanner.servo):
+        yield LeftOut(names.SERVO_FRAME, f"{scanner.servo.name} is held by the holes in its rear", 1, "parts")
     if stack.bearing is None:
         servo = scanner.servo
         why = f"the horn of {servo.name} carries an axis this upright alone"

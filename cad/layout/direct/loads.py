@@ -10,10 +10,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
+    METAL_POISSON,
+    ShaftBend,
     Weight,
     rated_moment_nm,
     tilt_sine,
@@ -29,6 +33,7 @@ LINKAGE_OFF_AXIS_MM = 20.0
 JOURNAL_WALL = 1.8  # of the bearing's sleeve between bore and wires
 WIRE_DEPTH = 6.0  # least depth of the channel for the ring's wires
 HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
+SHEAR_SHARE = 0.9  # of a round section that carries shear
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +139,37 @@ def hanging(weight: Weight, stack: DirectStack, modulus_pa: float) -> Supported:
     moment = weight.across_n * (weight.lever_m - above_horn / 1000) + weight.along_n * weight.off_axis_m
     slope = float((moment * thick / 1000 / (modulus_pa * math.pi / 4 * (outer**4 - inner**4))).sum())
     return Supported(weight.moment_nm, 0.0, slope)
+
+
+def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0) -> ShaftBend:
+    """Return how far the beam from horn to hub gives way at the hub.
+
+    Round sections or tubes (Timoshenko), clamped in the horn; a spring braces the bearing's sleeve sideways.
+
+    Args:
+        stack: its lengths and radii.
+        modulus_pa: of elasticity.
+        cage_n_per_m: sideways stiffness of the cage that holds the bearing, 0 without one.
+    """
+    length = (stack.hub_bottom - stack.horn) / 1000
+    above_horn, thick = stack.slices(1000 * length, stack.waist_diameter)
+    z, dz = above_horn / 1000, thick / 1000
+    outer, inner = stack.radius_at(above_horn, stack.waist_diameter) / 1000, stack.bore_at(above_horn) / 1000
+    area, second_moment = math.pi * (outer**2 - inner**2), math.pi / 4 * (outer**4 - inner**4)
+    shear_pa = modulus_pa / (2 + 2 * METAL_POISSON)
+    lever = length - z
+    bend = dz / (modulus_pa * second_moment)
+    shear = float((dz / (SHEAR_SHARE * shear_pa * area)).sum())
+    free = np.array(
+        [[(bend * lever**2).sum() + shear, (bend * lever).sum()], [(bend * lever).sum(), bend.sum()]]
+    )  # of force and moment at the end
+    reach = np.array([1.0, (stack.bearing_middle - stack.hub_bottom) / 1000])  # the bearing moves by this
+    braced = np.outer(free @ reach, reach @ free) * cage_n_per_m / (1 + cage_n_per_m * float(reach @ free @ reach))
+    return ShaftBend(
+        compliance=free - braced,
+        twist_rad_per_nm=float((dz / (shear_pa * 2 * second_moment)).sum()),
+        stretch_m_per_n=float((dz / (modulus_pa * area)).sum()),
+    )
 
 
 def shaft_modulus_pa(scanner: Scanner, stack: DirectStack) -> float:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
+from scanwright.cad.layout.direct.cage import BearingCage, Ears, stiffness_n_per_m
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, UNRATED_NM, ShaftMetal, heaviest, supported
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import Weight, rated_moment_nm
@@ -46,9 +46,9 @@ class Contribution:
     moment_nm: float
 
 
-def offsets_mm(cage: BearingCage) -> dict[str, float]:
+def offsets_mm(ears: Ears) -> dict[str, float]:
     """Every tolerance by its words: how far it puts the sleeve's middle off the bearing's."""
-    from_axis = abs(sum(y for _, y in cage.holes)) / len(cage.holes)
+    from_axis = abs(sum(y for _, y in ears.holes)) / len(ears.holes)
     return {
         f"sleeve trued to {TRUED_MM:g} over a turn": TRUED_MM / 2,
         "runout of the inner ring": INNER_RING_MM / 2,
@@ -59,55 +59,49 @@ def offsets_mm(cage: BearingCage) -> dict[str, float]:
     }
 
 
-def contributions(
-    scanner: Scanner, stack: DirectStack, weight: Weight, metal: ShaftMetal = ALUMINIUM
-) -> list[Contribution]:
-    """Moments on the horn of a scanner with a bearing, the weight first; empty without one."""
-    cage = cage_of(scanner, stack)
-    if cage is None:
-        return []
-    shared = supported(weight, stack, stiffness_n_per_m(cage), metal)
-    off = offsets_mm(cage)
+def contributions(cage: BearingCage, weight: Weight, metal: ShaftMetal = ALUMINIUM) -> list[Contribution]:
+    """Moments on the horn of a scanner with a bearing, the weight first."""
+    stack = cage.stack
+    shared = supported(weight, stack, stiffness_n_per_m(stack, cage.ears), metal)
+    off = offsets_mm(cage.ears)
     return [
         Contribution("weight", None, shared.horn_moment_nm),
         *(Contribution(what, mm, mm / 1000 * shared.misaligned_nm_per_m) for what, mm in off.items()),
     ]
 
 
-def worst_moment_nm(scanner: Scanner, stack: DirectStack, weight: Weight) -> dict[str, float]:
+def worst_moment_nm(cage: BearingCage, weight: Weight) -> dict[str, float]:
     """Sum of all contributions by metal."""
     return {
-        metal.name: sum(each.moment_nm for each in contributions(scanner, stack, weight, metal))
-        for metal in (ALUMINIUM, STEEL)
+        metal.name: sum(each.moment_nm for each in contributions(cage, weight, metal)) for metal in (ALUMINIUM, STEEL)
     }
 
 
-def with_waist(scanner: Scanner, stack: DirectStack) -> DirectStack:
+def with_waist(scanner: Scanner, stack: DirectStack, ears: Ears) -> DirectStack:
     """The stack with a waist that the horn bears in every metal and that a stalled servo does not twist off.
 
     What bends less for what is out of line twists less under the lidar too, by one ratio for a round bar of any length:
-    so of every length the thickest diameter, and of the lengths the shortest, since a low cage is a stiff one. Where
-    the horn bears none of them the longest that withstands the servo stays, and `tilt_moment` fails.
+    so of every length the thickest diameter, and of the lengths the shortest, since a low cage is a stiff one. If the
+    horn bears none of them the longest that withstands the servo stays, and `tilt_moment` fails.
 
     Args:
         scanner: a horn that its maker does not rate is trusted with `UNRATED_NM`.
         stack: with a bearing; its waist is replaced.
+        ears: that the cage stands on.
     """
     rated = rated_moment_nm(scanner)
     bears = SURELY * (UNRATED_NM if rated is None else SHARE * rated)
-    lasting = [one for one in WAIST_DIAMETERS if _outlasts(scanner, one)] or [WAIST_DIAMETERS[0]]
+    strong = [one for one in WAIST_DIAMETERS if _outlasts(scanner, one)] or [WAIST_DIAMETERS[0]]
+    off_m = sum(offsets_mm(ears).values()) / 1000
     for length in WAIST_LENGTHS:
         one = replace(stack, waist_length=length)
-        cage, weight = cage_of(scanner, one), heaviest(scanner, one)
-        if cage is None:
-            break
-        stiffness, off_m = stiffness_n_per_m(cage), sum(offsets_mm(cage).values()) / 1000
-        for diameter in lasting:
+        weight, stiffness = heaviest(scanner, one), stiffness_n_per_m(one, ears)
+        for diameter in strong:
             thick = replace(one, waist_diameter=diameter)
             shared = [supported(weight, thick, stiffness, metal) for metal in (ALUMINIUM, STEEL)]
             if max(each.horn_moment_nm + off_m * each.misaligned_nm_per_m for each in shared) <= bears:
                 return thick
-    return replace(stack, waist_length=WAIST_LENGTHS[-1], waist_diameter=lasting[-1])
+    return replace(stack, waist_length=WAIST_LENGTHS[-1], waist_diameter=strong[-1])
 
 
 def _outlasts(scanner: Scanner, waist_diameter: float) -> bool:

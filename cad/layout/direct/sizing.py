@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 from scanwright.cad.layout.direct.adapter import fork_holes
+from scanwright.cad.layout.direct.cage import Ears, ears_of
 from scanwright.cad.layout.direct.cup import cup_stack
 from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
 from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.envelope import covered_screws, hub_height, leaning_least, lidar_pose, rows_of
+from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT
 from scanwright.cad.screws import SCREWS
@@ -25,30 +26,34 @@ SHAFT_MIN = 8.0
 COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less only where the heads beside it stand close
 
 
-def direct_stack(scanner: Scanner) -> DirectStack:
-    """Lay out the stack of one scanner with its servo on the axis.
+def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ears | None]:
+    """Lay out the stack of one scanner with its servo on the axis, and the ears that a bearing's cage stands on.
 
     Raises:
-        BuildError: the ring has no bore, a bore too small for a shaft, or the lidar would hang upside down.
+        BuildError: the ring has no bore, a bore too small for a shaft, the case has no holes for a cage, or the lidar
+            would hang upside down.
     """
     R = lidar_pose(scanner)
-    stack = _without_sub_plate(scanner, R)
+    stack = _without_sub_plate(scanner, envelope, R)
     if covered_screws(scanner.lidar, stack):
         axis = leaning_least(R)
-        h = hub_height(scanner.lidar, R, stack.hub_radius, stack.ring_radius, axis)
+        h = hub_height(envelope, R, stack.hub_radius, stack.ring_radius, axis)
         stack = replace(stack, h=h, sub_plate=axis)
-    return stack if stack.bearing is None else with_waist(scanner, stack)
+    if stack.bearing is None:
+        return stack, None
+    ears = ears_of(scanner, stack)
+    return with_waist(scanner, stack, ears), ears
 
 
-def _without_sub_plate(scanner: Scanner, R: Array) -> DirectStack:
-    """A cup where neither ring nor bearing asks for a turned shaft."""
-    cup = cup_stack(scanner) if scanner.slip_ring is None else None
+def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
+    """A cup if neither ring nor bearing needs a turned shaft."""
+    cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     alone = DirectStack(
-        h=hub_height(scanner.lidar, R, shaft / 2 + HUB_WALL, radius),
+        h=hub_height(envelope, R, shaft / 2 + HUB_WALL, radius),
         R_rot_laser=rows_of(R),
         ring_length=length,
         ring_radius=radius,
@@ -68,7 +73,7 @@ def _without_sub_plate(scanner: Scanner, R: Array) -> DirectStack:
 
 
 def _needs_bearing(scanner: Scanner, stack: DirectStack) -> bool:
-    """Where the horn is not rated for the rotor, or where only the base of a bearing's cage finds holes for a ring."""
+    """If the horn is not rated for the rotor, or if only the base of a bearing's cage finds holes for a ring."""
     return not horn_bears(scanner, stack) or (scanner.slip_ring is not None and not fork_holes(scanner.servo, stack))
 
 
@@ -119,7 +124,7 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     room, boss = _room_on_horn(servo), servo.horn_boss_diameter_mm / 2
     collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(room, boss + COLLAR_WALL_MIN)))
     if collar > room:
-        doubt = servo.doubt("horn_circle_mm")
+        doubt = servo.caution("horn_circle_mm")
         raise BuildError(
             f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
             f"{servo.horn_circle_mm:g} mm{doubt} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"

@@ -75,11 +75,19 @@ class DirectStack(Hub):
     collar_height: float
     waist_length: float  # of the thin piece that bends where horn and bearing are not quite in line
     waist_diameter: float  # in aluminium
+    foot_radius: float = 0.0  # of a cup that stands over the screws of a servo frame; 0 of every other one
+    foot_height: float = 0.0
+    grip: float = 0.0  # of such a cup under the heads of the horn's screws; else its flange
 
     @property
     def shaft(self) -> str:
         """Name of the part that stands on the horn."""
         return SERVO_SHAFT if self.cup_bore == 0 else HORN_CUP
+
+    @property
+    def horn_grip(self) -> float:
+        """Thickness of what the horn's screws hold."""
+        return self.grip or self.flange_thickness
 
     @property
     def bearing_middle(self) -> float:

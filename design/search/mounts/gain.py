@@ -71,26 +71,26 @@ class Gain:
 def gains(problem: Problem, angles_deg: Sequence[float], J: float, mounts: Iterable[TunedMount]) -> tuple[Gain, ...]:
     """Compare an answer, a setting and its J, with reference mounts: the best of them, the smallest gain, first."""
     logarithmic = problem.objective.name == "log"  # the one objective whose differences are ratios of densities
-    found = []
+    result = []
     for mount in mounts:
         less = mount.score.J - J
         factor = float(np.exp(less)) if logarithmic else None
         same = np.allclose(angles_deg, mount.angles_deg, atol=1e-6)
-        found.append(Gain(mount, factor, less, same, angles_used(mount.angles_deg) < angles_used(angles_deg)))
-    return tuple(sorted(found, key=lambda gain: gain.J_less))
+        result.append(Gain(mount, factor, less, same, angles_used(mount.angles_deg) < angles_used(angles_deg)))
+    return tuple(sorted(result, key=lambda gain: gain.J_less))
 
 
-def gain_lines(found: tuple[Gain, ...]) -> list[str]:
+def gain_lines(result: tuple[Gain, ...]) -> list[str]:
     """The gains in words, a line each, the smallest first; and whether it is worth a mount that is not simple."""
-    unit = "J, against" if found[0].factor is None else "beams per ball over the weighted region, against"
-    lines = [f"{unit} the best simple mount: {found[0].words()}"]
-    lines += [f"{unit} another simple mount: {gain.words()}" for gain in found[1:]]
-    return lines + verdict(found)
+    unit = "J, against" if result[0].factor is None else "beams per ball over the weighted region, against"
+    lines = [f"{unit} the best simple mount: {result[0].words()}"]
+    lines += [f"{unit} another simple mount: {gain.words()}" for gain in result[1:]]
+    return lines + verdict(result)
 
 
-def verdict(found: tuple[Gain, ...]) -> list[str]:
+def verdict(result: tuple[Gain, ...]) -> list[str]:
     """A sentence about a simple mount that is as good or better; of several the one that nothing speaks against."""
-    good = [gain for gain in found if gain.factor is not None and gain.factor <= AS_GOOD]
+    good = [gain for gain in result if gain.factor is not None and gain.factor <= AS_GOOD]
     if not good:
         return []
     free = [gain for gain in good if not _against(gain)] or good

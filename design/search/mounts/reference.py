@@ -7,20 +7,20 @@
   UTM-30LX-EW on an MX-28 that their MAV carries). How far was not found: the best twist up to 45 deg.
 
 Their builders are bound by the limits of the task, not by its ranges of angles: whoever builds one of these chooses its
-angles. An angle is tuned in steps down to `STEPS_DEG[-1]`.
+angles. An angle is tuned in steps down to `STEPS_DEG[-1]`. If the servo sweeps, the first steps compare mean counts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.arrays import Setting
 from scanwright.design.objective.problem import Problem
-from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.objective.score import Score, bound_J, score, score_on
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.grid_classes import mirrors_of
 from scanwright.design.search.with_parts import equivalents
@@ -30,6 +30,9 @@ from scanwright.design.task.task import Task
 STEPS_DEG = (5.0, 1.0, 0.2)  # of an angle: over all of its range, then about the best one so far
 AROUND = 4  # steps to either side of it
 QUICK_NODES = 243  # of a score that only tunes an angle
+SWEEP_LOOKS = 12  # of the first steps of a sweep, by their mean counts: these are scored
+SWEEP_NODES = 2187  # that a score of a sweep begins with
+SWEEP_TOLERANCE = 5e-3  # of J of a mount that sweeps: half a percent of its beams
 LOOKS = 5  # settings scored exactly, before a mount is taken that breaks what the task asks
 
 Four = tuple[float, float, float, float]
@@ -96,11 +99,14 @@ def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
         TaskError: no direction has a weight.
     """
     limits = Requirements(problem, task.limits, avoid_holes=False)
+    if problem.sweep is not None:
+        tolerance = max(problem.tolerance, SWEEP_TOLERANCE)
+        problem = replace(problem, tolerance=tolerance, nodes=min(problem.nodes, SWEEP_NODES))
     required = Requirements(problem, task.limits, task.angles.holes == "avoid")
-    found = [(name, angles_deg, score(problem, np.radians(angles_deg))) for name, angles_deg in STANDARD_DEG.items()]
-    found += [(name, *_tuned(required, lines)) for name, lines in TUNED.items()]
+    result = [(name, angles_deg, score(problem, np.radians(angles_deg))) for name, angles_deg in STANDARD_DEG.items()]
+    result += [(name, *_tuned(required, lines)) for name, lines in TUNED.items()]
     out = []
-    for name, angles_deg, judged in found:
+    for name, angles_deg, judged in result:
         keeps_limits = limits.keeps(judged, np.array(angles_deg))
         allowed = [same for same in _same(problem, angles_deg) if task.angles.hold(same)]
         out.append(TunedMount(name, (allowed or [angles_deg])[0], judged, keeps_limits, bool(allowed)))
@@ -109,6 +115,7 @@ def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
 
 def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, Score]:
     """The best setting of some lines, found by quick scores, and its exact score."""
+    problem = required.problem
     known: dict[Four, tuple[bool, float]] = {}
     places: list[tuple[OneFreeAngle, float]] = []
 
@@ -116,27 +123,37 @@ def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Fou
         for angle_deg in np.unique(np.clip(angles_deg, line.low_deg, line.high_deg).round(6) + 0.0).tolist():
             setting = line.at(angle_deg)
             if setting not in known:
-                quick = score_on(required.problem, np.radians(setting), QUICK_NODES, stated=False)
+                quick = score_on(problem, np.radians(setting), QUICK_NODES, stated=False)
                 known[setting] = (not required.keeps(quick, np.array(setting)), quick.J)
                 places.append((line, angle_deg))
 
+    first: list[tuple[OneFreeAngle, Setting]] = []
     for line in lines:
-        low_deg = 0.0 if line is ROLLED and _rolls_alike(required.problem) else line.low_deg
-        look(line, np.arange(low_deg, line.high_deg + STEPS_DEG[0] / 2, STEPS_DEG[0]))
+        low_deg = 0.0 if line is ROLLED and _rolls_alike(problem) else line.low_deg
+        first.append((line, np.arange(low_deg, line.high_deg + STEPS_DEG[0] / 2, STEPS_DEG[0])))
+    if problem.sweep is not None:
+        bounds = [
+            (bound_J(problem, np.radians(line.at(angle_deg)), QUICK_NODES), k, angle_deg)
+            for k, (line, angles_deg) in enumerate(first)
+            for angle_deg in angles_deg.tolist()
+        ]
+        first = [(first[k][0], np.array([angle_deg])) for _, k, angle_deg in sorted(bounds)[:SWEEP_LOOKS]]
+    for line, angles_deg in first:
+        look(line, angles_deg)
     for step_deg in STEPS_DEG[1:]:
         line, angle_deg = min(places, key=lambda place: known[place[0].at(place[1])])
         look(line, angle_deg + step_deg * np.arange(-AROUND, AROUND + 1))
     ordered = sorted(known, key=known.__getitem__)
     for setting in [each for each in ordered if not known[each][0]][:LOOKS]:
-        if (found := required.score(np.array(setting))) is not None:
-            return setting, found
+        if (result := required.score(np.array(setting))) is not None:
+            return setting, result
     return ordered[0], score(required.problem, np.radians(ordered[0]))
 
 
 def _same(problem: Problem, angles_deg: Four) -> list[Four]:
     """Settings of the same J, itself first; an axis that is turned over may be turned either way."""
-    found = equivalents(problem, angles_deg, AngleRanges())
-    return [*found, *((180.0, b, c, d) for a, b, c, d in found if a == -180)]
+    result = equivalents(problem, angles_deg, AngleRanges())
+    return [*result, *((180.0, b, c, d) for a, b, c, d in result if a == -180)]
 
 
 def _rolls_alike(problem: Problem) -> bool:

@@ -38,9 +38,9 @@ def simplest_first(required: Requirements, ranges: AngleRanges, families: tuple[
     near = [setting for setting, J in quick.items() if most_J + ROUGH_J >= J]
     answer = optimum
     for setting in sorted(near, key=lambda setting: (angles_used(setting), quick[setting])):
-        found = required.score(np.array(setting))
-        if found is not None and most_J + EQUAL >= found.J:
-            answer = known.get(setting) or Family(setting, found, 1, "")
+        result = required.score(np.array(setting))
+        if result is not None and most_J + EQUAL >= result.J:
+            answer = known.get(setting) or Family(setting, result, 1, "")
             break
     others = [family for family in families if family.angles_deg != answer.angles_deg]
     return (answer, *others)
@@ -55,11 +55,11 @@ def _simple_settings(ranges: AngleRanges) -> list[Four]:
     """The candidates that the ranges hold, each once."""
     limits = [ranges.limits(name) for name in NAMES]
     none = [float(np.clip(0.0, *each)) for each in limits]
-    found = [tuple(none), *STANDARD_DEG.values()]
+    result = [tuple(none), *STANDARD_DEG.values()]
     for k, name in enumerate(NAMES):
-        found += [(*none[:k], angle, *none[k + 1 :]) for angle in ranges.grid_deg(name).tolist()]
+        result += [(*none[:k], angle, *none[k + 1 :]) for angle in ranges.grid_deg(name).tolist()]
     for line in (line for lines in TUNED.values() for line in lines):
         grid = ranges.grid_deg(NAMES[line.free])
-        found += [line.at(angle) for angle in grid[(grid >= line.low_deg) & (grid <= line.high_deg)].tolist()]
-    inside = [(a + 0.0, b + 0.0, c + 0.0, d + 0.0) for a, b, c, d in found if ranges.hold((a, b, c, d))]
+        result += [line.at(angle) for angle in grid[(grid >= line.low_deg) & (grid <= line.high_deg)].tolist()]
+    inside = [(a + 0.0, b + 0.0, c + 0.0, d + 0.0) for a, b, c, d in result if ranges.hold((a, b, c, d))]
     return list(dict.fromkeys(inside))

@@ -20,8 +20,8 @@ from scanwright.firmware_io.calibration.solve import WIDTH, Grouping, covariance
 from scanwright.firmware_io.calibration.tiles import FlatTiles
 
 _U = WIDTH - 2
-_RATES = 6
-_CHANCE = 1e-6
+_RATES = 6  # three of translation, three of rotation
+_CHANCE = 1e-6  # of a false warning in a recording at rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from scanwright.design.errors import ProtocolError
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.lidar.sick.cola import Telegram, TelegramSplitter, Writer, framed
 from scanwright.firmware_io.lidar.sick.scan_data import WRAP_US, Channel, ScanData, telegram_of
-from scanwright.firmware_io.lidar.sick.values import Reader
+from scanwright.firmware_io.lidar.sick.values import Kind, Reader
 
 _NEVER_NS = 1 << 62  # 146 years
 _SEND_NS = 3_000_000  # from the last beam to the telegram: between the captures of an LMS100 and of a TiM55x
@@ -21,6 +21,13 @@ _BOOT_NS = 1_000_000_000  # [assumed]
 _HEAD = 100  # bytes of a telegram before its ranges
 # of the access levels, from the factory; telegram listing 8014631
 _PASSWORDS = {2: 0xB21ACE26, 3: 0xF4724744, 4: 0x81BE23AA}
+# values of its filters, and those that leave the ranges as they are; telegram listing 8014631
+_FILTERS: dict[str, tuple[Kind, ...]] = {
+    "FREchoFilter": ("u8",),
+    "LFPmeanfilter": ("u8", "u16", "u8"),
+    "LFPparticle": ("u8", "u16"),
+}
+_FILTERS_OFF = {"FREchoFilter": [2], "LFPmeanfilter": [0, 10, 0], "LFPparticle": [0, 500]}
 _ACCESS_DENIED, _UNKNOWN_METHOD, _UNKNOWN_VARIABLE, _INVALID = 1, 2, 3, 5
 
 
@@ -50,6 +57,7 @@ class SickMachine:
         run_tenth_h: how long it has run, tenths of an hour.
         starts: how often it was switched on.
         refusals: codes with which it refuses what it is asked next, one each.
+        filters: values that were set, by name.
         scanning: what it tells scans; None where nobody asked.
     """
 
@@ -64,6 +72,7 @@ class SickMachine:
     silent_until_ns: int = 0
     dialects: tuple[bool, ...] = (True, False)
     refusals: list[int] = field(default_factory=list)
+    filters: dict[str, list[float]] = field(default_factory=dict)
     serial_number: int = 18_030_000
     run_tenth_h: int = 6641
     starts: int = 597
@@ -160,6 +169,11 @@ class SickMachine:
             narrow=(),
         )
 
+    @property
+    def _span(self) -> int:
+        """From the first to the last beam, 1e-4 deg."""
+        return (self.lidar.last_step - self.lidar.first_step) * 3_600_000 // self.lidar.steps_per_turn
+
     def _angles(self) -> tuple[int, int]:
         """First angle and step, 1e-4 deg, cut to whole numbers as the sensor does."""
         per_step = 3_600_000 / self.lidar.steps_per_turn
@@ -190,11 +204,21 @@ class SickMachine:
                 return out.number("u32", self.starts).telegram()
             case b"sRN", "SCdevicestate":
                 return out.number("u8", int(self.measuring and now_ns >= self.busy_until_ns)).telegram()
+            case b"sRN", "FirmwareVersion":
+                return out.text("V1.00").telegram()
+            case b"sRN", "LocationName":
+                return out.text("not defined").telegram()
+            case b"sRN" | b"sWN", "FREchoFilter" | "LFPmeanfilter" | "LFPparticle":
+                return self._filter(request, name, values, out)
+            case b"sRN", "LMPoutputRange":
+                start, step = self._angles()
+                return out.number("u16", 1).number("u32", step).numbers("i32", [start, start + self._span]).telegram()
+            case b"sEN", "LIDinputstate" | "LIDoutputstate" | "LFErec":  # events, of which none happens
+                return out.number("u8", values.number("u8")).telegram()
             case b"sRN", "LMPscancfg":
                 start, step = self._angles()
-                span = (self.lidar.last_step - self.lidar.first_step) * 3_600_000 // self.lidar.steps_per_turn
                 out.number("u32", self._scan_rate).number("u16", 1).number("u32", step)
-                return out.numbers("i32", [start, start + span]).telegram()
+                return out.numbers("i32", [start, start + self._span]).telegram()
             case b"sMN", "SetAccessMode":
                 level = values.number("u8")
                 self._level = level if _PASSWORDS.get(level) == values.number("u32") else 0
@@ -209,6 +233,18 @@ class SickMachine:
                 self.scanning = _Scanning(request.binary, turn) if wanted and self.measuring else None
                 return out.number("u8", wanted).telegram()
         return _refused(request, _UNKNOWN_VARIABLE if word in (b"sRN", b"sWN") else _UNKNOWN_METHOD)
+
+    def _filter(self, request: Telegram, name: str, values: Reader, out: Writer) -> Telegram:
+        """Read or set a filter; filters do nothing to the ranges here."""
+        kinds = _FILTERS[name]
+        if request.word == b"sRN":
+            for kind, value in zip(kinds, self.filters.get(name, _FILTERS_OFF[name]), strict=True):
+                out.number(kind, value)
+        elif not self._level:
+            return _refused(request, _ACCESS_DENIED)
+        else:
+            self.filters[name] = [values.number(kind) for kind in kinds]
+        return out.telegram()
 
     def _method(self, request: Telegram, name: str, out: Writer) -> Telegram:
         if not self._level:

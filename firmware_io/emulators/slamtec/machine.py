@@ -19,7 +19,7 @@ from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.slamtec import packets
 from scanwright.firmware_io.emulators.slamtec.models import DENSE, EXPRESS, IDENTITIES, STANDARD, ULTRA, ScanMode
-from scanwright.firmware_io.emulators.world import turned_deg
+from scanwright.firmware_io.emulators.world import spun_up, turned_deg
 
 _STOP, _RESET, _SCAN, _FORCE_SCAN, _EXPRESS_SCAN = 0x25, 0x40, 0x20, 0x21, 0x82
 _INFO, _HEALTH, _SAMPLE_TIMES, _GET_CONF = 0x50, 0x52, 0x59, 0x84
@@ -27,7 +27,6 @@ _MOTOR_PWM, _MOTOR_RPM, _BOARD_FLAG = 0xF0, 0xA8, 0xFF
 
 _CHUNK_NS = 8_000_000  # measured at once: some ms cost a computer little and delay nothing
 _BOOT_NS = 1_000_000_000  # [assumed]
-_SPIN_UP_S = 0.5  # time constant of the motor [assumed]: after 1.5 s it has 95 % of its speed
 _NEVER_NS = 1 << 62  # 146 years
 _POINTS: Final = {STANDARD: 8, EXPRESS: 32, ULTRA: 96, DENSE: 40}  # of a packet; nodes are sent 8 together
 _SIZES: Final = {STANDARD: 5, EXPRESS: 84, ULTRA: 132, DENSE: 84}
@@ -196,8 +195,7 @@ class SlamtecMachine:
         if self._started_ns is None:
             return np.full(time_ns.size, self._rest_deg)
         since_s = np.maximum((time_ns - self._started_ns) / 1e9, 0.0)
-        at_speed_s = since_s + _SPIN_UP_S * np.expm1(-since_s / _SPIN_UP_S)
-        return self._rest_deg + turned_deg(self.lidar.scan_rate_hz, at_speed_s)[0]
+        return self._rest_deg + turned_deg(self.lidar.scan_rate_hz, spun_up(since_s)[0])[0]
 
     def _seen_mm(self, time_ns: Times, angle_deg: Floats) -> Times:
         """Whole millimetres, 0 without a return."""

@@ -24,7 +24,7 @@ from scanwright.firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 
 FAMILY = "ldrobot"
 
-_BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
+_BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
 _FIRST_PACKETS_S = 0.5  # it talks hundreds of times a second
 _TURN_S = 1.0  # without a turn: five of the slowest
 _SILENCE_NS = 500_000_000  # after which the sensor may have restarted

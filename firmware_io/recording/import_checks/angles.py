@@ -18,8 +18,8 @@ _REACH = 4  # neighbours on each side
 _FAR_SHARE = 0.85  # of the neighbours: at a step of an axis that stops half of them are far
 _LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are smaller
 _STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
-_SIGMAS = 8.0
-_MOVING_RAD_S = math.radians(1.0)
+_SIGMAS = 8.0  # of the differences to the neighbours: noise alone never gets there
+_MOVING_RAD_S = math.radians(1.0)  # slower than any sweep
 _FASTEST = 4.0  # times the usual speed: no servo jumps to it for one sample
 
 

@@ -17,7 +17,7 @@ _LATE_S = 0.01  # scans that arrive so much later than angles: another clock, or
 _BLOCKS = 12  # of a recording, in which the shortest delays are compared
 _LEAST = 5  # messages in a block
 _OF_SPREAD = 0.9  # by how much of the jitter in a block the shortest delays of 12 blocks of 7 messages differ by chance
-_LEAST_MM = 5.0
+_LEAST_MM = 5.0  # at AT_M: smaller costs are not worth a warning
 
 
 def clock_findings(

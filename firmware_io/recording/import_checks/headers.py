@@ -18,7 +18,7 @@ AT_M = 5.0  # range at which a finding states its cost
 _LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
 _SPAN_STEPS = 1.6  # headers of real bags state n - 1 or n steps between angle_min and angle_max
 _TIME_ERROR = 0.1  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
-_WHOLE_TURNS = 0.03  # how near to an integer the turns between two scans are that a driver dropped
+_TURN_ERROR = 0.03  # how near to an integer the turns between two scans are that a driver dropped
 _SAME_RANGE = 0.01  # share of the beams with the longest range: no scene puts so many at one distance
 _FEWEST = 20  # beams
 
@@ -77,7 +77,7 @@ class Headers:
         usual_s = float(np.median(np.diff(np.sort(self.stamp_ns)))) / 1e9
         scan_s = float(np.median(self.scan_time_s))
         turns = usual_s / scan_s if scan_s > 0 else 0.0
-        return scan_s if turns > 0.5 and abs(turns - round(turns)) < _WHOLE_TURNS * turns else usual_s
+        return scan_s if turns > 0.5 and abs(turns - round(turns)) < _TURN_ERROR * turns else usual_s
 
     @property
     def time_increment_from_turn_s(self) -> float:
@@ -149,18 +149,18 @@ def _bearings(headers: Headers) -> Iterator[Finding]:
 
 
 def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
-    even_s, told_s = headers.time_increment_from_turn_s, headers.time_increment_s
+    even_s, stated_s = headers.time_increment_from_turn_s, headers.time_increment_s
     arc = np.maximum(headers.beams - 1, 0)
-    cost_mm = 1000 * AT_M * speed_rad_s * float(np.median(np.abs(told_s - even_s) * arc))
+    cost_mm = 1000 * AT_M * speed_rad_s * float(np.median(np.abs(stated_s - even_s) * arc))
     hint = f'time_increment = "auto" uses {even_s:.4g} s'
-    if not told_s.any():
+    if not stated_s.any():
         cost = f", off by up to {_mm(cost_mm)} at {AT_M:g} m at this speed" if cost_mm >= _LEAST_MM else ""
         text = f"the time increment is 0: every beam takes the time of its scan's stamp, not its own{cost}"
         yield Finding("time_increment_zero", "warning", "time_increment", text, cost_mm, unit="mm", hint=hint)
         return
     if not even_s:
         return
-    ratio = float(np.median(told_s)) / even_s
+    ratio = float(np.median(stated_s)) / even_s
     if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _LEAST_MM:
         yield Finding(
             "time_increment_off",
@@ -173,9 +173,9 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
             "times",
             hint,
         )
-    wander = np.abs(told_s / np.median(told_s) - 1) > _TIME_ERROR if np.median(told_s) else np.zeros(0, bool)
+    wander = np.abs(stated_s / np.median(stated_s) - 1) > _TIME_ERROR if np.median(stated_s) else np.zeros(0, bool)
     if wander.any():
-        worst_mm = 1000 * AT_M * speed_rad_s * float(np.max(np.abs(told_s - np.median(told_s)) * arc))
+        worst_mm = 1000 * AT_M * speed_rad_s * float(np.max(np.abs(stated_s - np.median(stated_s)) * arc))
         if worst_mm >= _LEAST_MM:
             yield Finding(
                 "time_increment_changes",

@@ -21,9 +21,9 @@ from mcap.writer import MCAP0_MAGIC
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
 _CHUNK_HEAD = struct.Struct("<QQQII")  # first and last time, size, checksum, length of the compression's name
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, begin of the summary, of its offsets, checksum
-_BLOCK = 1 << 20
+_BLOCK = 1 << 20  # bytes that are searched at once
 _SIP = 1 << 12  # of packed bytes at once: they may become 32,768 times as many
-_MOST_UNPACKED = 1 << 30
+_MOST_UNPACKED = 1 << 30  # bytes: chunks of recorders have some MB
 _PACKED = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18", "": b""}  # compression -> how it begins
 _READ: dict[int, Callable[[Any], Any]] = {
     Opcode.HEADER: mcap.Header.read,

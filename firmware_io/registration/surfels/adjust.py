@@ -21,20 +21,20 @@ from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.firmware_io.registration.surfels.beams import UNKNOWNS, Beams, sum_beams
 from scanwright.firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
 
-_ROUNDS = 8
+_ROUNDS = 8  # of finding cells and solving: an end to poses that do not settle
 _SETTLED = 5e-2  # squared sigmas of a step: beams at the edges of pieces come and go, and move it as much for ever
-_SAME_REACH = 0.9
+_SAME_REACH = 0.9  # times the last reach: the cells would be the same
 _REACH = 5  # sigmas: what a wall's noise never does
-_FOREIGN = 0.02
-_MIN_CELLS = 12
+_FOREIGN = 0.02  # share of points off the common plane
+_MIN_CELLS = 12  # two for each degree of freedom
 _SHARED_BEAMS = 20  # how many beams of the whole cloud's noise a piece's own is mixed with
 _OUTLIER = 36.0  # times the median of what pieces disagree by, in squared sigmas: moved, or not the same thing
 _DOUBTED = 9.0  # from here on a piece pulls in proportion to its distance only
-_REWEIGHTED = 8
+_REWEIGHTED = 8  # of the robust weights
 _MEDIAN_CHI2 = 2.37  # of three degrees of freedom
 _VAGUE = 0.1  # of the spacing: flat pieces that leave a position this open leave out what holds it
 _RIDGE = 1e-9  # of a plane's information: keeps what one line leaves open solvable
-_RANK = 1e-6
+_RANK = 1e-6  # times the largest eigenvalue: smaller ones are rounding
 _SHARES = 8  # of the beams, summed side by side: on every machine as many, as the order of a sum rounds it
 
 

@@ -15,14 +15,14 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Floats
 
-_LEVELS = 4
+_LEVELS = 4  # edges of 1, 2, 4 and 8 spacings
 _FINEST = 2.5  # times the spacing: the edge of the smallest cubes
 _REACH = 1.5  # times the spacing: how far off its plane a beam of a piece may end
 _THICK = 0.5  # times the spacing: standard deviation across the plane
 _FLAT = 0.05  # of the variance along the plane's short side, at most, lies across
 _FOREIGN = 0.01  # share of the points of a cube that may lie off its plane
 _FEW = 10  # points of either stand
-_BITS = 21
+_BITS = 21  # of a cell along each axis: three of them fit an int64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ from scanners import scanner_at
 from scanwright.cad.assembly.assembly import as_tree
 from scanwright.cad.assembly.bought import bought_of
 from scanwright.cad.files.step import step_text
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import scanner_of
@@ -69,6 +69,6 @@ def test_every_body_of_a_lidar_whose_window_reaches_its_top_has_a_mesh():
         servo="MX-64R",
         slip_ring="SNU11-P0210",
     )
-    bodies = bought_of(layout_of(scanner_of(angles, "sla", load_catalogue())))
+    bodies = bought_of(laid_out(scanner_of(angles, "sla", load_catalogue())))
     assert all(body.make().Volume() > 0 for body in bodies)
     assert not [body for body in bodies if body.name == "lidar_cap"]

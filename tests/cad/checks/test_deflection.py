@@ -9,14 +9,13 @@ import pytest
 from scanwright.cad.checks.loads.deflection import sag_of, split
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import mesh_of
-from scanwright.cad.layout.direct.loads import hanging, shaft_modulus_pa
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.layout.direct.loads import hanging, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.loads import ALUMINIUM_PA, weight_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.parts.horn_cup import horn_cup
 from scanwright.cad.solids import box, upright
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.sag import linkage_sag
-from scanwright.cad.statics.shaft import shaft_bend
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -103,7 +102,7 @@ def test_a_printed_cup_turns_on_its_horn_as_the_same_cup_in_finite_elements():
         slip_ring=None,
     )
     scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
-    layout, servo = layout_of(scanner), scanner.servo
+    layout, servo = laid_out(scanner), scanner.servo
     stack, modulus = layout.stack, shaft_modulus_pa(scanner, layout.stack)
     mesh = mesh_of(horn_cup(layout.linkage, stack, servo, scanner.printer))
 

@@ -27,7 +27,7 @@ def test_leads_touch_nothing_and_bend_no_further_than_they_may(lying):
 
 
 def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
-    for number, lead in enumerate(lying.leads, start=1):
+    for number, lead in enumerate(lying.layout.leads, start=1):
         half, wide = lead.diameter / 2, lead.diameter / 2 + joint.WALL
         wanted = np.pi * (
             half**2 * (lead.path.length() - joint.LENGTH) + wide**2 * joint.LENGTH
@@ -36,7 +36,7 @@ def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
 
 
 def test_a_lead_straight_through_the_linkage_is_seen(lying):
-    first = lying.leads[0]
+    first = lying.layout.leads[0]
     short = Path((first.path.corners[0], first.path.corners[-1]), first.radius)
     bad = replace(lying, bought=lying.bought | {"rotor_lead_1": lead_solid(replace(first, path=short, joint=None))})
     (found,) = [check for check in clearance_checks(bad) if check.code == "interference"]
@@ -53,7 +53,9 @@ def test_no_beam_meets_a_lead_that_was_not_hidden_before(lying):
 
 
 def test_no_way_is_told_with_its_numbers(lying):
-    blocked = replace(lying, leads=(replace(lying.leads[0], path=None, radius=32.0),))
+    blocked = replace(
+        lying, layout=replace(lying.layout, leads=(replace(lying.layout.leads[0], path=None, radius=32.0),))
+    )
     (check,) = rotor_cable_checks(blocked)
     assert check.severity == "warning" and check.limit == 32.0 and "y = -15 mm" in check.message
 
@@ -61,5 +63,5 @@ def test_no_way_is_told_with_its_numbers(lying):
 def test_the_last_step_tells_where_each_lead_runs(lying):
     thing, step = steps_of(lying)[-1]
     assert thing == "rotor_leads"
-    for lead in lying.leads:
+    for lead in lying.layout.leads:
         assert f"is {lead.path.length():.0f} mm long" in step.words

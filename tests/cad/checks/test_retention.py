@@ -10,7 +10,6 @@ from scanners import CAPSULE, GROUND_AHEAD, ROLLING, scanner_at
 import scanwright.cad.checks.loads.retention as room
 from scanwright.cad import solids
 from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import ScrewAxis
 from scanwright.cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
 from scanwright.cad.screws import SCREWS, thread_in_part
@@ -26,7 +25,7 @@ def scanner_and_assembly(request, parts_of):
 
 
 def joint_of(assembly, part, onto):
-    return next(joint for joint in joints_of(assembly.layout) if (joint.part, joint.onto) == (part, onto))
+    return next(joint for joint in assembly.layout.joints if (joint.part, joint.onto) == (part, onto))
 
 
 def test_a_hub_that_moves_takes_its_screws_into_the_metal_of_the_shaft(scanner_and_assembly):
@@ -51,7 +50,7 @@ def test_what_hangs_on_a_joint_is_what_falls_with_it(scanner_and_assembly):
     assert hanging_on(assembly, joint_of(assembly, "alignment_linkage", "lidar_body")) == {"lidar"}
     if shaft == "main_shaft":  # it rests on its lower ring where the axis hangs
         assert hanging_on(assembly, joint_of(assembly, "shaft_ring", shaft)) == {*above, shaft, "shaft_pulley"}
-    deck = next(joint for joint in joints_of(assembly.layout) if joint.onto == "deck")
+    deck = next(joint for joint in assembly.layout.joints if joint.onto == "deck")
     assert hanging_on(assembly, deck) >= {"lidar", "servo", "base_mount", *assembly.made}
 
 
@@ -61,7 +60,7 @@ def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_asse
     assert {check.severity for check in checks if "shaft_pulley" not in check.subject} == {"ok"}
     (friction,) = [check for check in checks if "friction: they" in check.message] or [None]
     assert (friction is None) == (assembly.layout.drive.shaft == "servo_shaft")  # the pulley, which is set by turning
-    joints = [joint for joint in joints_of(assembly.layout) if joint.fixing != "grub"]
+    joints = [joint for joint in assembly.layout.joints if joint.fixing != "grub"]
     assert [
         sum(check.code == kind and check.value is not None for check in checks) for kind in ("retention", "screw")
     ] == [len(joints)] * 2
@@ -69,32 +68,32 @@ def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_asse
 
 def test_what_gives_way_fails_and_what_has_little_to_spare_warns(scanner_and_assembly, monkeypatch):
     scanner, assembly = scanner_and_assembly
-    margin = min(c.value for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None)
+    margin = min(c.value for c in retention_checks(scanner, assembly) if c.code == "retention" and c.value is not None)
     for over, severity in ((0.4 * margin, "ok"), (0.7 * margin, "warning"), (1.3 * margin, "error")):
         with monkeypatch.context() as shaken:
             shaken.setattr(room, "SHOCK_G", 5.0 * over)
-            checks = [c for c in retention_checks(scanner, assembly) if c.kind == "retention" and c.value is not None]
+            checks = [c for c in retention_checks(scanner, assembly) if c.code == "retention" and c.value is not None]
         weakest = min(checks, key=lambda check: check.value)
         assert (weakest.severity, weakest.value) == (severity, pytest.approx(margin / over, rel=0.02))
 
 
-def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly, monkeypatch):
+def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly):
     scanner, assembly = scanner_and_assembly
-    joints = joints_of(assembly.layout)
+    joints = assembly.layout.joints
     hub = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
-    _instead(monkeypatch, joints, hub, replace(hub, fixing="grub"))
-    assert [check.subject for check in retention_checks(scanner, assembly) if check.severity == "error"] == [
+    loose = _instead(assembly, hub, replace(hub, fixing="grub"))
+    assert [check.subject for check in retention_checks(scanner, loose) if check.severity == "error"] == [
         f"{hub.part} and {hub.onto}"
     ]
     for nuts in (joint for joint in joints if joint.onto == "bearing_tower" and joint.part == "base_mount"):
-        _instead(monkeypatch, joints, nuts, replace(nuts, fixing="thread", thread=None))
-        failed = [check.message for check in retention_checks(scanner, assembly) if check.severity == "error"]
+        bare = _instead(assembly, nuts, replace(nuts, fixing="thread", thread=None))
+        failed = [check.message for check in retention_checks(scanner, bare) if check.severity == "error"]
         assert any("threads in bare plastic" in message for message in failed)
 
 
-def _instead(monkeypatch, joints, joint, other):
-    changed = [other if each == joint else each for each in joints]
-    monkeypatch.setattr(room, "joints_of", lambda _: changed)
+def _instead(assembly, joint, other):
+    changed = tuple(other if each == joint else each for each in assembly.layout.joints)
+    return replace(assembly, layout=replace(assembly.layout, joints=changed))
 
 
 def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
@@ -117,7 +116,7 @@ def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
         pull = max(pull, np.abs(axial).max())
         push = max(push, np.linalg.norm(shares - axial[:, None] * along, axis=1).max())
     assert worst_shares(joint, centre) == pytest.approx((pull, push), rel=5e-3)
-    assert scanner.lidar.mount_screw == joint.screw.name
+    assert scanner.lidar.base.screw == joint.screw.name
 
 
 def test_torque_and_strength_against_hand_calculation():

@@ -29,8 +29,7 @@ from scanwright.cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.fits import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.fits import OnSheet, ToleratedDiameter
 from scanwright.cad.solids import box, cylinder, upright
 
 X, Y, Z = np.eye(3)
@@ -118,7 +117,7 @@ def test_shaft_circle_of_holes_and_diameters(sheets):
 
 def test_every_hole_that_holds_a_screw_says_by_what(sheets, made):
     for name, sheet in sheets.items():
-        held = [joint for joint in joints_of(made.result.assembly.layout) if joint.holder == name]
+        held = [joint for joint in made.result.assembly.layout.joints if joint.holder == name]
         told = Counter()
         for text in sheet.said:
             if found := re.match(r"(?:(\d+)x )?Ø.*(?:TAPPED|THREAD|INSERT|FOR NUT) ([\w./-]+(?: UNC)?)", text):

@@ -3,6 +3,7 @@
 import csv
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -11,17 +12,18 @@ from scanners import CAPSULE, RING, ROLLING, TILTED, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.files.bom import WIRING, _wiring, bom_text, items_of
-from scanwright.cad.files.manual.instructions import instructions_text
+from scanwright.cad.files.manual.instructions import instructions_text, screws_in_words
 from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.layout.placement import placement_of
+from scanwright.cad.parts.all_parts import laid_out, parts_of
+from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.angles import Angles
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.products import Provenance, Servo
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +82,8 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
 
 @pytest.mark.parametrize("slip_ring", [RING, CAPSULE])
 def test_every_small_thing_of_a_drive_has_an_estimate(slip_ring):
-    needs = layout_of(scanner_at(ROLLING, slip_ring=slip_ring)).drive.needs
+    parts = parts_of(placement_of(scanner_at(ROLLING, slip_ring=slip_ring)))
+    needs = [row for part in parts if isinstance(part, PartSpec) for row in part.rows]
     assert needs and {need.estimate for need in needs} <= EACH_USD.keys()
     assert {row.estimate for rows in WIRING.values() for row in rows} <= EACH_USD.keys()
 
@@ -155,10 +158,10 @@ def test_screws_are_those_of_the_catalogue_and_none_bottoms(rows, made):
     lidar, servo = made.scanner.lidar, made.scanner.servo
     assert counts["servo_shaft", "servo_horn"] == (servo.horn_holes, "ISO 4762 M2.5 x 6")
     count, number = counts["alignment_linkage", "lidar_body"]
-    assert count == len(lidar.mount_holes_mm)
-    length = int(number.removeprefix(f"ISO 4762 {lidar.mount_screw} x "))
+    assert count == len(lidar.base.places)
+    length = int(number.removeprefix(f"ISO 4762 {lidar.base.screw} x "))
     plate = 8.0
-    assert 2 * 3.0 <= length - plate < lidar.mount_thread_depth_mm
+    assert 2 * 3.0 <= length - plate < lidar.base.depth_mm
     assert counts["base_mount", "servo_case"][0] == 4 and counts["base_mount", "deck"] == (4, "ISO 4762 M4 x 16")
     assert counts["alignment_linkage", "servo_shaft"] == (2, "ISO 4762 M3 x 12")
     assert not [row for row in rows if row["number"].startswith("ISO 4026")]  # nothing holds by friction
@@ -213,7 +216,7 @@ def upright(made):
 def test_what_a_scanner_does_not_have_is_not_listed(upright):
     scanner = replace(upright, slip_ring=None, lidar=upright.lidar.model_copy(update={"price_usd": None}))
     assembly = make_parts(scanner)
-    joints = joints_of(assembly.layout)
+    joints = assembly.layout.joints
     masses = dict.fromkeys(assembly.made, 1.0)
     items = items_of(scanner, assembly, joints, masses, "0123456789ab")
     assert "slip ring" not in {item.part for item in items}
@@ -227,17 +230,27 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert (seat.part, seat.count) == ("sub_plate", 4)
 
 
+def test_screws_into_holes_that_are_not_verified_say_how_to_measure_them():
+    scanner = scanner_at((0, 0, 25, -20), slip_ring=None)
+    lidar = scanner.lidar.model_copy()
+    lidar._provenance = lidar.provenance() | {"holes": Provenance(source="assumed", verified=False)}
+    layout = laid_out(replace(scanner, lidar=lidar))
+    words = [screws_in_words(SimpleNamespace(layout=layout, parts={}), joint) for joint in layout.joints]
+    first = [line for line in words if "Measure first" in line]
+    assert len(first) == 1 and f"no source verifies holes of {lidar.name}: press paper" in first[0]
+
+
 def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
     scanner = scanner_at(TILTED, printer="fdm-0.4-insert")
     assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
-    joints = joints_of(assembly.layout)
+    joints = assembly.layout.joints
     held = {(joint.part, joint.onto): joint for joint in joints if joint.inserts}
     cage = held.pop(("bearing_cage", "slip_ring_adapter"))
     assert not held and cage.count == 4
     seats = [hole for hole in rounds["slip_ring_adapter"] if hole.hole and hole.diameter == 4.0]
     assert len(seats) == 4 and min(hole.length for hole in seats) > INSERT_LENGTH
-    by_threads = {(joint.part, joint.onto) for joint in joints_of(made.result.assembly.layout)}
+    by_threads = {(joint.part, joint.onto) for joint in made.result.assembly.layout.joints}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 4)]

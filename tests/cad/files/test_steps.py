@@ -14,13 +14,12 @@ from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.plates import EDGE_MM, GAP_MM, plates_of
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import on_bed
-from scanwright.cad.layout.all_joints import joints_of
 
 
 @pytest.fixture(scope="module")
 def scenes(made):
     assembly = made.result.assembly
-    return scenes_of(assembly, joints_of(assembly.layout))
+    return scenes_of(assembly, assembly.layout.joints)
 
 
 def pixels(png):
@@ -38,7 +37,7 @@ def test_a_step_shows_what_earlier_ones_left_and_the_last_one_all(scenes, made):
     assembly = made.result.assembly
     every = {*assembly.made, *assembly.bought}
     assert {*scenes[-1].there, *scenes[-1].comes} == every
-    assert sum(len(scene.joints) for scene in scenes) == len(joints_of(assembly.layout))
+    assert sum(len(scene.joints) for scene in scenes) == len(assembly.layout.joints)
     known = set()
     for scene in scenes:
         assert scene.comes and not {*scene.there} & {*scene.comes}
@@ -71,7 +70,7 @@ def test_what_comes_is_coloured_and_stands_where_it_comes_from(scenes, made):
 def test_every_step_has_its_picture_in_the_folder_and_the_same_bytes_again(scenes, made):
     assembly = made.result.assembly
     text = (made.folder / "assembly.md").read_text(encoding="utf-8")
-    again = step_files(made.scanner, assembly, made.result.meshes, joints_of(assembly.layout), [], "0" * 12)
+    again = step_files(made.scanner, assembly, made.result.meshes, assembly.layout.joints, [], "0" * 12)
     for number, scene in enumerate(scenes, start=1):
         name = picture_name(number)
         assert f"]({name})" in text and scene.step.check in text

@@ -6,13 +6,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import yourdfpy
+from scanners import mount_offset_mm
 
 from scanwright.cad.files.part_files import build_parts
 from scanwright.cad.files.urdf import urdf_text
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.cables.leads import leads_of
-from scanwright.cad.layout.cables.standing import standing_leads_of
-from scanwright.cad.layout.layout import drive_of, layout_of, mount_offset_mm
+from scanwright.cad.layout.placement import drive_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Bearing
@@ -108,11 +108,11 @@ def test_masses_add_up_and_inertias_are_those_of_bodies(made):
     bearing = load_catalogue().get("61806-2RS", Bearing).mass_g / 1000 if "bearing_cage" in own else 0.0
     turning = own["servo_shaft"] + own["alignment_linkage"] + own.get("counterweight", 0.0) + 0.1 + bearing / 2
     turning += own.get("journal_sleeve", 0.0)
-    turning += sum(lead.mass_g for lead in leads_of(layout_of(made.scanner))) / 1000
-    standing = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
-    standing += sum(lead.mass_g for lead in standing_leads_of(layout_of(made.scanner))) / 1000
+    turning += sum(lead.mass_g for lead in laid_out(made.scanner).leads) / 1000
+    fixed = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
+    fixed += sum(cable.mass_g for cable in laid_out(made.scanner).cables) / 1000
     assert mass["rot"] == pytest.approx(turning, abs=5e-4)  # of the plain parts: their labels weigh that little
-    assert mass["servo"] == pytest.approx(standing + 0.126, abs=5e-4)
+    assert mass["servo"] == pytest.approx(fixed + 0.126, abs=5e-4)
     assert mass["laser"] == pytest.approx(0.370)
     shaft = next(part for part in result.parts if part.name == "servo_shaft")
     assert own["servo_shaft"] == pytest.approx(2.7e-6 * shaft.volume_mm3, rel=1e-4)  # turned from aluminium

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 import trimesh
+from scanners import digest_of
 
 from scanwright.cad import solids
 from scanwright.cad.geometry.holes import Piercing
@@ -15,7 +16,7 @@ from scanwright.cad.labels.flats import flat_at, flats_of
 from scanwright.cad.labels.glyphs import letters, text_width
 from scanwright.cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
 from scanwright.cad.labels.sight import Sight
-from scanwright.cad.layout.layout import config_hash, layout_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.solids import box, upright
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
@@ -29,7 +30,7 @@ def groove(made):
 
 
 def test_the_parts_that_hold_the_angles_say_them(made):
-    digest, parts = config_hash(made.scanner), made.result.assembly.parts
+    digest, parts = digest_of(made.scanner), made.result.assembly.parts
     assert label_texts(made.scanner, parts["alignment_linkage"], digest) == [
         "tilted",
         "L -20 -70",
@@ -43,7 +44,7 @@ def test_the_parts_that_hold_the_angles_say_them(made):
     assert label_texts(made.scanner, parts["bearing_cage"], digest) == ["tilted", digest[:DIGITS]]
     assert set(made.result.meshes) >= {"alignment_linkage", "base_mount"}
     named = made.scanner.angles.model_copy(update={"task": "another"})
-    assert config_hash(replace(made.scanner, angles=named)) != digest
+    assert digest_of(replace(made.scanner, angles=named)) != digest
 
 
 def test_scanners_whose_parts_may_differ_have_labels_that_do(made):
@@ -52,9 +53,9 @@ def test_scanners_whose_parts_may_differ_have_labels_that_do(made):
         return replace(made.scanner, angles=made.scanner.angles.model_copy(update={"motion": motion}))
 
     scanners = [made.scanner, swept(-10.0, 10.0), swept(-90.0, 90.0)]
-    assert len({config_hash(scanner) for scanner in scanners}) == 3
-    assert config_hash(swept(-10.0, 10.0, period_s=9.0)) == config_hash(scanners[1])
-    bars = [layout_of(scanner).counterweight for scanner in scanners[1:]]
+    assert len({digest_of(scanner) for scanner in scanners}) == 3
+    assert digest_of(swept(-10.0, 10.0, period_s=9.0)) == digest_of(scanners[1])
+    bars = [laid_out(scanner).counterweight for scanner in scanners[1:]]
     assert [isinstance(bar, LeftOut) for bar in bars] == [True, False]  # the narrow one keeps the gears on a flank
 
 
@@ -73,7 +74,7 @@ def test_engraving_takes_off_the_area_of_its_letters_and_nothing_else(made, groo
         read = trimesh.load(made.folder / "parts" / f"{name}.stl")
         assert read.is_watertight and read.body_count == 1
         lost = checked_mesh(plain, name).volume() - mesh.volume()
-        lines = [*label_texts(made.scanner, made.result.assembly.parts[name], config_hash(made.scanner))]
+        lines = [*label_texts(made.scanner, made.result.assembly.parts[name], digest_of(made.scanner))]
         if name == "alignment_linkage":
             lines.append("FRONT")
         areas = [sum(part.area for line in lines for part in letters(line, height, STROKE)) for height in (3.6, 4.5)]

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scanners import avoided
 
 from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
 from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
 from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.cables.room import room_of
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import scanner_of
@@ -34,7 +35,7 @@ def layout_for(setting, **of_ring):
         slip_ring=ring,
     )
     scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
-    return layout_of(replace(scanner, slip_ring=scanner.slip_ring.model_copy(update=of_ring)))
+    return laid_out(replace(scanner, slip_ring=scanner.slip_ring.model_copy(update=of_ring)))
 
 
 def bend_radii(points):
@@ -64,7 +65,7 @@ def test_what_is_too_short_for_its_radius_has_no_path():
 def test_every_lead_leaves_the_ring_and_meets_its_cable_in_line(setting):
     layout = layout_for(setting)
     lidar, stack = layout.scanner.lidar, layout.stack
-    leads = leads_of(layout)
+    leads = layout.leads
     assert [lead.y for lead in leads] == list(lidar.cable_y_mm)
     for lead in leads:
         corners = np.array(lead.path.corners)
@@ -82,8 +83,8 @@ def test_every_lead_leaves_the_ring_and_meets_its_cable_in_line(setting):
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_a_lead_turns_above_all_that_stands_still(setting):
     layout = layout_for(setting)
-    room = room_of(layout)
-    for lead in leads_of(layout):
+    room = room_of(layout, avoided(parts_of(layout), turns=True))
+    for lead in layout.leads:
         points = lead.path.points(1.0)
         outside = points[np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + lead.diameter]
         assert outside[:, 2].min() > room.floor + lead.diameter / 2
@@ -93,7 +94,7 @@ def test_a_lead_turns_above_all_that_stands_still(setting):
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_joints_touch_neither_the_hub_nor_the_other_lead(setting):
     layout = layout_for(setting)
-    leads = [lead for lead in leads_of(layout) if lead.joint is not None]
+    leads = [lead for lead in layout.leads if lead.joint is not None]
     assert leads
     for lead in leads:
         thick, points = lead.diameter / 2 + WALL, lead.joint.points()
@@ -135,10 +136,10 @@ def test_a_joint_goes_as_far_from_the_middle_as_it_must_and_stays_there_where_no
 
 
 def test_where_no_way_is_wide_enough_there_is_none():
-    assert [lead.path for lead in leads_of(layout_for("upright", lead_bend_radius_mm=60.0))] == [None, None]
+    assert [lead.path for lead in layout_for("upright", lead_bend_radius_mm=60.0).leads] == [None, None]
 
 
 def test_without_ring_or_facts_nothing_is_laid():
-    assert leads_of(layout_for("upright", lead_diameter_mm=None)) == ()
+    assert layout_for("upright", lead_diameter_mm=None).leads == ()
     layout = layout_for("upright")
-    assert leads_of(replace(layout, scanner=replace(layout.scanner, slip_ring=None))) == ()
+    assert leads_of(replace(layout, scanner=replace(layout.scanner, slip_ring=None)), ()) == ()

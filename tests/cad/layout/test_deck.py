@@ -7,8 +7,8 @@ import pytest
 
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
-from scanwright.cad.layout.direct.sizing import direct_stack
-from scanwright.cad.layout.layout import drive_of, layout_of
+from scanwright.cad.layout.placement import drive_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.parts.base_mount import base_mount
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -49,8 +49,8 @@ def scanner_for(alpha_rot, beta_rot, deck):
 @pytest.mark.parametrize(("alpha_rot", "beta_rot"), [(0, 90), (0, 0), (180, 0), (66, -52)])
 def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count, alpha_rot, beta_rot):
     scanner = scanner_for(alpha_rot, beta_rot, deck)
-    stack = direct_stack(scanner)
-    layout = layout_of(scanner)
+    stack = drive_of(scanner).stack
+    layout = laid_out(scanner)
     where = layout.deck
     mesh = checked_mesh(base_mount(layout), "base_mount")
     turn = scanner.angles.T_world_rot(0.0)[:3, :3]
@@ -66,7 +66,7 @@ def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count
         assert len(rim) > 20
         np.testing.assert_allclose(np.linalg.norm(rim - hole, axis=1), radius, atol=0.01)
         assert reach[reach > radius + 0.5].min() > 2 * radius  # material around it
-    assert stack == direct_stack(scanner_for(alpha_rot, beta_rot, None))  # nothing above the mount changes
+    assert stack == drive_of(scanner_for(alpha_rot, beta_rot, None)).stack  # nothing above the mount changes
 
 
 def test_a_hole_under_the_strut_is_refused_with_the_bound():

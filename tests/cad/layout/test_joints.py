@@ -18,9 +18,9 @@ from quick_tests import samples
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
 from scanwright.cad.geometry.holes import Piercing, rounds_of
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.joints import CASE_EAR, DECK_MM, shank_mm
+from scanwright.cad.layout.joints import DECK_MM, shank_mm
 from scanwright.cad.screws import SCREWS, thread_hole, trap_of
+from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.deck_holes import Rectangle
 from scanwright.design.scanner import Modules
 
@@ -117,7 +117,7 @@ def partner_of(part, hole, screw, rounds, printer):
             sizes = (screw.nominal, *holding_holes(screw, printer))
             threaded = min(abs(other.diameter - size) for size in sizes) < 0.01
             fixing = "trap" if is_trap(other, screw, printer) else "thread" if threaded else "nut"
-            depth = CASE_EAR if fixing == "nut" and name == "servo_case" else free_length(other, others, screw, low)
+            depth = CASE_EAR_MM if fixing == "nut" and name == "servo_case" else free_length(other, others, screw, low)
             order = (not threaded, round(abs(gap), 3))
             if best is None or order < best[0]:
                 best = order, Behind(name, fixing, depth, 1 if gaps[0] > gaps[1] else -1)
@@ -197,7 +197,7 @@ DAILY = (  # every way to hold something, and every part that takes a screw, onc
 def test_the_declared_joints_are_those_that_the_solids_have(name, parts_of):
     scanner = SETTINGS[name]
     assembly = parts_of(scanner)
-    read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in joints_of(assembly.layout)}
+    read, declared = read_joints(scanner, assembly), {(j.part, j.onto): j for j in assembly.layout.joints}
     assert {
         key for key, joint in declared.items() if joint.slot_mm is None and key[0] not in ("deck", "tripod")
     } == read.keys()
@@ -245,7 +245,7 @@ SLOTTED = {
 @pytest.mark.parametrize("setting", SLOTTED)
 def test_screws_in_slots_stand_in_the_middle_of_them(parts_of, setting):
     assembly = parts_of(SETTINGS[setting])
-    slotted = {(joint.part, joint.onto): joint for joint in joints_of(assembly.layout) if joint.slot_mm}
+    slotted = {(joint.part, joint.onto): joint for joint in assembly.layout.joints if joint.slot_mm}
     assert slotted.keys() == SLOTTED[setting]
     for (part, onto), joint in slotted.items():
         width, length = joint.slot_mm
@@ -269,6 +269,6 @@ def test_a_screw_that_moves_is_noticed(parts_of):
     assembly = parts_of(scanner)
     turned = scanner.servo.model_copy(update={"horn_first_hole_deg": 10.0})
     moved = replace(assembly.layout, scanner=replace(scanner, servo=turned))
-    joint = next(joint for joint in joints_of(moved) if joint.onto == "servo_horn")
+    joint = next(joint for joint in moved.joints if joint.onto == "servo_horn")
     _, holes = read_joints(scanner, assembly)["servo_shaft", "servo_horn"]
     assert not any(_is_on(axis, hole) for axis in joint.axes for hole, _ in holes)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
+from benchmarks.cad.combinations import screws_without_a_hole
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.clearance import clearance_checks
-from scanwright.cad.checks.loads.retention import retention_checks
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.direct.sizing import direct_stack
-from scanwright.cad.layout.joints import held_in
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.checks.loads.retention import retention_checks, worst_shares
+from scanwright.cad.layout.joints import fixing_in
+from scanwright.cad.layout.placement import drive_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import SCREWS
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -38,22 +38,64 @@ def scanner_for(servo, lidar, ring, angles=TILTED):
     return scanner_of(found, "fdm-0.4", CATALOGUE)
 
 
-@pytest.mark.parametrize("lidar", ["UST-10LX", "URG-04LX", "UTM-30LX"])
-@pytest.mark.parametrize("ring", [*RINGS, None])
-def test_an_xm430_is_laid_out_with_every_ring_and_every_hokuyo(ring, lidar):
-    layout = layout_of(scanner_for("XM430-W350", lidar, ring))
-    assert {joint.onto for joint in joints_of(layout)} >= {"lidar_body", "servo_case", "servo_horn"} - (
-        {"servo_horn"} if layout.drive.shaft == "main_shaft" else set()
-    )
+@pytest.mark.parametrize(("lidar", "holes"), [("UST-10LX", 2), ("URG-04LX", 2), ("UTM-30LX", 4), ("STL27L", 3)])
+def test_an_xm430_is_laid_out_with_a_frame_and_every_lidar_by_the_holes_it_has(lidar, holes):
+    layout = laid_out(scanner_for("XM430-W350", lidar, None, (0, 0, 0, 50)))
+    joints = {joint.onto: joint for joint in layout.joints}
+    assert joints["servo_case"].part == "servo_frame" and joints["servo_case"].fixing == "thread"
+    assert {axis.start[:2] for axis in joints["servo_case"].axes} == {(11.0, -8.0), (-11.0, -8.0)}
+    assert joints["servo_case"].length_mm - joints["servo_case"].grip_mm == 2.5  # of 3.0, one diameter
+    assert joints["lidar_body"].count == holes
+    assert joints["lidar_body"].fixing == ("nut" if lidar == "STL27L" else "thread")
 
 
-CUPS = [("STS3215", "UST-10LX", (0, 0, 60, -30)), ("XL330-M288", "LD06", TILTED), ("STS3215", "LD06", TILTED)]
+def test_every_screw_into_a_device_meets_a_hole_and_one_that_does_not_is_found():
+    for servo, lidar, ring in (("XL430-W250", "STL27L", None), ("MX-64R", "UST-10LX", "UH1256-02-0610-06S")):
+        layout = laid_out(scanner_for(servo, lidar, ring, (0, 0, 0, 50)))
+        assert list(screws_without_a_hole(layout)) == []
+    turned = layout.scanner.lidar.model_copy(update={"holes": CATALOGUE.products["RPLIDAR C1"].holes})
+    wrong = replace(layout, scanner=replace(layout.scanner, lidar=turned))
+    assert [line[:46] for line in screws_without_a_hole(wrong)] == [
+        "alignment_linkage on lidar_body: no hole for M"
+    ] * 2
+
+
+@pytest.mark.parametrize("ring", RINGS)
+def test_a_servo_with_two_front_threads_is_refused_with_a_ring(ring):
+    with pytest.raises(BuildError, match=r"holes = \[\(11.0, -8.0\), \(-11.0, -8.0\)\] in front: XM430-W350 needs two"):
+        laid_out(scanner_for("XM430-W350", "UTM-30LX", ring))
+
+
+@pytest.mark.parametrize("lidar", ["LMS111", "LD06"])
+def test_a_lidar_that_no_plate_below_it_can_hold_is_refused_with_the_holes_it_has(lidar):
+    with pytest.raises(BuildError, match=rf"{lidar} has fewer than two equal .* in its base \(\d x M"):
+        laid_out(scanner_for("MX-64R", lidar, None))
+
+
+def test_a_frame_on_a_tilted_axis_stands_on_the_mount():
+    scanner = scanner_for("XL430-W250", "STL27L", None, (0, 30, 0, 30))
+    layout = laid_out(scanner)
+    assert not layout.deck.flat and layout.drive.mounted.onto == "servo_frame"
+    names = {joint.part for joint in layout.joints}
+    assert {"servo_frame", "base_mount", "horn_cup"} <= names
+
+
+def test_a_pair_of_screws_resists_tipping_by_the_edge_of_what_they_hold():
+    layout = laid_out(scanner_for("XL430-W250", "STL27L", None, (0, 0, 0, 50)))
+    joint = next(joint for joint in layout.joints if joint.onto == "servo_case")
+    centre = np.array([0.0, 0.0, 0.1]) + np.mean([axis.start for axis in joint.axes], axis=0) / 1000
+    pull, _ = worst_shares(joint, centre)
+    bare, _ = worst_shares(replace(joint, heel_mm=None), centre)
+    assert pull == pytest.approx(bare + 0.1 / (2 * joint.heel_mm / 1000))  # a lever of 100 mm over the heel
+
+
+CUPS = [("STS3215", "UST-10LX", (0, 0, 60, -30)), ("XL330-M288", "LD19", TILTED), ("XL430-W250", "LD19", TILTED)]
 
 
 @pytest.mark.parametrize(("servo", "lidar", "angles"), samples(CUPS, CUPS[:1]))
 def test_without_a_ring_every_horn_gets_a_printed_cup_around_the_heads_of_its_screws(servo, lidar, angles):
     scanner = scanner_for(servo, lidar, None, angles)
-    stack, screw = direct_stack(scanner), SCREWS[scanner.servo.horn_screw]
+    stack, screw = drive_of(scanner).stack, SCREWS[scanner.servo.horn_screw]
     assert stack.cup_bore >= scanner.servo.horn_circle_mm + screw.head_diameter  # the heads pass it
     assembly = make_parts(scanner)
     assert {part.process for part in assembly.parts.values()} == {"printed"} and "horn_cup" in assembly.parts
@@ -66,9 +108,9 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
     """Read from the solids: the hole that the joint tells is there, and behind it the nut's room or the wall."""
     scanner = scanner_for("XL430-W250", "STL27L", None, (0, 0, 0, 50))
     scanner = replace(scanner, printer=CATALOGUE.products[printer])
-    stack, assembly = direct_stack(scanner), make_parts(scanner)
-    joint = next(joint for joint in joints_of(layout_of(scanner)) if joint.onto == "horn_cup")
-    assert [printer, held_in(joint.thread), joint.inserts] in (
+    stack, assembly = drive_of(scanner).stack, make_parts(scanner)
+    joint = next(joint for joint in laid_out(scanner).joints if joint.onto == "horn_cup")
+    assert [printer, fixing_in(joint.thread), joint.inserts] in (
         ["fdm-0.4", "trap", False],
         ["fdm-0.4-insert", "thread", True],
     )
@@ -90,23 +132,21 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
 
 
 def test_a_ring_still_asks_for_a_turned_shaft():
-    stack = direct_stack(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S"))
+    stack = drive_of(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S")).stack
     assert stack.cup_bore == 0 and stack.shaft_diameter == 12.0 and stack.shaft == "servo_shaft"
 
 
 def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
-    with pytest.raises(BuildError, match=r"a circle of 14 mm \(nobody has verified it: measure yours\) leave 4.25"):
-        layout_of(scanner_for("STS3215", "UTM-30LX", "UH1256-02-0610-06S"))
     with pytest.raises(
-        BuildError, match=r"-32.75\)\] \(nobody has verified it: measure yours\): STS3215 needs two pairs"
+        BuildError, match=r"-29.0\)\] in front \(not verified: measure yours\): STS3215 needs two pairs"
     ):
-        layout_of(scanner_for("STS3215", "UST-10LX", None))
+        laid_out(scanner_for("STS3215", "UST-10LX", None))
 
 
 @pytest.mark.parametrize(
     ("ring", "changed", "why"),
     [
-        (None, {"case_rear_holes_mm": ()}, r"base_mount: deck: case_rear_holes_mm = .* MX-64R has no four holes"),
+        (None, {"holes": ()}, r"servo_frame: holes: MX-64R has no four equal holes in its rear .*none"),
         (
             "SRC022A-6",
             {"case_max_mm": (20.1, 10.0, -30.0)},
@@ -115,6 +155,6 @@ def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
     ],
 )
 def test_a_servo_that_the_parts_cannot_hold_is_refused_with_the_value_in_the_way(ring, changed, why):
-    scanner = scanner_for("MX-64R", "LD06", ring)
+    scanner = scanner_for("MX-64R", "LD19", ring)
     with pytest.raises(BuildError, match=why):
-        layout_of(replace(scanner, servo=scanner.servo.model_copy(update=changed)))
+        laid_out(replace(scanner, servo=scanner.servo.model_copy(update=changed)))

@@ -1,4 +1,4 @@
-"""Cables that stand still: from servo and stator to the edge of foot or deck, clear of what turns, tied to the foot."""
+"""Cables that do not turn: from servo and stator to the edge of foot or deck, clear of what turns, tied to the foot."""
 
 from dataclasses import replace
 
@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
-from scanwright.cad.layout.cables.standing import standing_leads_of
-from scanwright.cad.layout.cables.standing_room import standing_room_of
-from scanwright.cad.layout.cables.ties import foot_ties_of
+from scanwright.cad.layout.cables.fixed import fixed_cables_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS
-from scanwright.cad.layout.layout import layout_of
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.deck_holes import Rectangle
 
 LAID = [
@@ -23,14 +21,13 @@ LAID = [
 
 @pytest.mark.parametrize(("setting", "products"), LAID, ids=["cage", "arms", "belt", "deck"])
 def test_every_cable_leaves_its_device_and_keeps_its_bend(setting, products):
-    layout = layout_of(scanner_at(setting, **products))
-    room = standing_room_of(layout)
-    leads = standing_leads_of(layout)
+    layout = laid_out(scanner_at(setting, **products))
+    leads = layout.cables
     assert [lead.name for lead in leads] == ["servo_cable", "stator_leads"]
     for lead in leads:
         points = lead.path.points(1.0)
         assert lead.path.least_radius() >= lead.radius and lead.mass_g > 0
-        assert points[:, 2].max() < room.ceiling  # below all that turns
+        assert points[:, 2].max() < layout.drive.ceiling  # below all that turns
         if layout.deck.flat:
             continue
         R, centre = layout.deck.rotation(), np.array(layout.deck.centre)
@@ -44,12 +41,12 @@ def test_every_cable_leaves_its_device_and_keeps_its_bend(setting, products):
 
 
 def test_on_the_foot_each_lies_between_two_slots():
-    layout = layout_of(scanner_at(GROUND_AHEAD))
+    layout = laid_out(scanner_at(GROUND_AHEAD))
     deck = layout.deck
-    for lead in standing_leads_of(layout):
+    for lead in layout.cables:
         points = (lead.path.points(0.5) - np.array(deck.centre)) @ deck.rotation()
         inside = []
-        for seat in foot_ties_of(deck):
+        for seat in deck.ties:
             out = seat.direction()
             along, across = points @ out, points @ [-out[1], out[0], 0.0]
             over = (along > seat.first) & (along < seat.last) & (points[:, 2] < FOOT_THICKNESS + lead.diameter)
@@ -58,20 +55,20 @@ def test_on_the_foot_each_lies_between_two_slots():
 
 
 def test_what_the_catalogue_does_not_tell_is_not_laid():
-    layout = layout_of(scanner_at(GROUND_AHEAD))
+    layout = laid_out(scanner_at(GROUND_AHEAD))
     scanner = layout.scanner
     silent = replace(scanner, servo=scanner.servo.model_copy(update={"cable_out": None}))
-    assert [lead.name for lead in standing_leads_of(replace(layout, scanner=silent))] == ["stator_leads"]
+    assert [lead.name for lead in fixed_cables_of(replace(layout, scanner=silent), ())] == ["stator_leads"]
 
 
 def test_a_cable_that_cannot_bend_has_no_way():
-    layout = layout_of(scanner_at(GROUND_AHEAD))
+    layout = laid_out(scanner_at(GROUND_AHEAD))
     stiff = layout.scanner.servo.model_copy(update={"cable_bend_radius_mm": 40.0})
-    (lead, _) = standing_leads_of(replace(layout, scanner=replace(layout.scanner, servo=stiff)))
+    (lead, _) = fixed_cables_of(replace(layout, scanner=replace(layout.scanner, servo=stiff)), ())
     assert lead.path is None and lead.mass_g == 0
 
 
 def test_no_slot_of_the_foot_is_where_a_screw_of_the_deck_is():
     scanner = replace(scanner_at(GROUND_AHEAD), deck=Rectangle(shape="rectangle", size_mm=(80.0, 20.0), screw="M4"))
-    seats = foot_ties_of(layout_of(scanner).deck)
+    seats = laid_out(scanner).deck.ties
     assert {round(np.degrees(seat.azimuth)) % 180 for seat in seats} == {90}

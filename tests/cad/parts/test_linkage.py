@@ -11,6 +11,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from quick_tests import samples
+from scanners import bare_linkage, digest_of
 
 from scanwright.cad.assembly.linkage_preview import draft_linkage
 from scanwright.cad.checks.printing import thin_walls
@@ -18,21 +19,22 @@ from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.envelope import (
+    box_corners,
     covered_screws,
     ear_screws,
     envelope_of,
-    rotor_radius,
     screw_travel_mm,
     slot_ends,
 )
-from scanwright.cad.layout.layout import config_hash, drive_of, layout_of
-from scanwright.cad.layout.linkage import linkage_of
+from scanwright.cad.layout.placement import drive_of, placement_of
 from scanwright.cad.parts.alignment_linkage import alignment_linkage
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.parts.base_mount import base_mount
 from scanwright.cad.parts.sub_plate import sub_plate
 from scanwright.cad.solids import box, building
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Provenance, SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
@@ -72,8 +74,8 @@ HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidd
 @pytest.mark.parametrize(("alpha", "beta", "lidar"), samples(HARD, [HARD[0], HARD[3], HARD[5], HARD[6]]))
 def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha, beta, lidar):
     scanner = scanner_for(alpha, beta, lidar)
-    stack = direct_stack(scanner)
-    mesh = checked_mesh(alignment_linkage(linkage_of(scanner, stack)), "alignment_linkage")
+    stack = drive_of(scanner).stack
+    mesh = checked_mesh(alignment_linkage(bare_linkage(scanner)), "alignment_linkage")
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     assert body.is_watertight and body.body_count == 1
     assert 20_000 < body.volume < 120_000
@@ -86,12 +88,12 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     walls = thin_walls(mesh, scanner.printer.min_wall_mm)
     assert walls.area_mm2 < 0.01 * walls.surface_mm2
     # the draft that a page shows is the same body, off by what its chords leave out
-    drawn = draft_linkage(linkage_of(scanner, stack))
+    drawn = draft_linkage(bare_linkage(scanner))
     draft = trimesh.Trimesh(drawn.vertices, drawn.faces, process=False)
     assert draft.is_watertight and draft.volume == pytest.approx(body.volume, rel=1e-3)
     assert np.abs(draft.bounds - body.bounds).max() < 0.2
     # two radial screws reach the spigot: the body is open there
-    assert len(linkage_of(scanner, stack).cross_azimuths) == 2
+    assert len(bare_linkage(scanner).cross_azimuths) == 2
 
 
 SKINS = {  # where one stood, of 10 to 420 mm2
@@ -107,13 +109,13 @@ SKINS = {  # where one stood, of 10 to 420 mm2
 @pytest.mark.parametrize("where", SKINS)
 def test_no_skin_stays_between_what_is_cut(where):
     scanner = scanner_for(*SKINS[where])
-    walls = thin_walls(draft_linkage(layout_of(scanner).linkage), scanner.printer.min_wall_mm)
+    walls = thin_walls(draft_linkage(laid_out(scanner).linkage), scanner.printer.min_wall_mm)
     assert walls.area_mm2 < 5.0, f"{where}: {walls.thinnest_mm:.2f} mm at {walls.at}"
 
 
 def test_a_lying_plate_is_thick_at_its_foot():
     """A bracket, not a board: measured through the plate, beside its screws, below and above its middle."""
-    p = layout_of(scanner_for(0, 80)).linkage
+    p = laid_out(scanner_for(0, 80)).linkage
     drawn = draft_linkage(p)
     body = trimesh.Trimesh(drawn.vertices @ p.stack.R(), drawn.faces, process=False)
     down = np.sign(p.stack.R()[2, 0])  # along x, where the hub is
@@ -129,10 +131,10 @@ COVERED = [(25.5, -21.4, "UTM-30LX"), (7.8, -13.0, "URG-04LX"), (-30.7, 19.2, "U
 @pytest.mark.parametrize(("alpha", "beta", "lidar"), samples(COVERED, COVERED[:1]))
 def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha, beta, lidar):
     scanner = scanner_for(alpha, beta, lidar)
-    stack = direct_stack(scanner)
+    stack = drive_of(scanner).stack
     bodies = {
         "plate": sub_plate(scanner, stack, stack.sub_plate),
-        "linkage": alignment_linkage(linkage_of(scanner, stack)),
+        "linkage": alignment_linkage(bare_linkage(scanner)),
     }
     base = stack.R() @ [0, 0, -scanner.lidar.optical_height_mm]
     mesh = {}
@@ -143,7 +145,7 @@ def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha,
     half = scanner.lidar.body_mm[0] / 2
     np.testing.assert_allclose(mesh["plate"].bounds[:, 2], [-4, 0], atol=1e-4)
     down = np.array([[0.0, 0.0, -1.0]])
-    for x, y in scanner.lidar.mount_holes_mm:  # on the bench: from below through the plate alone
+    for x, y in scanner.lidar.base.places:  # on the bench: from below through the plate alone
         assert len(mesh["plate"].ray.intersects_location([[x, y, 1]], down)[0]) == 0
         pocket = mesh["linkage"].ray.intersects_location([[x, y, 1]], down)[0][:, 2].max()
         assert pocket == pytest.approx(-4 - 3.5, abs=1e-3)  # a head of 3
@@ -164,10 +166,12 @@ def test_a_screw_under_the_hub_gets_a_sub_plate_that_every_driver_reaches(alpha,
 @given(alpha=degrees, beta=degrees)
 def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
     scanner = scanner_for(alpha, beta)
-    stack = direct_stack(scanner)
+    stack = drive_of(scanner).stack
     assert 45 <= stack.h <= 90 and stack.h % 0.25 == 0
     assert stack.sub_plate is not None or covered_screws(scanner.lidar, stack) == []
-    assert (envelope_of(scanner.lidar, stack.sub_plate).corners() @ stack.R()[2]).min() >= stack.hub_bottom + 0.99
+    envelope = envelope_of(scanner.lidar)
+    boxes = (envelope.body, *envelope.cables, envelope.plate(stack.sub_plate), envelope.under(stack.sub_plate))
+    assert min((box_corners(box) @ stack.R()[2]).min() for box in boxes) >= stack.hub_bottom + 0.99
     assert stack.spigot_top > stack.hub_bottom > stack.ring_top > stack.ring_bottom > stack.horn
 
 
@@ -175,11 +179,11 @@ def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
 @given(alpha=turns, beta=degrees, alpha_laser=degrees, beta_laser=degrees)
 def test_the_deck_never_meets_the_rotor(alpha, beta, alpha_laser, beta_laser):
     scanner = scanner_for(alpha_laser, beta_laser, alpha_rot=alpha, beta_rot=beta)
-    stack = direct_stack(scanner)
+    stack = drive_of(scanner).stack
     deck = deck_of(scanner, drive_of(scanner))
     a, b = np.radians([alpha, beta])
     hangs = np.cos(a) * np.cos(b) < -1e-6
-    assert deck.t_world_rot[2] * (-1 if hangs else 1) > rotor_radius(scanner.lidar, stack.sub_plate)
+    assert deck.t_world_rot[2] * (-1 if hangs else 1) > envelope_of(scanner.lidar).radius(stack.sub_plate)
     # the deck's centre, seen from the world, is the world's origin
     R = scanner.angles.T_world_rot(0.0)[:3, :3]
     np.testing.assert_allclose(R @ np.array(deck.centre) + deck.t_world_rot, 0, atol=1e-5)
@@ -191,37 +195,41 @@ AXES = [(0, 0.01), (179.99, 0), (0, -90), (66, -52), (135, 45), (-24, 20)]
 @pytest.mark.parametrize(("alpha_rot", "beta_rot"), samples(AXES, AXES[:4]))
 def test_a_mount_for_any_axis(alpha_rot, beta_rot):
     scanner = scanner_for(30, -30, alpha_rot=alpha_rot, beta_rot=beta_rot)
-    solid = base_mount(layout_of(scanner))
+    solid = base_mount(placement_of(scanner))
     assert checked_mesh(solid, "base_mount").is_closed()
 
 
 def test_a_capsule_ring_has_no_place_on_a_shaft():
     capsule = load_catalogue().get("SRC022A-6", SlipRing)
     with pytest.raises(BuildError, match=r"bore_mm = 0: .*stator of a capsule"):
-        direct_stack(replace(scanner_for(0, 0), slip_ring=capsule))
+        direct_stack(replace(scanner_for(0, 0), slip_ring=capsule), envelope_of(scanner_for(0, 0).lidar))
 
 
 def test_a_bore_too_small_for_a_shaft_is_refused():
     with pytest.raises(BuildError, match=r"bore_mm = 6: a shaft of 5.5 mm .* bore_mm >= 8.4"):
-        direct_stack(with_ring(bore_mm=6.0))
+        drive_of(with_ring(bore_mm=6.0))
 
 
 def test_a_wide_bore_meets_the_heads_of_the_horn_screws():
     with pytest.raises(BuildError, match=r"servo_shaft: collar radius = 12.5 mm"):
-        direct_stack(with_ring(bore_mm=25.4, outer_diameter_mm=86.0))
+        drive_of(with_ring(bore_mm=25.4, outer_diameter_mm=86.0))
 
 
 def test_an_upside_down_lidar_is_refused():
     with pytest.raises(BuildError, match=r"alignment_linkage: tilt = 120.00 deg"):
-        direct_stack(scanner_for(120, 0))
+        drive_of(scanner_for(120, 0))
+
+
+def threads(*places):
+    return tuple(Hole(at_mm=(*place, 0.0), axis="-z", kind="tapped", size="M3", depth_mm=5.0) for place in places)
 
 
 def test_holes_outside_the_plate_are_refused():
     scanner = scanner_for(0, 0)
-    lidar = scanner.lidar.model_copy(update={"mount_holes_mm": ((29, 0.0), (-29, 0.0), (0.0, 29))})
+    lidar = scanner.lidar.model_copy(update={"holes": threads((29, 0.0), (-29, 0.0), (0.0, 29))})
     wrong = replace(scanner, lidar=lidar)
-    with pytest.raises(BuildError, match="alignment_linkage: seat: mount_holes_mm"):
-        linkage_of(wrong, direct_stack(wrong))
+    with pytest.raises(BuildError, match="alignment_linkage: seat: holes at"):
+        bare_linkage(wrong)
 
 
 def test_no_kernel_exception_reaches_the_user_bare():
@@ -240,18 +248,18 @@ def test_no_kernel_exception_reaches_the_user_bare():
 
 
 def test_the_mount_offset_needs_no_kernel():
-    imports = "import sys, scanwright.cad.files.part_files, scanwright.cad.layout.layout"
+    imports = "import sys, scanwright.cad.files.part_files, scanwright.cad.layout.placement"
     code = f"{imports}; assert not {{'cadquery', 'OCP', 'trimesh'}} & sys.modules.keys()"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-SLOTTED = [("UST-10LX", (5, 0)), ("RPLIDAR A1", (60, 60)), ("URG-04LX", (-80, 75))]
+SLOTTED = [("RPLIDAR S2", (5, 0)), ("RPLIDAR A1", (60, 60)), ("RPLIDAR S1", (-80, 75))]
 
 
 @pytest.mark.parametrize(("name", "at"), samples(SLOTTED, SLOTTED[:2]))
 def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, at):
     scanner = scanner_for(*at, lidar=name)
-    p, lidar = layout_of(scanner).linkage, scanner.lidar
+    p, lidar = laid_out(scanner).linkage, scanner.lidar
     assert p.screw_travel > 1.5
     part, low = (alignment_linkage(p), p.seat - 9.0)
     if p.ears is not None:
@@ -263,7 +271,7 @@ def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, a
     def bites(travel, x=0.0, y=0.0):
         """Volume that the shanks of a lidar's screws take from the part, its pitch another, or itself moved."""
         met = 0.0
-        for place in np.array(lidar.mount_holes_mm):
+        for place in np.array(lidar.base.places):
             at = place * (1 + travel / np.hypot(*place)) + [x, y]
             shank = manifold3d.Manifold.cylinder(9.0, p.screw.nominal / 2 * 0.99, circular_segments=48)
             met += (shank.translate((*at, low)).transform(T) ^ body).volume()
@@ -275,18 +283,18 @@ def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, a
 
 
 def test_a_lidar_whose_holes_somebody_verified_gets_round_ones():
-    measured = scanner_for(5, 0, lidar="UST-10LX")
+    measured = scanner_for(5, 0, lidar="RPLIDAR S2")
     lidar = measured.lidar.model_copy()
-    lidar._provenance = lidar.provenance() | {"mount_holes_mm": Provenance(source="calliper", verified=True)}
+    lidar._provenance = lidar.provenance() | {"holes": Provenance(source="calliper", verified=True)}
     verified = replace(measured, lidar=lidar)
-    assert (layout_of(measured).linkage.screw_travel > 0, layout_of(verified).linkage.screw_travel) == (True, 0)
-    assert config_hash(measured) != config_hash(verified)
+    assert (laid_out(measured).linkage.screw_travel > 0, laid_out(verified).linkage.screw_travel) == (True, 0)
+    assert digest_of(measured) != digest_of(verified)
 
 
 def test_slots_need_lines_that_cross():
-    lidar = scanner_for(5, 0, lidar="UST-10LX").lidar
-    centred = lidar.model_copy(update={"mount_holes_mm": ((0.0, 0.0), (20.0, 20.0), (-20.0, 20.0))})
-    in_line = lidar.model_copy(update={"mount_holes_mm": ((0.0, 15.0), (0.0, -15.0), (0.0, 8.0))})
+    lidar = scanner_for(5, 0, lidar="RPLIDAR S2").lidar
+    centred = lidar.model_copy(update={"holes": threads((0.0, 0.0), (20.0, 20.0), (-20.0, 20.0))})
+    in_line = lidar.model_copy(update={"holes": threads((0.0, 15.0), (0.0, -15.0), (0.0, 8.0))})
     assert screw_travel_mm(centred) > 1.5 and screw_travel_mm(in_line) == 0
     assert slot_ends((0.0, 0.0), 1.8) == ((0.0, 0.0), (0.0, 0.0))
     for at in ((3.0, 4.0), (20.0, -20.0)):

@@ -5,19 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scanners import GROUND_AHEAD, RING, UPRIGHT, scanner_at
+from scanners import GROUND_AHEAD, RING, UPRIGHT, digest_of, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.shadow import PartsWorkshop
 from scanwright.cad.assembly.steps import steps_of
 from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
 from scanwright.cad.checks.products import module_checks
-from scanwright.cad.checks.remarks import left_out_of
 from scanwright.cad.files.bom import items_of
-from scanwright.cad.layout.all_joints import joints_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS
-from scanwright.cad.layout.layout import config_hash, layout_of
 from scanwright.cad.layout.names import LIDAR
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import NO_MODULES, Modules
@@ -31,7 +29,7 @@ def scanner_for(angles, modules, ring=RING):
 def bought(assembly):
     scanner = assembly.layout.scanner
     masses = dict.fromkeys(assembly.made, 1.0)
-    return items_of(scanner, assembly, joints_of(assembly.layout), masses, config_hash(scanner))
+    return items_of(scanner, assembly, assembly.layout.joints, masses, digest_of(scanner))
 
 
 ON_TRIPOD = scanner_for(GROUND_AHEAD, Modules(tripod_foot=True))
@@ -47,22 +45,22 @@ def on_tripod(parts_of):
 def test_what_is_not_asked_for_is_told_as_left_out_and_changes_nothing_that_is_made(name):
     asked, without = (scanner_for(GROUND_AHEAD, Modules(**{name: value})) for value in (True, False))
     assert without.modules == NO_MODULES
-    specs = [layout_of(scanner) for scanner in (asked, without)]
-    assert config_hash(asked) != config_hash(without)
+    specs = [laid_out(scanner) for scanner in (asked, without)]
+    assert digest_of(asked) != digest_of(without)
     assert specs[0].linkage == specs[1].linkage and specs[0].stack == specs[1].stack
 
 
 def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod, parts_of):
     without = parts_of(scanner_for(GROUND_AHEAD, NO_MODULES))
     assert "tripod_foot" in on_tripod.made and "tripod_foot" not in without.parts
-    assert "tripod_foot" not in [left.what for left in left_out_of(on_tripod)]
-    (left,) = [left for left in left_out_of(without) if left.what == "tripod_foot"]
+    assert "tripod_foot" not in [left.what for left in on_tripod.layout.left_out]
+    (left,) = [left for left in without.layout.left_out if left.what == "tripod_foot"]
     assert left.why == "the task does not ask for it by modules.tripod_foot" and left.saved == 1
     assert on_tripod.made["base_mount"].Volume() == pytest.approx(without.made["base_mount"].Volume())
 
 
 def test_the_world_begins_where_the_tripod_does(on_tripod):
-    deck, plain = on_tripod.layout.deck, layout_of(scanner_for(GROUND_AHEAD, NO_MODULES)).deck
+    deck, plain = on_tripod.layout.deck, laid_out(scanner_for(GROUND_AHEAD, NO_MODULES)).deck
     assert deck.tripod.thickness == 8.0
     np.testing.assert_allclose(np.subtract(deck.t_world_rot, plain.t_world_rot), [0, 0, 8.0], atol=1e-6)
     turn = on_tripod.layout.scanner.angles.T_world_rot(0.0)[:3, :3]
@@ -74,7 +72,7 @@ def test_the_world_begins_where_the_tripod_does(on_tripod):
 
 
 def test_the_lidar_hangs_on_a_nut_of_the_tripod_and_no_screw_ends_in_plastic(on_tripod):
-    joints = {(joint.part, joint.onto): joint for joint in joints_of(on_tripod.layout)}
+    joints = {(joint.part, joint.onto): joint for joint in on_tripod.layout.joints}
     of_mount, of_tripod = joints["base_mount", "tripod_foot"], joints["tripod", "tripod_foot"]
     assert ("base_mount", "deck") not in joints
     assert of_mount.traps and of_tripod.traps and of_tripod.count == 1
@@ -87,7 +85,7 @@ def test_the_lidar_hangs_on_a_nut_of_the_tripod_and_no_screw_ends_in_plastic(on_
 
 def test_a_lone_screw_keeps_the_foot_from_tipping_over_its_edge(on_tripod):
     """Against forces tried in many directions: the pull is what turns the foot about the edge it tips over."""
-    (joint,) = [joint for joint in joints_of(on_tripod.layout) if joint.part == "tripod"]
+    (joint,) = [joint for joint in on_tripod.layout.joints if joint.part == "tripod"]
     axis = joint.axes[0]
     along, start, heel = np.array(axis.along), np.array(axis.start) / 1000, joint.heel_mm / 1000
     centre = start + 0.12 * along + 0.19 * np.cross(along, [0.3, 0.5, 0.8])
@@ -109,8 +107,8 @@ def test_the_nut_is_bought_and_the_screw_of_the_tripod_is_not(on_tripod):
 
 
 def test_an_upright_axis_gets_its_mount_for_the_tripod():
-    assert layout_of(scanner_for(UPRIGHT, NO_MODULES)).deck.flat
-    layout = layout_of(scanner_for(UPRIGHT, Modules(tripod_foot=True)))
+    assert laid_out(scanner_for(UPRIGHT, NO_MODULES)).deck.flat
+    layout = laid_out(scanner_for(UPRIGHT, Modules(tripod_foot=True)))
     assert not layout.deck.flat and math.isclose(layout.deck.normal[2], 1.0)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scanners import TILTED, scanner_at
+from scanners import TILTED, bare_linkage, scanner_at
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.checks.remarks import without_traps
@@ -14,10 +14,8 @@ from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.labels.fit_coupon import fit_coupon
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.direct.cage import cage_of, has_room
-from scanwright.cad.layout.direct.sizing import direct_stack
-from scanwright.cad.layout.linkage import linkage_of
+from scanwright.cad.layout.direct.cage import has_room
+from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.parts.alignment_linkage import alignment_linkage
 from scanwright.cad.screws import SCREWS, thread_in_part, trap_of
 from scanwright.design.angles import Angles
@@ -33,7 +31,7 @@ def nutted(parts_of):
     scanner = scanner_at(TILTED, printer="fdm-0.4-nut")
     assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in (assembly.made | assembly.bought).items()}
-    return scanner, assembly, rounds, joints_of(assembly.layout)
+    return scanner, assembly, rounds, assembly.layout.joints
 
 
 def _nut(start, along, turn_deg, length=HEIGHT):
@@ -84,7 +82,7 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     core = thread_in_part(M3, PRINTER, room_for_nut=False)
     plain = [replace(cage, fixing="thread", thread=core)]
     assert [finding.subject for finding in without_traps(PRINTER, plain)] == [cage.onto]
-    stack = cage_of(scanner, assembly.layout.stack).stack
+    stack = assembly.layout.stack
     assert has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 15.0, 1.2)
     assert not has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 7.0, 1.2)  # the ring comes down to the nut
 
@@ -93,9 +91,9 @@ def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):
     setting = Angles(alpha_rot=0, beta_rot=0, alpha_laser=21, beta_laser=-21)
     angles = made.scanner.angles.model_copy(update={"angles_deg": setting, "t_world_rot_mm": (0.0, 0.0, 0.0)})
     scanner = replace(made.scanner, printer=PRINTER, angles=angles)
-    linkage = linkage_of(scanner, direct_stack(scanner))
+    linkage = bare_linkage(scanner)
     assert len(linkage.ear_screws) == 4
-    part = alignment_linkage(linkage).moved(solids.location(direct_stack(scanner).R().T))  # in the laser frame
+    part = alignment_linkage(linkage).moved(solids.location(drive_of(scanner).stack.R().T))  # in the laser frame
     low = linkage.top - 8.0
     for x, y in linkage.ear_screws:
         floor = np.array([x, y, low + trap_of(M3, PRINTER).depth])

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 import trimesh
 from quick_tests import samples
-from scanners import GROUND_AHEAD, UPRIGHT, scanner_at
+from scanners import GROUND_AHEAD, UPRIGHT, mount_offset_mm, scanner_at
 
 from scanwright.cad.checks.products import products_of, unverified
 from scanwright.cad.layout.deck import FOOT_THICKNESS
-from scanwright.cad.layout.layout import mount_offset_mm
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 
 # name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo; hundreds more: `python -m benchmarks.cad.parts`

@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
+from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.steps import steps_of
-from scanwright.cad.checks.remarks import left_out_of
 from scanwright.cad.layout.cables.leads import tied_mm
-from scanwright.cad.layout.cables.tie_seat import GROOVE, SLOT_ACROSS
-from scanwright.cad.layout.cables.ties import foot_ties_of
-from scanwright.cad.layout.cables.words import tied_at
 from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
+from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS
 
 TIE = (2.5, 1.1)  # width and thickness
 
@@ -56,7 +54,7 @@ def test_a_tie_goes_around_every_tongue(tied):
 
 def test_a_tie_goes_through_the_foot_and_below_it(parts_of):
     assembly = parts_of(scanner_at(GROUND_AHEAD))
-    deck, seats = assembly.layout.deck, foot_ties_of(assembly.layout.deck)
+    deck, seats = assembly.layout.deck, assembly.layout.deck.ties
     assert len(seats) == 4
     for seat in seats:
         middle = np.array([(seat.first + seat.last) / 2])
@@ -70,7 +68,7 @@ def test_a_tie_goes_through_the_foot_and_below_it(parts_of):
 
 def test_the_leads_leave_the_ring_under_the_tongue_near_enough_to_be_pulled_up(tied):
     seat = tied.layout.linkage.hub_tie
-    assert [0.3 < tied_mm(lead, seat) < 1.0 for lead in tied.leads] == [True, True]
+    assert [0.3 < tied_mm(lead, seat) < 1.0 for lead in tied.layout.leads] == [True, True]
 
 
 def test_the_bar_of_a_counterweight_lies_on_the_ear_and_not_on_the_tie(parts_of):
@@ -79,10 +77,10 @@ def test_the_bar_of_a_counterweight_lies_on_the_ear_and_not_on_the_tie(parts_of)
 
 
 def test_a_tie_is_counted_for_every_tongue_and_for_the_foot_of_a_mount(tied):
-    layout, left_out = tied.layout, {entry.what for entry in left_out_of(tied)}
+    layout, left_out = tied.layout, {entry.what for entry in tied.layout.left_out}
     plates = 0 if PLATE_TIE in left_out else len(layout.scanner.lidar.cable_y_mm)
     foot = 0 if layout.deck.flat else 1
-    assert tied_at(layout, tied.leads) == ["hub"] + plates * ["plate"] + foot * ["foot of the mount"]
+    assert tied_at(layout) == ["hub"] + plates * ["plate"] + foot * ["foot of the mount"]
 
 
 def test_a_tie_that_went_in_under_the_bar_is_closed_and_no_other_asked_for(tied):
@@ -96,5 +94,5 @@ def test_a_tie_that_went_in_under_the_bar_is_closed_and_no_other_asked_for(tied)
 
 def test_what_has_no_tongue_is_told(parts_of):
     assembly = parts_of(scanner_at((0, 19, 84, 41), sensor="URG-04LX", slip_ring=CAPSULE))
-    (told,) = [entry for entry in left_out_of(assembly) if entry.what == HUB_TIE]
+    (told,) = [entry for entry in assembly.layout.left_out if entry.what == HUB_TIE]
     assert assembly.layout.linkage.hub_tie is None and "hollow shaft" in told.why

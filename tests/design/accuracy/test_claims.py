@@ -17,6 +17,7 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.objective import score as scoring
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.coarse import Effort, coarse_landscape
 from scanwright.design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
 from scanwright.design.search.optimum import directions_left_out
@@ -108,7 +109,7 @@ def test_equivalent_settings_folded_and_not(sensor):
     assert len(folded[0].first) * len(folded[1].first) < 0.3 * len(whole[0].first) * len(whole[1].first)
     lowest = []
     for axes, planes in (folded, whole):
-        land, _ = coarse_landscape(problem, planes, axes, lambda _: None, Limits(), avoid_holes=False, effort=EXACT)
+        land, _ = coarse_landscape(problem, planes, axes, no_progress, Limits(), avoid_holes=False, effort=EXACT)
         by_plane = land.plain.by_plane[planes.flip.astype(int), planes.classes]
         lowest.append((by_plane, land.plain.by_axis[axes.flip.astype(int), axes.classes]))
     for of_folded, of_whole in zip(*lowest, strict=True):

@@ -33,6 +33,7 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import homogeneity, log_density
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.search.search import search
@@ -199,7 +200,7 @@ def test_what_sees_nothing_is_blind_to_all_of_the_weight_and_no_more(ceiling, ro
 
 
 def test_what_j_alone_would_take_is_told_without_a_table():
-    optimum = find_optimum(load_task(Path("ground_ahead")), lambda _: None)
+    optimum = find_optimum(load_task(Path("ground_ahead")), no_progress)
     (first, *_), (alone, *_) = optimum.hole_lines(), optimum.hole_lines(tabled=False)
     assert first.endswith("would take the last row of the table")
     assert re.search(r"would take \(0, -5\d.*\) with J = -6\.12\d\d$", alone)
@@ -219,7 +220,7 @@ def test_the_cheap_scanner_stands_beside_with_what_a_dollar_sees(ceiling, rows):
     cheap = load_task(Path("low_cost"))
     assert row.time_s == cheap.task.motion.duration_s
     assert row.cost_usd == cheap.lidar.price_usd + cheap.servo.price_usd
-    assert (row.range_stated_m, row.range_practical_m, row.range_sigma_mm) == (25, 25, 10)
+    assert (row.range_stated_m, row.range_practical_m, row.range_sigma_mm) == (25, 10, 15)
     assert (rows[0].range_stated_m, rows[0].range_practical_m) == (30, 15), "what its maker states, what users get"
     assert row.beams_per_ball == pytest.approx(np.exp(-row.J) - 1)
     assert row.beams_per_ball_per_usd == pytest.approx(row.beams_per_ball / row.cost_usd)

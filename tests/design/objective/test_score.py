@@ -233,16 +233,36 @@ def test_g_of_the_true_counts_is_worse_where_lines_leave_gaps():
 
 
 @pytest.mark.parametrize("seed", [13, 166, 198, 217, 261, 315])
-def test_a_count_that_is_lower_between_nodes_is_found(seed):
-    """Thirty times the nodes find none that is lower."""
+def test_a_lowest_count_is_that_of_every_polar_angle(seed):
+    """Thirty times the nodes, and random angles about the lowest of them, reach no lower count."""
     rng = np.random.default_rng(seed)
     period_s, ball_deg, axis = float(np.round(rng.uniform(2, 6), 1)), rng.uniform(3, 8), rng.normal(size=3).tolist()
     region = {"shape": "cone", "axis": axis, "half_angle_deg": rng.uniform(5, 30)}
     p = problem([region], period_s=period_s, ball_radius_deg=ball_deg)
     p = p.with_beams(p.bearings_rad[::12], p.lines)
     setting = rng.uniform(-1.5, 1.5, 4)
-    assert score_on(p, setting, 729).least <= score_on(p, setting, 20_000, stated=False).least
-    assert score_on(p, setting, 729).least < score_on(p, setting, 729, stated=False).least
+    least = score_on(p, setting, 729).least
+    assert least < score_on(p, setting, 729, stated=False).least
+    rule, polar, azimuth = polar_rule(p, setting, 20_000)
+    t = rule.polar_rad[rule.fine > 0]
+    lowest = zones(t, polar, azimuth, p.lines, p.ball_rad, log_density).least
+    about = t[np.argsort(lowest, kind="stable")[:200], None] + rng.uniform(-1e-4, 1e-4, (200, 40))
+    about = np.clip(about.ravel(), t.min(), t.max())
+    assert least <= min(lowest.min(), zones(about, polar, azimuth, p.lines, p.ball_rad, log_density).least.min())
+
+
+@pytest.mark.parametrize("period_s", [2.0, 2.013])
+def test_a_bound_of_a_range_is_below_every_count_in_it(period_s):
+    rng = np.random.default_rng(4)
+    p = problem([ALL], period_s=period_s, ball_radius_deg=4.0)
+    polar, azimuth = polar_and_azimuth(p.with_beams(p.bearings_rad[::7], p.lines).beams_rot(np.array([0.4, -0.7])))
+    low = rng.uniform(0, pi, 60)
+    high = np.minimum(low + 10 ** rng.uniform(-5, -1.5, 60), pi)
+    bound = zones(low, polar, azimuth, p.lines, p.ball_rad, log_density, high).least
+    inside = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, 25)
+    counts = zones(inside.ravel(), polar, azimuth, p.lines, p.ball_rad, log_density).least.reshape(60, 25)
+    assert (bound <= counts.min(axis=1)).all()
+    assert (bound == counts.min(axis=1)).mean() > 0.2
 
 
 def test_quick_J_is_the_same_J():

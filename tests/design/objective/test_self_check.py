@@ -9,7 +9,9 @@ from quick_tests import samples
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import NumericalError
-from scanwright.design.objective.counted import _net
+from scanwright.design.objective import counted, self_check
+from scanwright.design.objective.counted import _net, counted_J
+from scanwright.design.objective.drawn_regions import drawn_in, layers_of
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.objective.self_check import require_counted
@@ -118,6 +120,49 @@ def test_an_optimum_on_a_field_that_loses_weight_does_not_leave_the_search(monke
     best = search(problem, loaded.task.angles.model_copy(update={"step_deg": 30.0})).best[0]
     with pytest.raises(NumericalError):
         require_counted(loaded, best.angles_rad, best.score)
+
+
+def sparse_strokes():
+    """A task with few beams in a neighbourhood, as brush strokes on cells."""
+    cells = np.zeros((20, 40))
+    cells[6:14, 3:30] = np.random.default_rng(2).random((8, 27)) < 0.4
+    return a_task([{"shape": "map", "file": "w.npy"}], maps=[cells], motion={"period_s": 4.0}, ball_radius_deg=2.0)
+
+
+def test_the_count_of_a_sparse_scan_is_sure_to_four_standard_errors_of_a_few_thousandths():
+    loaded = sparse_strokes()
+    right = score(problem_of(loaded), SETTING)
+    J, J_error, _ = self_check._counted(loaded, SETTING, None, (0.0, 0.0, 0.0))
+    assert abs(J - right.J) <= right.J_error + J_error
+    assert J_error < 1.2 * self_check.NEAR
+
+
+@pytest.mark.parametrize("motion", ["spin", "seam", "stop_and_go"])
+@pytest.mark.parametrize("objective", ["log", "homogeneity", "required", "kl"])
+def test_the_control_variate_does_not_change_the_mean(motion, objective, monkeypatch):
+    loaded = a_task([GROUND], motion=MOTIONS[motion], objective=objective, required=30.0, ball_radius_deg=1.5)
+    controlled = counted_J(loaded, SETTING, 1, 256, 8)
+    counts = counted._counts
+
+    def without_means(*arguments):
+        found, mean = counts(*arguments)
+        return found, mean * np.nan
+
+    monkeypatch.setattr(counted, "_counts", without_means)
+    plain = counted_J(loaded, SETTING, 1, 256, 8)
+    assert controlled.J == pytest.approx(plain.J, abs=1.5 * np.hypot(controlled.J_error, plain.J_error))
+
+
+def test_cells_are_drawn_by_weight_and_stand_for_their_area():
+    table = np.random.default_rng(3).random((12, 24)) ** 4
+    loaded = a_task([{"shape": "map", "file": "w.npy"}], maps=[table])
+    (layer,) = drawn_in(layers_of(loaded))
+    u = _net(2**14, np.random.default_rng(1))
+    d, _ = layer.drawn(u)
+    share = 1 / layer.chance(d, np.nan) / len(u)
+    areas = 2 * np.pi / 24 * -np.diff(np.cos(np.pi * np.arange(13) / 12))[:, None]
+    assert share.sum() == pytest.approx(4 * np.pi, rel=1e-2)
+    assert share @ layer.value_at(d) == pytest.approx((areas * table).sum(), rel=1e-3)
 
 
 def test_the_points_drawn_are_a_net():

@@ -44,6 +44,11 @@ def test_of_a_turn_they_hold_on_few_nodes():
     assert abs(shares).max() < 1
 
 
+def test_they_are_a_few_times_the_true_ones():
+    shares = shares_of_the_stated(problem(SPIN, objective="log", ball_radius_deg=2.0), 2187, 19_683, 12, 4)
+    assert 0.1 < np.median(abs(shares)) and abs(shares).max() < 1
+
+
 def test_of_a_step_between_two_nodes_they_hold():
     p = problem(SPIN, objective="required", required=12, ball_radius_deg=2.0)
     assert abs(shares_of_the_stated(p, 27, 6561, 30, 5)).max() < 1

@@ -15,6 +15,7 @@ from scanwright.design.objective.ball_search import start_phases
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import quick_J, score
 from scanwright.design.objective.tolerance import rise_words, sensitivity, worst_within
+from scanwright.design.progress import no_progress
 from scanwright.design.search import families
 from scanwright.design.search import search as search_module
 from scanwright.design.search.grid_classes import fold_planes, mirrors_of
@@ -109,7 +110,7 @@ def test_a_gap_limit_that_leaves_holes_names_the_period_without_them(period_s):
 def test_the_shortest_period_keeps_its_limit_in_simulated_scans():
     """At the period found every direction has the beams it must have at any phase; 15 % faster some has not."""
     task = loaded(motion={"period_s": "shortest", "longest_s": 12.0}, limits={"min_density": 12})
-    now, problem, result = fastest(task, lambda _: None)
+    now, problem, result = fastest(task, no_progress)
     assert now.task.motion.period_s < 12.0
     directions = weighted_samples(problem.field, 2500).directions
 
@@ -126,7 +127,7 @@ def test_the_shortest_period_keeps_its_limit_in_simulated_scans():
 
 def test_the_shortest_period_for_a_gap_is_the_one_that_makes_it():
     task = loaded(motion={"period_s": "shortest"}, limits={"max_line_gap_deg": 1.0})
-    now, problem, result = fastest(task, lambda _: None)
+    now, problem, result = fastest(task, no_progress)
     assert gaps(problem, result.best[0].angles_rad).line_gap_deg <= 1.0 + 1e-9
     one_less = problem_of(loaded(motion={"period_s": now.task.motion.period_s - 1 / 40}))
     assert gaps(one_less, result.best[0].angles_rad).line_gap_deg > 1.0
@@ -183,14 +184,14 @@ def test_a_region_that_no_setting_sees_is_told():
 
 def test_holes_between_the_nodes_of_every_setting_are_no_refusal(monkeypatch):
     """A task without limits has an answer where no setting is free of holes, even if none shows them at the nodes."""
-    real = search_module.best_leader
+    real = search_module.best_candidate
 
     def with_holes(land, planes, axes, required, **more):
         return None if required.avoid_holes else real(land, planes, axes, required, **more)
 
     task, told = loaded(angles=ANGLES | {"step_deg": 45}), []
     free = search(problem_of(task), task.task.angles)
-    monkeypatch.setattr(search_module, "best_leader", with_holes)
+    monkeypatch.setattr(search_module, "best_candidate", with_holes)
     found = search(problem_of(task), task.task.angles, told.append)
     assert found.best[0].score.J <= free.best[0].score.J and found.least_blind is not None
     assert "no setting of the grid sees all of the region: the lowest J of all" in told

@@ -9,6 +9,7 @@ from scanwright.design.errors import TaskError
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.gain import gain_lines, gains
@@ -146,7 +147,7 @@ def test_the_simplest_mount_costs_no_more_than_accepted_and_breaks_nothing(seed)
 
 def test_a_mount_with_one_angle_is_taken_if_it_costs_little_and_the_answer_says_so():
     flat = {"alpha_rot_deg": 0, "beta_rot_deg": 0, "step_deg": 30.0, "prefer": "simple"}
-    found = find_optimum(task(angles=flat | {"prefer_loss": 0.6}), lambda _: None)
+    found = find_optimum(task(angles=flat | {"prefer_loss": 0.6}), no_progress)
     answer, lowest = found.search.best[0], found.search.lowest
     assert angles_used(answer.angles_deg) < angles_used(lowest.angles_deg)
     assert found.angle_set().J == pytest.approx(answer.score.J, abs=1e-3)
@@ -166,7 +167,7 @@ def test_the_preference_holds_for_the_shortest_period():
         limits={"max_line_gap_deg": 6.0},
         angles={"alpha_rot_deg": 0, "beta_rot_deg": 0, "step_deg": 45.0, "prefer": "simple", "prefer_loss": 0.6},
     )
-    found = find_optimum(asked, lambda _: None)
+    found = find_optimum(asked, no_progress)
     assert found.search.lowest is not None and found.loaded.task.motion.period_s < 60
     answer, lowest = found.search.best[0].score.J, found.search.lowest.score.J
     assert np.exp(lowest - answer) >= 0.4 and found.search.best[0].score.blind_weight <= NO_BLIND_WEIGHT

@@ -5,7 +5,7 @@ import pytest
 
 from scanwright.design.objective.named_objectives import Moment, Objective
 from scanwright.design.search.constraints import AtMost, NoHole
-from scanwright.design.search.plane_axis_product import PART, PIECE, both_ways, lowest
+from scanwright.design.search.plane_axis_product import PART, PIECE, both_orientations, lowest
 
 PLANES, AXES, NODES = PIECE + 37, PART + 211, 7
 
@@ -26,7 +26,7 @@ def test_the_lowest_of_every_plane_and_axis(sides):
     g, weights, has_plane, has_axis, hole, most = sides
     moment = Moment(None, np.asarray)
     objective = Objective("none", None, (moment,), lambda moments: np.asarray(moments[0]))
-    plain, kept = lowest(objective, [both_ways(moment, g, weights)], has_plane, has_axis, [hole, most])
+    plain, kept = lowest(objective, [both_orientations(moment, g, weights)], has_plane, has_axis, [hole, most])
     straight, turned = g @ weights.T, g[:, ::-1] @ weights.T
     in_hole = (
         (hole.fan_rad[:, 0, None] > hole.region_rad[:, 0]) | (hole.fan_rad[:, 1, None] < hole.region_rad[:, 1]),

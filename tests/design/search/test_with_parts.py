@@ -13,6 +13,7 @@ from scanwright.design.errors import BuildError
 from scanwright.design.objective.ball_search import start_phases
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.with_parts import Refused, choose_with_parts, equivalents, score_with
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
@@ -105,7 +106,7 @@ def test_the_equivalent_that_hides_least_is_built():
         if not workshop.bound(np.radians(setting)).beams.any():
             away = setting
     assert away is not None and workshop.bound(np.radians(towards)).beams.any()
-    chosen = choose_with_parts(p, (family(p, *towards),), AngleRanges(), Limits(), workshop, lambda _: None)
+    chosen = choose_with_parts(p, (family(p, *towards),), AngleRanges(), Limits(), workshop, no_progress)
     assert chosen.family.angles_deg == away
     assert chosen.shadow.share() == 0 and chosen.family.score.J == pytest.approx(chosen.bare.J, abs=1e-9)
     assert chosen.bounded == 2 and chosen.built == 1
@@ -116,7 +117,7 @@ def test_a_family_that_hides_less_wins_and_the_rest_is_not_made():
     fixed = AngleRanges(alpha_rot_deg=0, beta_rot_deg=(0, 90), alpha_laser_deg=0, beta_laser_deg=(0, 90))
     families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0), family(p, 0.0, 85.0, 0.0, 3.0))
     workshop = ConeRegion(p, np.radians(60))
-    chosen = choose_with_parts(p, families, fixed, Limits(), workshop, lambda _: None)
+    chosen = choose_with_parts(p, families, fixed, Limits(), workshop, no_progress)
     best = min(families, key=lambda f: score_with(p, f.angles_rad, workshop.bound(f.angles_rad)).J)
     assert chosen.family.angles_deg == best.angles_deg
     assert chosen.built <= len(families) and chosen.open == 0
@@ -126,10 +127,10 @@ def test_the_simplest_mount_is_built_though_another_one_has_a_lower_J_and_hides_
     p = problem()
     families = (family(p, 0.0, 85.0, 0.0, 3.0), family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0))
     simple = AngleRanges(prefer="simple", prefer_loss=0.5, holes="allow")
-    chosen = choose_with_parts(p, families, simple, Limits(), ConeRegion(p, np.radians(60)), lambda _: None)
+    chosen = choose_with_parts(p, families, simple, Limits(), ConeRegion(p, np.radians(60)), no_progress)
     assert chosen.family.angles_deg == families[0].angles_deg and chosen.built == 1
     refused = tuple(equivalents(p, families[0].angles_deg, simple))
-    chosen = choose_with_parts(p, families, simple, Limits(), ConeRegion(p, np.radians(60), refused), lambda _: None)
+    chosen = choose_with_parts(p, families, simple, Limits(), ConeRegion(p, np.radians(60), refused), no_progress)
     assert chosen.family.angles_deg in equivalents(p, families[1].angles_deg, simple)
 
 
@@ -138,15 +139,15 @@ def test_what_cannot_be_built_is_refused_with_its_reason():
     families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0))
     fixed = AngleRanges(alpha_rot_deg=0, beta_rot_deg=(0, 90), alpha_laser_deg=0, beta_laser_deg=(0, 90))
     first, second = sorted(families, key=lambda f: f.score.J)
-    chosen = choose_with_parts(p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg,)), lambda _: None)
+    chosen = choose_with_parts(p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg,)), no_progress)
     assert chosen.family.angles_deg == second.angles_deg
     assert [reason.split(": ")[1] for reason in chosen.refused] == ["tilted too far"]
     with pytest.raises(BuildError, match="tilted too far"):
         choose_with_parts(
-            p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg, second.angles_deg)), lambda _: None
+            p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg, second.angles_deg)), no_progress
         )
     with pytest.raises(BuildError, match=r"limits\.max_blocked"):
-        choose_with_parts(p, families[:1], fixed, Limits(max_blocked=0.01), ConeRegion(p, 1.2), lambda _: None)
+        choose_with_parts(p, families[:1], fixed, Limits(max_blocked=0.01), ConeRegion(p, 1.2), no_progress)
 
 
 def test_a_sweep_keeps_its_setting():

@@ -7,7 +7,7 @@ import pytest
 from quick_tests import samples
 from random_fields import field, random_field, unit_vectors, walls
 
-from scanwright.design.errors import NumericalError
+from scanwright.design.errors import NumericalError, TaskError
 from scanwright.design.sphere import polar_rule
 from scanwright.design.sphere.polar_rule import circle_rule
 from scanwright.design.sphere.total_weight import total_weight
@@ -43,6 +43,15 @@ def test_a_rule_that_loses_weight_is_an_error(monkeypatch):
     monkeypatch.setattr(polar_rule, "weighted_segments", without_the_widest)
     with pytest.raises(NumericalError, match="please report"):
         circle_rule(f, np.array([0.6, 0.0, 0.8]), NO_BREAKS, NODES)
+
+
+def test_a_ring_that_is_too_thin_is_refused_with_its_width():
+    """A mask leaves a ring of 1e-5 deg, less than what is looked at on both sides of an edge."""
+    cone = {"shape": "cone", "axis": [1.0, 0.3, 0.2], "half_angle_deg": 10.0}
+    f = field([cone], [cone | {"half_angle_deg": 10.0 - 1e-5}])
+    with pytest.raises(TaskError, match="thinner than 2e-05 deg") as refused:
+        circle_rule(f, np.array([0.866, 0.433, 0.25]), NO_BREAKS, NODES)
+    assert not isinstance(refused.value, NumericalError)
 
 
 @pytest.mark.parametrize("seed", samples(range(20), range(5)))

@@ -70,7 +70,7 @@ def test_a_platform_that_drives_is_named(tmp_path):
 
 def test_people_that_walk_are_named(tmp_path):
     record = calibrated(tmp_path, Unrest(walkers=2))
-    assert any("somebody walked" in note for note in record["notes"])
+    assert any("a person walked" in note for note in record["notes"])
     assert not any("platform" in note for note in record["notes"])
 
 

@@ -426,7 +426,7 @@ def test_a_servo_stuck_in_its_dead_sector_stalls():
     with ServoEmulator("AX-12A", angle_rad=math.pi) as emulator, open_servo(emulator.port) as servo:
         emulator.stall()
         servo.spin(6.0)
-        with pytest.raises(DeviceFaultError, match="stall: stuck in the dead sector where"):
+        with pytest.raises(DeviceFaultError, match="stall: stuck in the dead sector instead of"):
             read_for(servo, 60.0)
 
 
@@ -450,7 +450,7 @@ def test_opening_sets_what_it_relies_on_if_it_may_and_says_so():
             assert (servo.id, servo.baud) == (42, 115200)
             notes = " ".join(servo.warnings())
             assert "homing_offset (register 20) was -500" in notes and "drive_mode (register 10) was 1" in notes
-            assert "return_delay_time (register 9) is 250, so that its answers come 500 us late" in notes
+            assert "return_delay_time (register 9) is 250, so that its answers are 500 us late" in notes
             assert (memory[20], memory[68], memory[10], memory[9]) == (0, 2, 0, 250)
         memory[9] = 0
         with open_servo(emulator.port, servo_id=42) as servo:
@@ -506,11 +506,11 @@ def test_two_programs_cannot_share_a_port():
 # Faults: whatever happens, the servo stands, and the error says what to do
 
 FAULTS = [
-    ("overload", "overload at {volts} V, 30 degC: free what brakes the axis"),
+    ("overload", "overload at {volts} V, 30 degC: free the axis"),
     ("overheat", r"overheating at {volts} V, \d+5 degC: let it cool down"),
-    ("stall", r"stall: moved \d+\.\d deg where"),
-    ("brown_out", r"restarted by itself, {volts} V now: look at its supply"),
-    ("low", r"voltage at \d.\d V, 30 degC: look at its supply"),
+    ("stall", r"stall: moved \d+\.\d deg instead of"),
+    ("brown_out", r"restarted by itself, {volts} V now: check its supply"),
+    ("low", r"voltage at \d.\d V, 30 degC: check its supply"),
 ]
 
 
@@ -624,7 +624,7 @@ def test_it_stands_when_its_program_does_not_listen_and_when_its_bus_is_cut():
         ):
             servos[0].read()
         for servo in servos[1:]:
-            with pytest.raises(DeviceError, match="could not be stopped: take its power"):
+            with pytest.raises(DeviceError, match="could not be stopped: cut its power"):
                 servo.close()
         helpless.reconnect_bus()
         with open_servo(helpless.port, servo_id=1):
@@ -639,7 +639,7 @@ def test_unplugged_is_said_and_plugged_in_it_is_found_again(model, protocol):
             read_for(servo, 0.1)
             emulator.unplug()
             read_for(servo, 60.0)
-        assert any("could not be stopped: take its power" in note for note in caught.value.__notes__)
+        assert any("could not be stopped: cut its power" in note for note in caught.value.__notes__)
         with pytest.raises(DeviceError, match="no such port"):
             open_servo(emulator.port)
         emulator.replug()

@@ -116,8 +116,26 @@ def test_equal_seeds_are_equal_scans(room):
 
 def test_a_sensor_of_the_catalogue_has_its_own_limits():
     urg = range_model(load_catalogue().get("URG-04LX", Lidar))
-    assert (urg.range_min_m, urg.range_max_m, urg.sigma_m) == (0.02, 4.0, 0.01)
+    assert (urg.range_min_m, urg.range_max_m) == (0.02, 4.0)
+    assert urg.sigma_m(np.array([0.5, 3.0])) == pytest.approx([0.01, 0.03])  # 1 % beyond 1 m
     assert range_model(load_catalogue().get("URG-04LX", Lidar), sigma_mm=3).sigma_m == 0.003
+
+
+def test_noise_grows_with_the_range_as_the_catalogue_states():
+    """Two walls head on, at 1.5 and 3 m: a triangulating sensor has four times the noise at twice the range."""
+    a1, n = load_catalogue().get("RPLIDAR A1", Lidar), 20_000
+    for range_m, sigma_m in ((1.5, 0.015), (3.0, 0.06)):
+        hits = Hits(np.full(n, range_m), np.zeros(n), np.zeros(n, np.int32))
+        measured = measure_ranges(hits, range_model(a1), np.random.default_rng(5))
+        assert measured.range_m.std() == pytest.approx(sigma_m, rel=0.03)
+
+
+def test_the_head_of_a_scanner_with_a_ring_feels_its_friction(tmp_path):
+    (tmp_path / "scanner.urdf").write_text(URDF)
+    ring = angle_set(20, -55, -80, 75).model_copy(update={"slip_ring": "UH1256-02-0610-06S"})
+    assert read_load(tmp_path, ring).bearing_nm == pytest.approx(0.18)
+    bare = ring.model_copy(update={"slip_ring": None})
+    assert read_load(tmp_path, bare).bearing_nm == Load().bearing_nm
 
 
 URDF = """<robot name="r"><link name="world"/>

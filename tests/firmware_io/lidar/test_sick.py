@@ -211,3 +211,30 @@ def test_skipped_turns_are_not_missing():
 def test_what_speaks_no_cola_is_told():
     with emulator(dialects=()) as sensor, pytest.raises(DeviceTimeoutError, match="no SICK sensor answers"):
         open_sick(sensor.address)
+
+
+# What sick_scan_xd 3.9 sends to a TiM5xx and an LMS1xx beyond our driver, in the layout of telegram listing 8014631.
+OTHER_REQUESTS = [
+    ("sRN FirmwareVersion", "sRA FirmwareVersion 5 V1.00"),
+    ("sRN LocationName", "sRA LocationName B not defined"),
+    ("sEN LIDinputstate 0", "sEA LIDinputstate 0"),
+    ("sEN LIDoutputstate 0", "sEA LIDoutputstate 0"),
+    ("sEN LFErec 0", "sEA LFErec 0"),
+    ("sRN LFPmeanfilter", "sRA LFPmeanfilter 0 A 0"),
+    ("sWN LFPmeanfilter 1 3 0", "sFA 1"),
+    ("sMN SetAccessMode 3 F4724744", "sAN SetAccessMode 1"),
+    ("sWN LFPmeanfilter 1 3 0", "sWA LFPmeanfilter"),
+    ("sRN LFPmeanfilter", "sRA LFPmeanfilter 1 3 0"),
+    ("sWN FREchoFilter 0", "sWA FREchoFilter"),
+    ("sRN FREchoFilter", "sRA FREchoFilter 0"),
+    ("sRN LMPoutputRange", "sRA LMPoutputRange 1 D05 FFF92230 225510"),
+    ("sRN field000", "sFA 3"),
+]
+
+
+def test_an_emulator_answers_what_other_programs_ask():
+    """The range of a TiM571: from -45 to 225 deg, in steps of a third of a degree cut to 0.3333."""
+    machine = SickEmulator(SickMachine(load_catalogue().get("TiM571", Lidar), look, 0)).machine
+    for request, answer in OTHER_REQUESTS:
+        got, rest = machine.hear(b"\x02" + request.encode() + b"\x03", 1_000_000_000)
+        assert (got, rest) == (b"\x02" + answer.encode() + b"\x03", b""), request

@@ -13,7 +13,7 @@ from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
-from scanwright.firmware_io.emulators.slamtec import machine
+from scanwright.firmware_io.emulators import world
 from scanwright.firmware_io.emulators.slamtec.machine import SlamtecEmulator
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import open_lidar
@@ -47,7 +47,7 @@ def patience(monkeypatch):
     monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
-    monkeypatch.setattr(machine, "_SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
+    monkeypatch.setattr(world, "SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
 
 
 def lidar(model):

@@ -1,4 +1,4 @@
-"""RPLIDARs whose motor starts from rest, in every scan mode: turns are handed out, on time, and none is lost."""
+"""Lidars whose motor starts from rest, in every scan mode: turns are handed out, on time, and none is lost."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from virtual_line import VirtualLine
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.families import open_lidar
+from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
 
@@ -50,6 +51,22 @@ def test_turns_come_while_the_motor_spins_up(model, number, monkeypatch):
         true_ms = (one.scan.range_m.astype(float) - 1.0) * 100
         off_ms = (one.scan.time_ns / 1e6 - true_ms + 200) % (1e3 * SLOW_S) - 200
         assert np.nanmax(np.abs(off_ms)) < 3e-6 * one.uncertainty_ns + 1.0
+
+
+@pytest.mark.parametrize("model", samples(["LD06", "LD19", "STL27L"], ["LD19"]))
+def test_an_ldrobot_that_starts_from_rest_sends_no_bad_packets(model, monkeypatch):
+    line = VirtualLine(model, clock_m)
+    for module in (sensor_line, ldrobot):
+        monkeypatch.setattr(module, "time", line)
+    monkeypatch.setattr(sensor_line, "open_stream", line.open)
+    with open_lidar("virtual", model) as lidar:
+        line.machine.power_cycle(line.now_ns)
+        lidar.start()
+        line.sleep(1.0)
+        timed = [lidar.read(3.0) for _ in range(12)]
+        assert lidar.bad_packets == 0
+    speed_hz = 1 / np.diff([one.scan.stamp_ns / 1e9 for one in timed])
+    assert speed_hz[0] < 0.95 * lidar.scan_rate_hz and speed_hz[-1] > 0.9 * lidar.scan_rate_hz
 
 
 class WireAt:

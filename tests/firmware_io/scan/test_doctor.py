@@ -218,6 +218,11 @@ def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):
 
     monkeypatch.setattr("serial.serialposix.fcntl.ioctl", listening)
     with ServoEmulator("MX-64R") as emulator:
+        fd = os.open(emulator.port, os.O_RDWR | os.O_NOCTTY)
+        modes = termios.tcgetattr(fd)
+        modes[2] |= termios.HUPCL  # as serial ports have it, but no pseudo-terminal
+        termios.tcsetattr(fd, termios.TCSANOW, modes)
+        os.close(fd)
         opened = serial_port.open_serial_port(emulator.port, 57600)
         assert not termios.tcgetattr(opened.fileno())[2] & termios.HUPCL  # closing drops DTR no more
         opened.baudrate = 115_200

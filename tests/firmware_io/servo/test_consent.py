@@ -291,7 +291,7 @@ def test_scan_stops_where_nobody_can_be_asked(command, tmp_path):
     with emulated_scanner(SCANNER, room(None), factory_servo=True) as emulators, announced(tmp_path, emulators.ports):
         before = bytes(emulators.servo.memory.data[:24])
         code, _, complaints = command("scan", tmp_path)
-        assert code == 2
+        assert code == 3
         assert "1 register that outlasts the power must change first; nothing was written" in complaints[0]
         assert (
             "ccw_angle_limit (register 8) is 4095, so that it does not turn continuously; 0 is right" in complaints[1]

@@ -19,7 +19,7 @@ from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
 
 OFF = "servo 1 (MX-64R) has answered that its torque is off"
-UNHEARD = "could not be stopped: take its power"
+UNHEARD = "could not be stopped: cut its power"
 
 
 @pytest.mark.parametrize("cut", [False, True])
@@ -63,7 +63,7 @@ def test_a_neglected_servo_that_its_guard_cannot_reach_is_not_said_to_be_stopped
         servo._guard._process.kill()  # as good as a guard that was not answered
         servo._guard._process.wait()
         servo._guard._sent_s = 0.0
-        with pytest.raises(DeviceError, match="did not answer when it was to be stopped: take its power"):
+        with pytest.raises(DeviceError, match="did not answer the order to stop: cut its power"):
             servo.read()
         with pytest.raises(DeviceError, match=UNHEARD):
             servo.close()

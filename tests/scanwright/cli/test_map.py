@@ -73,7 +73,7 @@ def test_a_cloud_becomes_a_map(run, shop):
 def test_without_a_place_nothing_is_free_and_a_line_says_so(run, shop):
     code, told, _ = run("room.ply", "-o", "blind.yaml")
     assert code == 0
-    assert "nobody knows where the scanner stood that saw it, so no cell is free: name --angles, or --poses" in told
+    assert "unknown scanner position of the cloud, so no cell is free" in told
     assert 254 not in np.asarray(Image.open(shop / "blind.pgm"))
 
 
@@ -118,13 +118,16 @@ def test_poses_move_the_map(run, shop):
         (("room.ply", "-o", "m.yaml", "--from-m", "2"), "= 1.8: allowed 0 < "),
         (("room.ply", "-o", "m.yaml", "--floor-m", "inf"), "= inf: must be finite"),
         (("room.ply", "-o", "m.yaml", "--floor-m", "90"), "no point and no beam between 0.1 and 1.8 m above the floor"),
-        (("sky.npz", "-o", "m.yaml"), "which is no floor then: name its height: --floor-m"),
+        (("sky.npz", "-o", "m.yaml"), "which is no floor then: pass its height as --floor-m"),
         (("sky.npz", "-o", "m.yaml", "--angles", "angles.json"), "no point lies below the scanner"),
-        (("merged.npz", "-o", "m.yaml", "--angles", "angles.json"), "which no single place saw: name those"),
+        (
+            ("merged.npz", "-o", "m.yaml", "--angles", "angles.json"),
+            "merged from several clouds (column count): pass those clouds",
+        ),
         (("room.ply", "room.ply", "-o", "m.yaml", "--poses", "one.tum"), "1 poses for 2 clouds"),
         (("room.ply", "-o", "m.yaml", "--angles", "none.json"), "none.json"),
         (("room.ply", "-o", "m.yaml", "--seen-through-m", "0"), "= 0.0: must be above 0 and finite"),
-        (("room.ply", "room.ply", "-o", "m.yaml", "--seen-through-m", "1"), "0 clouds whose scanner's place is known"),
+        (("room.ply", "room.ply", "-o", "m.yaml", "--seen-through-m", "1"), "0 clouds with a known scanner position"),
         (("none.ply", "-o", "m.yaml"), "none.ply"),
     ],
 )

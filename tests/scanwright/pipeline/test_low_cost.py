@@ -7,8 +7,6 @@ import pytest
 from scanwright import api
 from scanwright.cad.checks.run import run_checks
 from scanwright.cad.files.bom import items_of
-from scanwright.cad.layout.all_joints import joints_of
-from scanwright.cad.layout.layout import config_hash
 from scanwright.design.progress import no_progress
 
 
@@ -22,16 +20,18 @@ def low_cost(parts_of):
 
 @pytest.fixture(scope="module")
 def bought(low_cost):
-    assembly, digest = low_cost.assembly, config_hash(low_cost.scanner)
+    assembly, digest = low_cost.assembly, low_cost.assembly.layout.digest
     masses = {name: solid.Volume() * 1.3e-3 for name, solid in assembly.made.items()}  # of the densest plastic
-    return items_of(low_cost.scanner, assembly, joints_of(assembly.layout), masses, digest)
+    return items_of(low_cost.scanner, assembly, assembly.layout.joints, masses, digest)
 
 
 def test_all_that_is_made_is_printed(low_cost):
     parts = low_cost.assembly.parts
     assert {name: parts[name].process for name in low_cost.assembly.made} == {
+        "servo_frame": "printed",
         "horn_cup": "printed",
         "alignment_linkage": "printed",
+        "sub_plate": "printed",
     }
 
 

@@ -51,7 +51,7 @@ def agrees_with_the_parts(row, task):
     density = {"servo_shaft": 2.7, "journal_sleeve": 2.7}  # turned from aluminium
     made = sum(s.Volume() / 1000 * density.get(n, scanner.printer.density_g_cm3) for n, s in assembly.made.items())
     devices = loaded.lidar.mass_g + loaded.servo.mass_g
-    cables = sum(lead.mass_g for lead in assembly.standing)
+    cables = sum(lead.mass_g for lead in assembly.layout.cables)
     assert float(row["mass_g"]) == pytest.approx(made + devices + cables, rel=1e-4)
     assert float(row["cost_usd"]) == loaded.lidar.price_usd + loaded.servo.price_usd
     setting = np.radians([0.0, 0.0, 0.0, -60.0])

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from scanwright.cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
-from scanwright.cad.layout.linkage import AlignmentLinkage
+from scanwright.cad.layout.rotor.linkage import LinkageBody
 from scanwright.design.arrays import Array, Mask
 
 FAR_ABOVE = 1e3
@@ -28,15 +28,16 @@ def swept(box: Box) -> Box:
     return low, (x, y, FAR_ABOVE)
 
 
-def in_fan(points: Array, p: AlignmentLinkage, gap: float) -> Mask:
-    """Points that the linkage leaves free for its beams."""
+def in_fan(points: Array, p: LinkageBody, gap: float, fan_z: tuple[float, float] | None = None) -> Mask:
+    """Points that the linkage leaves free for its beams, or for those between other heights of the laser frame."""
+    low, high = fan_z or p.fan_z
     bearing = np.arctan2(points[:, 1], points[:, 0])
-    in_slab = (points[:, 2] > p.fan_z[0] - gap) & (points[:, 2] < p.fan_z[1] + gap)
+    in_slab = (points[:, 2] > low - gap) & (points[:, 2] < high + gap)
     in_slab &= np.hypot(points[:, 0], points[:, 1]) > min(p.half_x, p.half_y) - gap
     return np.asarray(in_slab & np.any([(bearing - first) % (2 * math.pi) < last - first for first, last in p.fan], 0))
 
 
-def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
+def behind_screws(points: Array, p: LinkageBody) -> Mask:
     """Points where the drivers of the lidar's screws come from; under a sub-plate they are driven on the bench."""
     below = points[:, 2] < p.top - PLATE_THICKNESS
     if p.ears is not None:
@@ -44,7 +45,7 @@ def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
     return below & at_screws(points, p)
 
 
-def at_screws(points: Array, p: AlignmentLinkage) -> Mask:
+def at_screws(points: Array, p: LinkageBody) -> Mask:
     """Points over or under the heads of the lidar's screws and their drivers, wherever these sit in their slots."""
     near = [_from_slot(points, *slot_ends(place, p.screw_travel)) < p.screw.head_room for place in p.holes]
     return np.asarray(np.any(near, axis=0))
@@ -52,9 +53,9 @@ def at_screws(points: Array, p: AlignmentLinkage) -> Mask:
 
 def _from_slot(points: Array, first: tuple[float, float], last: tuple[float, float]) -> Array:
     """Distances from the line between the middles of a slot's ends, seen along it."""
-    flat, way = points[:, :2] - first, np.subtract(last, first)
-    share = np.clip(flat @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
-    return np.asarray(np.hypot(*(flat - share[:, None] * way).T))
+    flat, along = points[:, :2] - first, np.subtract(last, first)
+    share = np.clip(flat @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
+    return np.asarray(np.hypot(*(flat - share[:, None] * along).T))
 
 
 def in_hull(points: Array, corners: Array, gap: float) -> Mask:

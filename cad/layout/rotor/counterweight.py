@@ -15,16 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scanwright.cad.layout.balance.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from scanwright.cad.layout.balance.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
 from scanwright.cad.layout.deck import FOOT_THICKNESS, FREE, Deck
-from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced
-from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.envelope import rotor_radius
+from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM
-from scanwright.cad.layout.linkage import CROSS_SCREW, AlignmentLinkage, Ear, neck_corners
-from scanwright.cad.layout.loads import STEEL_G_CM3, tilt_sine
+from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
+from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
+from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
+from scanwright.cad.layout.rotor.linkage import CROSS_SCREW, Ear, LinkageBody
+from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
@@ -52,7 +51,6 @@ SECTIONS = (
     (40, 30),
 )
 SCREW = SCREWS["M4"]
-RUBS_NM = 5e-3  # what bearing and ring rub with at least: assumed, no data sheet of theirs says it
 UPRIGHT = 1e-6  # sine of the tilt
 EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_SCREW.head_room + 0.5  # clear of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
@@ -102,32 +100,43 @@ class Counterweight:
         return replace(self, length=SAW * round(length / SAW))
 
 
-def counterweight_of(scanner: Scanner, deck: Deck, linkage: AlignmentLinkage) -> Counterweight | LeftOut:
+def counterweight_of(
+    scanner: Scanner,
+    drive: DriveLayout,
+    deck: Deck,
+    linkage: LinkageBody,
+    plate_ties: tuple[TieSeat, ...],
+    neck: Array,
+) -> Counterweight | LeftOut:
     """The lightest bar that balances the rotor and has room, or why there is none.
 
     Args:
         scanner: angles and products.
+        drive: below the hub.
         deck: that the bar must stay clear of.
-        linkage: without an ear.
+        linkage: that carries it.
+        plate_ties: tongues of its plate.
+        neck: corners of its neck, shape (n, 3).
     """
     if not play_matters(scanner):
         return _without(f"the play of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
     if tilt_sine(scanner) < UPRIGHT:
         return _without("gravity does not turn an upright axis")
-    moment = estimated_moment(scanner, linkage)
-    if torque_nm(scanner, float(np.linalg.norm(moment))) <= RUBS_NM:
-        return _without(f"gravity turns the rotor with no more than bearing and ring rub with, {RUBS_NM:g} N m")
+    moment = estimated_moment(scanner, linkage, neck)
+    least, _ = friction_nm(scanner)
+    if torque_nm(scanner, float(np.linalg.norm(moment))) <= least:
+        return _without(f"gravity turns the rotor with no more than the friction of bearing and ring, {least:g} N m")
     if keeps_flank(scanner, moment):
         return _without("all over the sweep gravity keeps the gears on one flank")
     azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))
-    neck, fault = neck_corners(linkage, 0), ""
+    free, fault = _FreeSpace(drive, deck, linkage, plate_ties, neck), ""
     for section in SECTIONS:
         bar = _bar(scanner, linkage, azimuth, section)
         bar = bar.balancing(moment + _ear_moment(scanner, linkage, bar.ear))
         if bar.length < LEAST_LENGTH:
             fault = fault or "would be shorter than its screws need"
             break
-        fault = _fault(scanner, linkage, deck, neck, bar)
+        fault = free.fault(scanner, bar)
         if not fault:
             return bar
     return _without(f"the rotor is out of balance, but the bar that would mend it {fault}")
@@ -145,7 +154,7 @@ def _grams_per_mm(section: tuple[float, float]) -> float:
     return section[0] * section[1] * STEEL_G_CM3 / 1000
 
 
-def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: tuple[float, float]) -> Counterweight:
+def _bar(scanner: Scanner, linkage: LinkageBody, azimuth: float, section: tuple[float, float]) -> Counterweight:
     stack = linkage.stack
     start = stack.hub_radius + FROM_HUB + TRIM
     ear = Ear(
@@ -160,46 +169,48 @@ def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: t
     return Counterweight(ear=ear, section=section, start=start, length=LEAST_LENGTH)
 
 
-def _ear_moment(scanner: Scanner, linkage: AlignmentLinkage, ear: Ear) -> Array:
+def _ear_moment(scanner: Scanner, linkage: LinkageBody, ear: Ear) -> Array:
     across = 2 * ear.half_width * (ear.high - ear.low) * scanner.printer.density_g_cm3 / 1000
     return across * (ear.end**2 - linkage.stack.hub_radius**2) / 2 * _direction(ear.azimuth)
 
 
-def _fault(scanner: Scanner, linkage: AlignmentLinkage, deck: Deck, neck: Array, bar: Counterweight) -> str:
-    """What a bar, wherever it slides, and its ear would meet; empty where nothing."""
-    ear, half, stack = bar.ear, bar.section[0] / 2, linkage.stack
-    inner, outer = bar.start - TRIM, bar.end + TRIM + LONGER
-    if math.hypot(bar.end, half) > rotor_radius(scanner.lidar, stack.sub_plate):
-        return "would reach further than the lidar"
-    rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
-    if _height_over(deck, rims) < FOOT_THICKNESS + FREE / 2:
-        return "would come too near to the deck"
-    if isinstance(stack, DirectStack) and _overloads(scanner, stack, bar):
-        return f"would be more than the horn of {scanner.servo.name} bears alone"
-    of_bar = _points((inner, -half, ear.high), (outer, half, ear.high + bar.section[1]), ear.azimuth)
-    of_ear = _points((inner, -ear.half_width, ear.low), (ear.end, ear.half_width, ear.high), ear.azimuth)
-    held, put_in = of_bar @ stack.R(), of_ear @ stack.R()  # the bar comes last, when the lidar is in its place
-    boxes = [linkage.body, *linkage.cables, *([] if linkage.ears is None else [linkage.ears])]
-    if any(in_box(held, box, GAP).any() or in_box(put_in, swept(box), GAP).any() for box in boxes):
-        return "would meet the lidar or its cables"
-    tongues = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in linkage.plate_ties]
-    if any(in_box(points, (low, high), GAP).any() for low, high in tongues for points in (held, put_in)):
-        return "would meet a tongue of the plate"
-    both = np.concatenate([held, put_in])
-    if in_fan(both, linkage, GAP).any():
-        return "would stand in the fan"
-    if behind_screws(both, linkage).any():
-        return "would stand before the screws of the lidar"
-    if in_hull(of_bar, neck, GAP).any():
-        return "would meet the neck of the linkage"
-    return ""
+@dataclass(frozen=True, slots=True)
+class _FreeSpace:
+    """What a bar and its ear must leave alone."""
 
+    drive: DriveLayout
+    deck: Deck
+    linkage: LinkageBody
+    plate_ties: tuple[TieSeat, ...]
+    neck: Array
 
-def _overloads(scanner: Scanner, stack: DirectStack, bar: Counterweight) -> bool:
-    """Whether it is the bar that makes the rotor too heavy for a horn without a bearing."""
-    if stack.bearing is not None or not horn_bears(scanner, stack):
-        return False
-    return not horn_bears_balanced(scanner, stack, bar.mass_g, bar.ear.high + bar.section[1] / 2)
+    def fault(self, scanner: Scanner, bar: Counterweight) -> str:
+        """What a bar, wherever it slides, and its ear would meet; empty if nothing."""
+        linkage = self.linkage
+        ear, half, stack = bar.ear, bar.section[0] / 2, linkage.stack
+        inner, outer = bar.start - TRIM, bar.end + TRIM + LONGER
+        if math.hypot(bar.end, half) > self.drive.envelope.radius(stack.sub_plate):
+            return "would reach further than the lidar"
+        rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
+        if _height_over(self.deck, rims) < FOOT_THICKNESS + FREE / 2:
+            return "would come too near to the deck"
+        if not self.drive.bears(bar.mass_g, bar.ear.high + bar.section[1] / 2):
+            return f"would be more than the horn of {scanner.servo.name} bears alone"
+        of_bar = _points((inner, -half, ear.high), (outer, half, ear.high + bar.section[1]), ear.azimuth)
+        of_ear = _points((inner, -ear.half_width, ear.low), (ear.end, ear.half_width, ear.high), ear.azimuth)
+        placed, put_in = of_bar @ stack.R(), of_ear @ stack.R()  # the bar comes last, when the lidar is in its place
+        boxes = [linkage.body, *linkage.cables, *([] if linkage.ears is None else [linkage.ears])]
+        if any(in_box(placed, box, GAP).any() or in_box(put_in, swept(box), GAP).any() for box in boxes):
+            return "would meet the lidar or its cables"
+        tongues = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in self.plate_ties]
+        if any(in_box(points, (low, high), GAP).any() for low, high in tongues for points in (placed, put_in)):
+            return "would meet a tongue of the plate"
+        both = np.concatenate([placed, put_in])
+        if in_fan(both, linkage, GAP).any():
+            return "would stand in the fan"
+        if behind_screws(both, linkage).any():
+            return "would stand before the screws of the lidar"
+        return "would meet the neck of the linkage" if in_hull(of_bar, self.neck, GAP).any() else ""
 
 
 def _height_over(deck: Deck, rims: tuple[tuple[float, float], ...]) -> float:

@@ -1,4 +1,4 @@
-"""A short way of a lead through the room on the rotor, as the corners of a smooth path.
+"""A short path of a lead through the free space on the rotor, as the corners of smooth arcs.
 
 Straight pieces between the points of a lattice about the axis make the graph; what is found is a short chain of
 them whose corners leave room for their arcs. Each piece pays for at most half of the arc at either end, so that any
@@ -52,21 +52,21 @@ class Ending:
         direction: unit vector, shape (3,).
         lengths: of the piece behind the last corner that may be tried.
         used: what the arc at the last corner takes of that piece.
-        held: length of that piece along which it may be near: it leaves its device there.
+        clamped: length of that piece along which it may be near: it leaves its device there.
     """
 
     corners: Array
     direction: Array
     lengths: tuple[float, ...]
     used: float
-    held: float
+    clamped: float
 
     def tips(self) -> Array:
         """Where the free part of the lead may begin, shape (m, 3)."""
         return np.asarray(self.corners[-1] + np.array(self.lengths)[:, None] * self.direction)
 
 
-def short_way(
+def short_path(
     room: LeadRoom, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
 ) -> Path | None:
     """A short path from one of some ends to one of others, within GREED of the shortest; None where there is none.
@@ -85,7 +85,7 @@ def short_way(
     lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
     points = np.concatenate([[end.tips()[tip] for end, tip in first], lattice, [end.tips()[tip] for end, tip in last]])
     beyond = len(first) + len(lattice)
-    chain = WayGraph(room, half, radius, points).chain(
+    chain = PathGraph(room, half, radius, points).chain(
         {i: (end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(first)},
         {i: (-end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(last, start=beyond)},
     )
@@ -112,7 +112,7 @@ def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[End
 
 def _clear(room: LeadRoom, end: Ending, tip: int, half: float) -> bool:
     """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
-    first, last = min(end.held, end.lengths[tip]), end.lengths[tip]
+    first, last = min(end.clamped, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
     return bool(room.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
 
@@ -127,7 +127,7 @@ class _Ends:
 
 
 @dataclass(frozen=True, slots=True)
-class WayGraph:
+class PathGraph:
     """The points (n, 3) that a lead may turn at, and the straight pieces between them, looked at when asked for.
 
     Attributes:
@@ -171,9 +171,9 @@ class WayGraph:
             others, _, lengths = self._pieces_at(here)
             known = shortest.setdefault(here, np.full(len(others), np.inf))
             for onto in self._onwards(here, stiff, ends, length + lengths < known - 1e-9):
-                found, there = length + float(lengths[onto]), int(others[onto])
-                known[onto], came[here, there] = found, (before, here)
-                heapq.heappush(queue, (found + float(left[there]), found, here, there, int(onto)))
+                so_far, there = length + float(lengths[onto]), int(others[onto])
+                known[onto], came[here, there] = so_far, (before, here)
+                heapq.heappush(queue, (so_far + float(left[there]), so_far, here, there, int(onto)))
         return []
 
     def _piece(self, start: int, end: int) -> Stiff:
@@ -181,11 +181,11 @@ class WayGraph:
         length = float(np.linalg.norm(along))
         return along / length, length / 2
 
-    def _onwards(self, here: int, stiff: Stiff, ends: _Ends, asked: Mask) -> NDArray[np.int64]:
-        """Which of the pieces from a point, of those that are asked for, one may go on along from a stiff one."""
+    def _onwards(self, here: int, stiff: Stiff, ends: _Ends, open_: Mask) -> NDArray[np.int64]:
+        """Which of the open pieces from a point one may go on along from a stiff one."""
         others, along, lengths = self._pieces_at(here)
         direction, left = stiff
-        fits = asked & (_arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2))
+        fits = open_ & (_arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2))
         last = np.flatnonzero(others >= ends.first)
         if len(last):
             end = others[last] - ends.first

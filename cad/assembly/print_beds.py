@@ -1,4 +1,4 @@
-"""Whether every printed part lies on the bed of its printer: what does not is refused before anything is written."""
+"""Whether every printed part fits the bed of its printer: one that does not is an error before anything is written."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from scanwright.design.errors import BuildError
 SLACK_MM = 0.01  # the noise of meshes
 
 
-def refuse_what_no_bed_holds(assembly: Assembly) -> None:
-    """Look at every made part that is printed.
+def require_beds(assembly: Assembly) -> None:
+    """Require a bed for every made part that is printed.
 
     Raises:
         BuildError: one lies on no bed of this printer, however it is turned; the message names its size and what helps.

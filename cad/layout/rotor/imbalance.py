@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from scanwright.cad.layout.balance.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.envelope import PLATE_THICKNESS
-from scanwright.cad.layout.linkage import AlignmentLinkage, neck_corners
-from scanwright.cad.layout.loads import FAR_MM, tilt_sine
+from scanwright.cad.layout.loads import noise_deg, tilt_sine
+from scanwright.cad.layout.rotor.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
+from scanwright.cad.layout.rotor.linkage import LinkageBody
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.motion import Sweep
@@ -18,13 +18,13 @@ from scanwright.design.scanner import Scanner
 CELL = 2.0
 
 
-def estimated_moment(scanner: Scanner, p: AlignmentLinkage) -> Array:
+def estimated_moment(scanner: Scanner, p: LinkageBody, neck: Array) -> Array:
     """Mass times distance from the axis of lidar, linkage and sub-plate, rotation frame, shape (2,) [g mm].
 
-    The linkage is counted in cells: within 3 % of its solid (`tests/cad/parts/test_balance.py`).
+    The linkage is counted in cells: within 3 % of its solid (`tests/cad/parts/test_balance.py`). Its neck is the hull
+    of corners of shape (n, 3).
     """
     lidar, stack, R = scanner.lidar, p.stack, p.stack.R()
-    neck = neck_corners(p, 0)
     reach = max(p.half_x, p.half_y) if p.ears is None else max(p.ears[1][:2])
     plate = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0.0, 1.0)])
     plate = plate * [reach, reach, p.seat - p.top + PLATE_THICKNESS] + [0.0, 0.0, p.top - PLATE_THICKNESS]
@@ -32,19 +32,19 @@ def estimated_moment(scanner: Scanner, p: AlignmentLinkage) -> Array:
     corners = np.concatenate([neck, plate @ R.T, [[-r, -r, stack.shoulder], [r, r, -stack.h]]])
     axes = [np.arange(low + CELL / 2, high, CELL) for low, high in zip(corners.min(0), corners.max(0), strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    seen = cells @ R
-    x, y, z = np.abs(seen[:, 0]), np.abs(seen[:, 1]), seen[:, 2]
+    in_laser = cells @ R
+    x, y, z = np.abs(in_laser[:, 0]), np.abs(in_laser[:, 1]), in_laser[:, 2]
     on_plate = (x < p.half_x) & (y < p.half_y) & (x + y < p.half_x + p.half_y - p.chamfer)
     if p.ears is not None:
         on_plate |= (x < p.ears[1][0]) & (y < p.ears[1][1])
     solid = (on_plate & (z > p.top - PLATE_THICKNESS) & (z < p.top)) | in_hull(cells, neck, 0.0)
     around = np.hypot(cells[:, 0], cells[:, 1])
-    room = np.any([in_box(seen, swept(box), 0.0) for box in (p.body, *p.cables)], axis=0)
-    solid &= ~in_fan(seen, p, 0.0) & ~behind_screws(seen, p)
+    free = np.any([in_box(in_laser, swept(box), 0.0) for box in (p.body, *p.cables)], axis=0)
+    solid &= ~in_fan(in_laser, p, 0.0) & ~behind_screws(in_laser, p)
     solid |= (around < stack.hub_radius) & (cells[:, 2] > stack.shoulder) & (cells[:, 2] < -stack.h)
-    solid &= ~room & ~((around < stack.shaft_diameter / 2) & (cells[:, 2] < stack.spigot_top))
+    solid &= ~free & ~((around < stack.shaft_diameter / 2) & (cells[:, 2] < stack.spigot_top))
     if p.ears is not None:
-        solid &= ~((z > p.top - p.screw.head_height) & (z < p.top) & at_screws(seen, p))  # pockets for heads
+        solid &= ~((z > p.top - p.screw.head_height) & (z < p.top) & at_screws(in_laser, p))  # pockets for heads
         solid |= on_plate & (z > p.top) & (z < p.seat)  # the sub-plate
     printed = CELL**3 * scanner.printer.density_g_cm3 / 1000 * cells[solid, :2].sum(axis=0)
     return printed + lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * R[:2, 2]
@@ -78,4 +78,4 @@ def keeps_flank(scanner: Scanner, moment: Array, doubt: float = 0.0) -> bool:
 def play_matters(scanner: Scanner) -> bool:
     """Whether the play of the servo's gears shows in a cloud; where nobody tells it, it does."""
     play = scanner.servo.backlash_deg
-    return play is None or math.radians(play) * FAR_MM > scanner.lidar.range_sigma_mm
+    return play is None or play > noise_deg(scanner)

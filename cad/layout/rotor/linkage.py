@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from scanwright.cad import outlines
-from scanwright.cad.layout.cables.tie_seat import TieSeat
-from scanwright.cad.layout.drive import Stack
 from scanwright.cad.layout.envelope import (
     BODY_GAP,
     EAR_SCREW,
     PLATE_THICKNESS,
     SUB_PLATE_THICKNESS,
     Box,
+    Envelope,
     box_corners,
     ear_screws,
-    envelope_of,
     screw_travel_mm,
     slot_ends,
 )
+from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import round_wall_mm
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
+from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
@@ -54,10 +55,10 @@ class Ear:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AlignmentLinkage:
-    """Lengths in mm, angles in rad, directions in the rotation frame."""
+class LinkageBody:
+    """Hub, neck and plate: lengths in mm, angles in rad, directions in the rotation frame."""
 
-    stack: Stack
+    stack: Hub
     seat: float  # z of the lidar's base in the laser frame
     top: float  # z of the plate's upper face: the seat, or below a sub-plate
     half_x: float
@@ -78,35 +79,53 @@ class AlignmentLinkage:
     cross_hole: float  # diameter, in the hub
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
     cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlignmentLinkage(LinkageBody):
+    """The whole part: its body, and what is attached to that."""
+
     ear: Ear | None = None
     hub_tie: TieSeat | None = None  # rotation frame
     plate_ties: tuple[TieSeat, ...] = ()  # laser frame
 
+    @classmethod
+    def on(
+        cls, body: LinkageBody, ear: Ear | None = None, hub_tie: TieSeat | None = None, ties: tuple[TieSeat, ...] = ()
+    ) -> AlignmentLinkage:
+        """Attach ear and seats of ties to a body."""
+        own = {field.name: getattr(body, field.name) for field in fields(LinkageBody)}
+        return cls(**own, ear=ear, hub_tie=hub_tie, plate_ties=ties)
 
-def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
-    """Parameters of the linkage of one scanner.
+
+def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> LinkageBody:
+    """Parameters of the linkage of one scanner, before anything is attached.
 
     Raises:
         BuildError: the screw holes come too near to the plate's edge.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    envelope = envelope_of(lidar, stack.sub_plate)
-    screw = SCREWS[lidar.mount_screw]
+    screw = SCREWS[lidar.base.screw]
     hole = passing_hole(screw, printer)
-    half_x, half_y = envelope.plate[1][0], envelope.plate[1][1]
+    half_x, half_y, _ = envelope.plate(stack.sub_plate)[1]
+    if len(lidar.base.places) < 2:
+        raise BuildError(
+            f"{ALIGNMENT_LINKAGE}: seat: holes: {lidar.name} has fewer than two equal threads or through holes in its "
+            f"base ({what_holds(lidar.holes)}): this linkage carries a lidar from below; take another one"
+        )
     travel = screw_travel_mm(lidar)
-    outermost = [slot_ends(place, travel)[1] for place in lidar.mount_holes_mm]
+    outermost = [slot_ends(place, travel)[1] for place in lidar.base.places]
     edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in outermost) - hole / 2
     if edge < printer.min_wall_mm:
         raise BuildError(
-            f"{ALIGNMENT_LINKAGE}: seat: mount_holes_mm = {list(lidar.mount_holes_mm)}: leaves a wall of {edge:.2f} mm "
+            f"{ALIGNMENT_LINKAGE}: seat: holes at {list(lidar.base.places)}: leaves a wall of {edge:.2f} mm "
             f"at the edge of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
     corner = min(half_x + half_y - abs(x) - abs(y) for x, y in outermost)
     chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
     low, high = lidar.window_z_mm
-    return AlignmentLinkage(
+    return LinkageBody(
         stack=stack,
         seat=-lidar.optical_height_mm,
         top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE_THICKNESS),
@@ -114,7 +133,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         half_y=half_y,
         chamfer=chamfer,
         body=envelope.body,
-        ears=None if stack.sub_plate is None else _grown(envelope.under),
+        ears=None if stack.sub_plate is None else _grown(envelope.under(stack.sub_plate)),
         ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
         ear_thread=thread_in_part(EAR_SCREW, printer, carries=True),
         cables=envelope.cables,
@@ -122,7 +141,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
         fan=_free_bearings(stack, lidar.bearings_rad()),
         screw=screw,
         screw_hole=hole,
-        holes=lidar.mount_holes_mm,
+        holes=lidar.base.places,
         screw_travel=travel,
         fit=printer.fit_clearance_mm,
         cross_hole=passing_hole(CROSS_SCREW, printer),
@@ -131,7 +150,7 @@ def linkage_of(scanner: Scanner, stack: Stack) -> AlignmentLinkage:
     )
 
 
-def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
+def neck_corners(p: LinkageBody, attempt: int) -> Array:
     """Of the hub's core, raised to just under the lidar, and of the plate: the neck is their hull, shape (n, 3).
 
     No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
@@ -150,7 +169,7 @@ def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     return np.concatenate(layers)
 
 
-def _foot(plate: Array, stack: Stack) -> Array:
+def _foot(plate: Array, stack: Hub) -> Array:
     """The lower half of the plate's corners, moved down, and back: else a lying plate hangs on a wedge with an edge."""
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
@@ -168,7 +187,7 @@ def _grown(box: Box) -> Box:
     return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
 
 
-def _free_bearings(stack: Stack, bearings: Array) -> tuple[tuple[float, float], ...]:
+def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ...]:
     """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there.
 
     What lies between two pieces is no fin: a full fan is closed where it begins and ends.
@@ -205,12 +224,12 @@ def _cross_azimuths(normal: Array) -> tuple[float, ...]:
     return middle - math.pi / 4, middle + math.pi / 4
 
 
-def cross_seat_mm(stack: Stack) -> float:
+def cross_seat_mm(stack: Hub) -> float:
     """Distance from the axis of the faces that the heads of the cross screws bear on."""
     return stack.hub_radius - CROSS_SUNK
 
 
-def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
+def cross_floor_mm(p: LinkageBody, azimuth: float) -> float:
     """Distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
     bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.cross_hole / 2
     flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
@@ -218,7 +237,7 @@ def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
     return min(math.sqrt(bore**2 - half**2), on_flat)
 
 
-def cross_thread_mm(p: AlignmentLinkage) -> float:
+def cross_thread_mm(p: LinkageBody) -> float:
     """Thread that a cross screw finds in the shaft before the other one crosses it, or in a cup before its nut."""
     outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
     if thread is None:

@@ -1,1 +1,0 @@
-"""The counterweight of a tilted axis: how far the rotor is out of balance, and where a bar has room."""

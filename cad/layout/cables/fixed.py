@@ -1,0 +1,150 @@
+"""The cables that do not turn: the servo's, and the leads of the ring's stator, each from its device to the deck.
+
+Nobody draws where either leaves: the catalogue assumes it, and says so. They end tied to a side of the mount's foot, or
+on the deck beside a servo that stands on it. Rotation frame at gamma = 0, mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanwright.cad.layout.cables.fixed_room import FixedRoom, fixed_room_of
+from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
+from scanwright.cad.layout.cables.obstacles import Shape
+from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.layout.cables.route import Ending, short_path
+from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.drive import Mounted
+from scanwright.cad.layout.joints import triple
+from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
+from scanwright.cad.layout.placement import Placement
+from scanwright.design.arrays import Array
+
+BUNDLED = 1.2  # diameter of a bundle of bundles, over that of one and the root of their number
+LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # of its device, before the first bend
+ON_FOOT = 1.0  # between foot or deck and a cable that lies on it
+BEYOND = 8.0  # the edge of the foot, where a cable ends
+CLEAR = 1.0  # of what it leaves, beside its own radius
+LONGER = (2.0, 8.0, 16.0)  # than a cable lies on the foot, before its last bend
+STEP = 12.0  # of the points that a cable may turn at
+AROUND = 20.0  # of these, beyond the ends
+FROM_CASE = 20.0  # where a cable ends on a flat deck
+THROUGH_DECK = 15.0
+FROM_SLOT = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class FixedCable:
+    """One cable that does not turn.
+
+    Attributes:
+        name: of its body.
+        device: that it leaves.
+        diameter: of it.
+        radius: least one that it may be bent to.
+        path: its middle from its device to the edge of foot or deck; None if there is none.
+    """
+
+    name: str
+    device: str
+    diameter: float
+    radius: float
+    path: Path | None
+
+    @property
+    def mass_g(self) -> float:
+        """As far as it is drawn; 0 where there is no way."""
+        return mass_g(self.path, self.diameter)
+
+
+@dataclass(frozen=True, slots=True)
+class Leaving:
+    """A cable before it has a way: from where it leaves, one of some places with their directions.
+
+    `inside` is how far it runs inside of what surrounds its device, and `stiff` whether it is straight there.
+    """
+
+    name: str
+    device: str
+    diameter: float
+    radius: float
+    places: tuple[tuple[Array, Array], ...]
+    inside: float = 0.0
+    stiff: bool = False
+
+
+def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
+    """Those that the catalogue describes, clear of what the parts that do not turn fill."""
+    room, cables = fixed_room_of(place, avoid), []
+    for lane, leaving in enumerate(_leaving(place)):
+        path = _path(place, room, leaving, lane)
+        cables.append(FixedCable(leaving.name, leaving.device, leaving.diameter, leaving.radius, path))
+        if path is not None:
+            room = room.with_cable(path.points(SAMPLE), leaving.diameter / 2)
+    return tuple(cables)
+
+
+def _leaving(place: Placement) -> Iterator[Leaving]:
+    servo, ring, stator = place.scanner.servo, place.scanner.slip_ring, place.drive.stator_exit
+    at, out, wide, radius = servo.cable_exit_mm, servo.cable_out, servo.cable_diameter_mm, servo.cable_bend_radius_mm
+    if at is not None and out is not None and wide is not None and radius is not None:
+        R, t = place.drive.servo_pose
+        yield Leaving(SERVO_CABLE, servo.name, wide, radius, ((R @ np.array(at) + t, R @ np.array(out)),))
+    if ring is None or stator is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
+        return
+    count = max(1, len(place.scanner.lidar.cable_y_mm))
+    wide = round(ring.lead_diameter_mm * (1.0 if count == 1 else BUNDLED * math.sqrt(count)), 2)
+    radius, inside = ring.lead_bend_radius_mm, stator.inside
+    yield Leaving(STATOR_LEADS, ring.name, wide, radius, stator.places, inside, stator.stiff)
+
+
+def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Path | None:
+    deck, half = place.deck, leaving.diameter / 2
+    start, out = leaving.places[0]
+    if deck.flat and out @ np.array(deck.normal) < -0.5:  # by a hole of the deck
+        return Path((triple(start), triple(start + THROUGH_DECK * out)), leaving.radius)
+    lengths, clamped = tuple(leaving.inside + length for length in LEAVES), leaving.inside + half + CLEAR
+    used = clamped if leaving.stiff else 0.0
+    starts = [Ending(point[None], out, lengths, used, clamped) for point, out in leaving.places]
+    goals = _next_to_case(place.drive.mounted, half) if deck.flat else _on_foot(deck, half, lane)
+    if not goals:
+        return None
+    tips = np.concatenate([end.tips() for end in (*starts, *goals)])
+    axes = []
+    for axis in range(3):  # through the first place that a cable may bend at
+        low, high, through = tips[:, axis].min() - AROUND, tips[:, axis].max() + AROUND, tips[0, axis]
+        axes.append(
+            through + STEP * np.arange(-math.ceil((through - low) / STEP), math.ceil((high - through) / STEP) + 1)
+        )
+    lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return short_path(room, starts, goals, half, leaving.radius, lattice)
+
+
+def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
+    """Over the slots at each side of the foot, outwards, two cables side by side."""
+    ends = []
+    for seat in deck.ties:
+        aside = (2 * lane - 1) * (seat.half - half - FROM_SLOT)
+        z = np.array([FOOT_THICKNESS + half + ON_FOOT])
+        (end,) = seat.points(np.array([seat.end + BEYOND]), np.array([aside]), z) @ deck.rotation().T + np.array(
+            deck.centre
+        )
+        clamped = seat.end + BEYOND - seat.first + half
+        lengths = tuple(clamped + length for length in LONGER)
+        ends.append(Ending(end[None], -deck.rotation() @ seat.direction(), lengths, clamped, clamped))
+    return ends
+
+
+def _next_to_case(mounted: Mounted, half: float) -> list[Ending]:
+    """On a flat deck, beside the case, outwards."""
+    corners, z, ends = mounted.corners, mounted.rear + half + ON_FOOT, []
+    for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+        out = sign * np.eye(3)[axis]
+        reach = float((corners @ out).max()) + FROM_CASE
+        end = reach * out + np.array([0.0, 0.0, z])
+        ends.append(Ending(end[None], -out, (9.0, 14.0), half, half))
+    return ends

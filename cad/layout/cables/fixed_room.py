@@ -1,0 +1,62 @@
+"""Where a cable may run that does not turn: clear of servo, ring and mount, over the deck, below all that turns.
+
+Rotation frame at gamma = 0, mm. Parts are taken for boxes, cylinders and hulls around them, as those of the rotor are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
+from scanwright.cad.layout.deck import Deck
+from scanwright.cad.layout.drive import Cuboid, Rod
+from scanwright.cad.layout.envelope import around_axis, box_corners
+from scanwright.cad.layout.placement import Placement
+from scanwright.design.arrays import Array, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class FixedRoom:
+    """What a cable that does not turn must stay clear of.
+
+    Attributes:
+        shapes: convex shapes.
+        ceiling: height below all that turns.
+        deck: that it lies on.
+        others: middles of cables that run already, shape (n, 3), and the largest radius of one.
+    """
+
+    shapes: tuple[Shape, ...]
+    ceiling: float
+    deck: Deck
+    others: tuple[Array, float]
+
+    def free(self, points: Array, half: float, gap: float) -> Mask:
+        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        room = half + gap
+        over_deck = (points - np.array(self.deck.centre)) @ np.array(self.deck.normal)
+        clear = (points[:, 2] < self.ceiling - room) & (over_deck > half)
+        middles, radius = self.others
+        left = np.flatnonzero(clear)
+        clear[left] = clear_of(self.shapes, points[left], room) & farther(points[left], middles, radius + room)
+        return np.asarray(clear)
+
+    def with_cable(self, middles: Array, radius: float) -> FixedRoom:
+        """The room that a cable leaves."""
+        return replace(self, others=(np.concatenate([middles, self.others[0]]), max(radius, self.others[1])))
+
+
+def fixed_room_of(place: Placement, avoid: Iterable[Shape]) -> FixedRoom:
+    """The room around all that does not turn, no cable in it yet; `avoid` is what its parts fill."""
+    products = [_around(each.shape) for each in place.drive.stations if each.shape is not None]
+    shapes = (*(shape_of(corners) for corners in products), *avoid)
+    return FixedRoom(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0))
+
+
+def _around(shape: Cuboid | Rod) -> Array:
+    if isinstance(shape, Rod):
+        return around_axis(shape.radius, shape.low, shape.high)
+    return box_corners((shape.low, shape.high))

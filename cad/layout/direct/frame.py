@@ -1,0 +1,147 @@
+"""Every number of the frame that holds a servo by the threads in its front. No kernel.
+
+A servo whose rear has only the screws of its own case, such as those of the X series, hangs from a plate on its front.
+Four legs carry the plate, and their feet are screwed to the deck or to the base mount.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.names import SERVO_FRAME
+from scanwright.cad.screws import SCREWS, Screw, passing_hole
+from scanwright.design.catalogue.holes import what_holds
+from scanwright.design.catalogue.products import Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.scanner import Scanner
+
+GRIP = 2.5  # of the plate, under the heads of the servo's screws
+HORN_ROOM = 0.5  # around what turns in the plate's opening
+OVER_HEADS = 0.5  # between the heads and what turns above them
+PLAY = 0.3  # around the case
+LEG = 5.0
+WINDOW = 8.0  # half width of the opening between two legs, about the servo's plug
+LEAST_LEG = 8.0
+LEAST_BRIDGE = 3.0  # of the plate beyond its opening
+HEADER = 8.0  # of a side above its window
+FOOT = 6.0
+FOOT_REACH = 10.0
+FOOT_SCREW = SCREWS["M3"]
+SEAT_GAP = 0.3  # the feet carry, not the case
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoFrame:
+    """Lengths in mm; x and y are those of the servo, z of the rotation frame.
+
+    Attributes:
+        low: lower face of the feet.
+        plate: lower face of the plate, on the front of the case.
+        opening: radius around the axis.
+        half_x: of the room for the case.
+        ends_y: of legs and plate.
+        window_y: between the legs of a side.
+        screw: that holds the servo.
+        hole: diameter.
+        holes: places of these screws.
+        feet: places of the screws in the feet.
+        foot_hole: diameter.
+    """
+
+    low: float
+    plate: float
+    opening: float
+    half_x: float
+    ends_y: tuple[float, float]
+    window_y: tuple[float, float]
+    screw: Screw
+    hole: float
+    holes: tuple[tuple[float, float], ...]
+    feet: tuple[tuple[float, float], ...]
+    foot_hole: float
+
+    @property
+    def high(self) -> float:
+        """Upper face of the plate, which the heads bear on."""
+        return self.plate + GRIP
+
+    @property
+    def reach_x(self) -> float:
+        """Half width over the feet."""
+        return self.half_x + LEG + FOOT_REACH
+
+    @property
+    def heel_mm(self) -> float:
+        """From the line of the servo's screws to the edge over which the servo tips off the plate."""
+        y = sum(y for _, y in self.holes) / len(self.holes)
+        return min(abs(end - y) for end in self.ends_y)
+
+    def legs(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+        """Boxes of the four legs with their feet, as low and high corners."""
+        spans = ((self.ends_y[0], self.window_y[0]), (self.window_y[1], self.ends_y[1]))
+        return [
+            (
+                (min(side * self.half_x, side * self.reach_x), y0, self.low),
+                (max(side * self.half_x, side * self.reach_x), y1, self.high),
+            )
+            for side in (1.0, -1.0)
+            for y0, y1 in spans
+        ]
+
+
+def needs_frame(servo: Servo) -> bool:
+    """Return whether only the servo's front has holes that may carry it."""
+    return len(servo.rear.places) < 4 and len(servo.front.places) >= 2
+
+
+def heads_over_horn_mm(servo: Servo) -> float:
+    """Return the height over the horn's face that whatever is wider than the frame's opening must keep."""
+    return servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
+
+
+def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
+    """Return the frame of one scanner whose servo needs one.
+
+    Raises:
+        BuildError: the servo's screws come too close to its horn.
+    """
+    servo, printer = scanner.servo, scanner.printer
+    screw = SCREWS[servo.front.screw]
+    hole = passing_hole(screw, printer)
+    opening = max(servo.horn_diameter_mm / 2, stack.foot_radius) + HORN_ROOM
+    wall = min(math.hypot(x, y) for x, y in servo.front.places) - hole / 2 - opening
+    if wall < printer.min_wall_mm:
+        raise BuildError(
+            f"{SERVO_FRAME}: plate: holes = {list(servo.front.places)} in front{servo.caution('holes')}: leave a "
+            f"wall of {wall:.2f} mm beside the horn of {servo.name}, {printer.name} needs min_wall_mm = "
+            f"{printer.min_wall_mm:g}"
+        )
+    (x0, y0, z0), (x1, y1, _) = servo.case_min_mm, servo.case_max_mm
+    half_x = max(-x0, x1) + PLAY
+    exit_y = (y0 + y1) / 2 if servo.cable_exit_mm is None else servo.cable_exit_mm[1]
+    middle = min(max(exit_y, y0 + LEAST_LEG + WINDOW), y1 - LEAST_LEG - WINDOW)
+    window = middle - WINDOW, middle + WINDOW
+    out, back, front = half_x + LEG + FOOT_REACH / 2, (y0 + window[0]) / 2, (window[1] + y1) / 2
+    return ServoFrame(
+        low=stack.horn + z0 - SEAT_GAP,
+        plate=stack.horn + servo.front.z_mm,
+        opening=opening,
+        half_x=half_x,
+        ends_y=(y0, y1),
+        window_y=window,
+        screw=screw,
+        hole=hole,
+        holes=servo.front.places,
+        feet=((out, front), (-out, front), (-out, back), (out, back)),
+        foot_hole=passing_hole(FOOT_SCREW, printer),
+    )
+
+
+def no_rear_holes(servo: Servo) -> BuildError:
+    """Return the error of a servo that neither its rear nor its front can hold."""
+    return BuildError(
+        f"{SERVO_FRAME}: holes: {servo.name} has no four equal holes in its rear and no two in its front "
+        f"({what_holds(servo.holes)}{servo.caution('holes')}): take another servo"
+    )

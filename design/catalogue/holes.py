@@ -1,0 +1,118 @@
+"""Holes of a bought device, and which of them a part can be screwed to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import Field
+
+from scanwright.design.files.record import Record
+
+Face = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Kind = Literal["tapped", "through", "self_tapping", "case_screw", "pin", "slot"]
+Size = Literal["M1.6", "M2", "M2.5", "M3", "M4", "M5", "M6"]
+Point = tuple[float, float, float]
+
+USABLE: tuple[Kind, ...] = ("tapped", "self_tapping", "through")
+"""Kinds that may carry a load: never the screws that close a case, locating pins, or slots."""
+OLD_LIDAR = ("mount_screw", "mount_holes_mm", "mount_thread_depth_mm")
+OLD_SERVO = ("case_screw", "case_holes_mm", "case_holes_z_mm", "case_rear_holes_mm", "case_rear_holes_z_mm")
+"""Fields of version 0.1 that stated the holes."""
+CASE_EAR_MM = 2.0  # of a servo's case between a through hole and its nut, where no source states it
+
+
+class Hole(Record):
+    """One hole, in the frame of its device; mm.
+
+    Attributes:
+        at_mm: middle of its mouth, in the face that a part lies on.
+        axis: out of the device, towards that part: a face, or a vector.
+        kind: tapped, self_tapping, through (the nut, or the head, is on the far side), or one that carries no load.
+        size: of the screw.
+        depth_mm: of the thread, or of what a screw passes in a through hole.
+        head_space_mm: of a through hole: free height for a nut or a head on the far side.
+    """
+
+    at_mm: Point
+    axis: Face | Point
+    kind: Kind
+    size: Size
+    depth_mm: float = Field(gt=0)
+    head_space_mm: float | None = Field(default=None, gt=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Equal holes in one plane, which hold one part.
+
+    Attributes:
+        screw: size of the screws.
+        kind: of the holes.
+        places: x and y of each.
+        z_mm: of the plane.
+        depth_mm: of the thread, or of what a screw passes.
+    """
+
+    screw: Size
+    kind: Kind
+    places: tuple[tuple[float, float], ...]
+    z_mm: float
+    depth_mm: float
+
+
+def mounting_holes(holes: Iterable[Hole], face: Face) -> Pattern:
+    """Return the largest set of equal, usable holes in one plane of a face; without places if there is none."""
+    groups: dict[tuple[Size, Kind, float], list[Hole]] = {}
+    for hole in holes:
+        if hole.axis == face and hole.kind in USABLE:
+            groups.setdefault((hole.size, hole.kind, hole.at_mm[2]), []).append(hole)
+    if not groups:
+        return Pattern("M3", "tapped", (), 0.0, 0.0)
+    (size, kind, z), chosen = max(groups.items(), key=lambda group: len(group[1]))
+    places = tuple((hole.at_mm[0], hole.at_mm[1]) for hole in chosen)
+    return Pattern(size, kind, places, z, min(hole.depth_mm for hole in chosen))
+
+
+def what_holds(holes: Iterable[Hole]) -> str:
+    """Return the holes in words, for a message: how many of which kind in which face."""
+    counts: dict[tuple[str, str, str], int] = {}
+    for hole in holes:
+        face = hole.axis if isinstance(hole.axis, str) else "an oblique face"
+        key = (hole.size, hole.kind.replace("_", " "), face)
+        counts[key] = counts.get(key, 0) + 1
+    return ", ".join(f"{n} x {size} {kind} in {face}" for (size, kind, face), n in counts.items()) or "none"
+
+
+def with_holes(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a product file with `holes` in place of the fields of version 0.1.
+
+    Args:
+        table: of a product file; each value a table of value, source and verified. Returned as it is if it states
+            `holes`, or not all of the old fields. The holes are verified if their places and size are.
+    """
+    old = OLD_LIDAR if table.get("kind") == "lidar" else OLD_SERVO
+    entries = [table.get(field) for field in old]
+    if "holes" in table or not all(isinstance(entry, dict) and "value" in entry for entry in entries):
+        return dict(table)
+    values = [entry["value"] for entry in entries if isinstance(entry, dict)]
+    if table["kind"] == "lidar":
+        screw, places, depth = values
+        holes = _in_face(places, 0.0, "-z", kind="tapped", size=screw, depth_mm=depth)
+    else:
+        screw, front, front_z, rear, rear_z = values
+        ear = {"kind": "through", "size": screw, "depth_mm": CASE_EAR_MM}
+        holes = [*_in_face(front, front_z, "+z", **ear), *_in_face(rear, rear_z, "-z", **ear)]
+    sources = dict.fromkeys(entry.get("source") for entry in entries if isinstance(entry, dict))
+    placing = [entries[old.index(field)] for field in old if field != "mount_thread_depth_mm"]
+    stated = {
+        "value": holes,
+        "source": "; ".join(str(source) for source in sources),
+        "verified": all(entry.get("verified") is True for entry in placing if isinstance(entry, dict)),
+    }
+    return {field: entry for field, entry in table.items() if field not in old} | {"holes": stated}
+
+
+def _in_face(places: Any, z: Any, face: Face, **alike: Any) -> list[dict[str, Any]]:
+    return [{"at_mm": [*place, z], "axis": face, **alike} for place in places]

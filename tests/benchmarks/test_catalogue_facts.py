@@ -1,0 +1,27 @@
+"""The catalogue against a table of facts: what agrees, what differs, and what the file itself states."""
+
+from benchmarks.design.catalogue_facts import compared, number_of
+
+
+def row(field, value, file="utm-30lx.toml"):
+    return {"file": file, "field": field, "found_value": value, "source": "a drawing", "certainty": "high"}
+
+
+def verdicts(*rows):
+    return [each.verdict for each in compared(iter(rows))]
+
+
+def test_numbers_and_lists_of_numbers_are_compared_and_nothing_else():
+    assert number_of("12.5") == 12.5 and number_of("[[1, 2], [3, 4]]") == [[1, 2], [3, 4]]
+    assert [number_of(text) for text in ("about 3", "[1, [2, 3]]", "true", "end", "[]")] == [None] * 5
+    assert verdicts(row("mass_g", "about 370"), row("mass_g", "370", file="no.toml")) == []
+
+
+def test_each_row_gets_its_verdict():
+    assert verdicts(row("mass_g", "370"), row("mass_g", "371"), row("speed", "1")) == ["agrees", "differs", "no value"]
+    assert verdicts(row("cable_y_mm", "[15, -15]"), row("cable_y_mm", "[-15, 15]")) == ["differs", "agrees"]
+
+
+def test_a_difference_that_the_file_states_has_a_reason():
+    (stated,) = compared(iter([row("length_mm", "88.5", file="uh1256.toml")]))
+    assert stated.verdict == "stated" and "43.5 mm too short" in stated.line and "a drawing" in stated.line

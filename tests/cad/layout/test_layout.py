@@ -1,0 +1,117 @@
+"""The layout is worked out once, in steps; nobody works a step out again, or asks which drive a scanner has."""
+
+import ast
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from scanners import CAPSULE, GROUND_AHEAD, ROLLING, UPRIGHT, scanner_at
+
+from scanwright.cad.layout.belt.stack import BeltStack
+from scanwright.cad.layout.direct.cage import BearingCage
+from scanwright.cad.layout.placement import drive_of, placement_of
+
+CAD = Path(__file__).parents[3] / "cad"
+STEPS = {
+    "adapter_of",
+    "cage_of",
+    "counterweight_of",
+    "deck_of",
+    "drive_of",
+    "ears_of",
+    "envelope_of",
+    "estimated_moment",
+    "fixed_cables_of",
+    "hub_tie_of",
+    "layout_of",
+    "leads_of",
+    "linkage_body_of",
+    "placement_of",
+    "plate_of",
+    "plate_ties_of",
+    "tower_of",
+}
+MAY_CALL = {  # the lists of parts are handed in here; which beams a drive hides in any case is asked before all else
+    ("parts/all_parts.py", "layout_of"),
+    ("assembly/shadow.py", "drive_of"),
+}
+SCANNERS = {
+    "bearing": scanner_at(GROUND_AHEAD),
+    "upright": scanner_at(UPRIGHT),
+    "belt": scanner_at(ROLLING, slip_ring=CAPSULE),
+    "cup": scanner_at(UPRIGHT, slip_ring=None, sensor="STL27L", servo="XL430-W250"),
+    "sub-plate": scanner_at((0, 0, 25.5, -21.4)),
+}
+
+
+def modules():
+    return {path.relative_to(CAD).as_posix(): ast.parse(path.read_text()) for path in CAD.rglob("*.py")}
+
+
+@pytest.mark.parametrize("name", SCANNERS)
+def test_every_step_of_a_placement_is_worked_out_once(name, monkeypatch):
+    calls = Counter()
+
+    def counted(step, function):
+        def wrapper(*args, **kwargs):
+            calls[step] += 1
+            return function(*args, **kwargs)
+
+        return wrapper
+
+    for module in [module for key, module in sys.modules.items() if key.startswith("scanwright.cad.")]:
+        for step in STEPS & vars(module).keys():
+            monkeypatch.setattr(module, step, counted(step, getattr(module, step)))
+    placement_of(SCANNERS[name])
+    assert {step for step, count in calls.items() if count > 1} == set()
+    assert {"envelope_of", "deck_of", "linkage_body_of", "drive_of", "hub_tie_of"} <= calls.keys()
+    assert ("cage_of" in calls, "tower_of" in calls) == (name == "bearing", name == "belt")
+
+
+def test_nobody_above_the_layout_works_a_step_out_again():
+    names = {
+        (module, name.id)
+        for module, tree in modules().items()
+        for name in ast.walk(tree)
+        if isinstance(name, ast.Name) and name.id in STEPS and not module.startswith("layout/")
+    }
+    assert names == MAY_CALL
+
+
+def test_no_type_of_a_drive_is_asked_for():
+    kinds = {name for tree in modules().values() for name in _stacks(tree)}
+    assert kinds == {"BeltStack", "DirectStack"}
+    asks = {
+        module
+        for module, tree in modules().items()
+        for call in ast.walk(tree)
+        if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "isinstance"
+        if kinds & {name.id for name in ast.walk(call) if isinstance(name, ast.Name)}
+    }
+    assert asks == set()
+
+
+def _stacks(tree):
+    """Classes of `Hub`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef) and "Hub" in [getattr(base, "id", "") for base in node.bases]:
+            yield node.name
+
+
+@pytest.mark.parametrize("name", SCANNERS)
+def test_stations_go_from_the_deck_to_the_linkage(name):
+    drive = drive_of(SCANNERS[name])
+    assert drive.stacked[0] == "base_mount" and drive.stacked[-1] == "alignment_linkage"
+    for station in drive.stations:
+        low, high = station.z_mm
+        assert low < high and station.radius_mm > 0, station.name
+        assert station.product is None or station.box is not None, station.name
+    turning = [station for station in drive.stations if station.body == "rotor"]
+    assert max(station.z_mm[1] for station in turning) == -drive.stack.h  # the hub
+
+
+def test_the_numbers_of_a_part_are_those_of_its_kind_or_none():
+    direct, belt = drive_of(SCANNERS["bearing"]), drive_of(SCANNERS["belt"])
+    assert direct.of(BearingCage).stack is direct.stack and direct.of(BeltStack) is None
+    assert belt.of(BeltStack) is belt.stack and belt.of(BearingCage) is None
