@@ -115,6 +115,18 @@ def test_angles_that_come_twice_or_late_do_no_harm():
     assert more.lost == 3
 
 
+def test_the_view_states_its_progress_and_the_unit_of_its_colours():
+    points = np.outer(np.linspace(0, 1, 101), [0, 0, 3]).astype(np.float32)
+    with guarded_server("a page") as (server, _):
+        view = CloudView(server, "scan", np.zeros(3), 18.0)
+        assert view.legend.content == ""
+        view.add(CloudGrowth(points, np.zeros(101, np.float32), np.full(101, 22.5, np.float32), (), 2))
+        assert "101 points; full scan 2: 25% (4.5 of 18 s); it dropped 2 scans" in view.facts.content
+        assert "0.0 m" in view.legend.content and "3.0 m" in view.legend.content
+        view.by.value = "time"
+        assert "22.5 s" in view.legend.content
+
+
 def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
     monkeypatch.setattr(cloud_view, "CHUNK_POINTS", 500)
     monkeypatch.setattr(cloud_view, "MOST_POINTS", 2000)
