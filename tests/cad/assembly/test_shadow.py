@@ -121,7 +121,7 @@ def test_own_body_is_the_same_bytes_and_reads_back(pitching):
 
 
 def test_a_full_fan_looks_past_the_neck_of_the_linkage(parts_of):
-    scanner = scanner_at((166.61, -87.48, 89.82, -42.81), sensor="LD19", servo="XL430-W250")
+    scanner = scanner_at((166.61, -87.48, 89.82, -42.81), sensor="LD19")
     assembly = parts_of(scanner)
     triangles = triangles_of(assembly)
     shadow = shadow_of(scanner, triangles, assembly.turning())

@@ -364,7 +364,7 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     found = Counter(line.split()[0] for line in lines[:-1])
     assert found["ok"] > 20 and found["note"] > 5  # the report counts them apart as well
     warned = f"{found['warning']} warning{'' if found['warning'] == 1 else 's'}"
-    assert lines[-1] == f"0 errors, {warned}, {found['note']} notes, {found['pass']} passed"
+    assert lines[-1] == f"0 errors, {warned}, {found['note']} notes, {found['ok']} passed"
     assert any("sub_plate" in line for line in lines)
     assert sum(" mm at 10 m), " in line and "bend" in line and "+-" in line for line in lines) == 2
 

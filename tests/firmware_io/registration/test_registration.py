@@ -332,10 +332,10 @@ def test_wrong_input_is_one_line(command, tmp_path):
     for words, says in (
         ([one], "1 cloud: register needs at least two"),
         ([one, other, "--start", tmp_path / "p.tum"], "1 poses for 2 clouds"),
-        ([one, other, "--spacing-m", "0"], "spacing 0.0 m: must be above 0"),
+        ([one, other, "--spacing-m", "0"], "--spacing-m = 0.0: must be above 0"),
         ([one, other, "--poses", tmp_path / "no/p.tum"], "does not exist"),
         ([one, one], "given twice"),
-        ([one, tmp_path], "this is a folder"),
+        ([one, tmp_path], "is a folder; name a file of a cloud"),
         ([one, tmp_path / "r.mcap"], "`scanwright assemble`"),
         ([one, tmp_path / "absent.las"], "absent.las: not a LAS file"),
     ):

@@ -87,7 +87,7 @@ class Viewer:
         self.lines.append(line)
 
 
-def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch):
+def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch, caplog):
     steered, viewer, motions, said = Steered(), Viewer(), [], []
     outcomes = iter([DeviceError("the lidar is gone"), driving.Interrupted(), KeyboardInterrupt()])
 
@@ -109,7 +109,7 @@ def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch
         *("begin", "told 4 s", "begin", "told 4 s"),
     ]
     assert viewer.lines == ["18 s", "4 s", "4 s"]
-    assert said == [again, "stopped, as a parameter asks"]
+    assert said == ["stopped by a parameter"] and caplog.messages == [again]
 
 
 def test_rows_of_points_are_packed_as_point_cloud_2_says():
