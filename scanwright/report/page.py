@@ -34,7 +34,7 @@ from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
 from scanwright.report.parts_list import read_parts
 from scanwright.report.room_picture import room_picture
 from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_glb, placed_bodies, scanner_scene
-from scanwright.report.to_do import to_do
+from scanwright.report.to_do import count, to_do
 
 REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
@@ -82,6 +82,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "checks": None if findings is None else by_severity(findings),
         "todo": to_do(files, findings or (), parts),
         "share": percent,
+        "count": count,
         "steps": read(folder / "assembly.md", partial(_steps, folder)),
         "wiring": read(folder / "wiring.svg", read_picture),
         "wiring_words": read(folder / "wiring.md", _wiring_words),
@@ -201,8 +202,8 @@ def _not_drawn(folder: Path) -> str:
 def _places(
     bodies: dict[str, PlacedBody], findings: Iterable[Finding], bought: dict[str, str]
 ) -> dict[str, dict[str, Any]]:
-    """Return the bodies of each subject of a check and a picture of them; a subject without bodies has none."""
+    """Return bodies and a picture of each subject of an error or a warning; a subject without bodies has none."""
     pictures = CheckPictures(bodies)
-    codes = {finding.subject: finding.code for finding in findings}
+    codes = {finding.subject: finding.code for finding in findings if finding.severity in ("error", "warning")}
     named = {subject: bodies_named(code, subject, bodies, bought) for subject, code in codes.items()}
     return {subject: {"bodies": names, "picture": pictures.picture(names)} for subject, names in named.items() if names}

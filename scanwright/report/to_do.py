@@ -66,7 +66,7 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
     if failed := [finding for finding in findings if finding.severity == "error"]:
         text = "Change the task until no check fails: each check states what to change."
         todo.append(ToDo(f"Fix {count(len(failed), 'failed check')}", text, ("#checks", "task.toml")))
-    how = "Copy its catalogue file, change the values, name the copy in task.toml under catalogue, build again."
+    how = "Copy the device's catalogue file, change the values, name the copy in task.toml, and build again."
     if wrong := [each for each in findings if each.code == "known_error" and each.severity == "warning"]:
         text = f"Parts made with these values do not fit the real devices. {how}"
         todo.append(ToDo(f"Correct {count(len(wrong), 'wrong value')}", text, ("#checks", "task.toml")))
