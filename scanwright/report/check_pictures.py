@@ -15,7 +15,7 @@ from PIL import Image
 from scanwright.design.arrays import Array
 from scanwright.design.scene.parallel_view import in_front, view_of
 from scanwright.design.scene.ray_caster import build_scene
-from scanwright.report.data_uri import png_uri
+from scanwright.report.build_files import png_uri
 
 SIZE_PX = 200, 150  # pixels, wide and high
 STILL_PX = 720, 480

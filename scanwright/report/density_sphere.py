@@ -25,7 +25,7 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.report.answer import mounting_rad
-from scanwright.report.data_uri import png_uri
+from scanwright.report.build_files import png_uri
 
 STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
 FEWEST, MOST_BANDS = 5, 8  # beams at the lowest edge of a band, and bands

@@ -29,12 +29,11 @@ from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_text
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
 from scanwright.report.density_sphere import density_sphere
-from scanwright.report.first_screen import cards, motion_in_words, title
+from scanwright.report.first_screen import cards, count, motion_in_words, title, to_do
 from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
 from scanwright.report.parts_list import read_parts
 from scanwright.report.room_picture import room_picture
 from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_glb, placed_bodies, scanner_scene
-from scanwright.report.to_do import count, to_do
 
 REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first

@@ -26,9 +26,9 @@ from scanwright.design.scene import ray_caster
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.shapes import MeshRegion
 from scanwright.design.task.task import Task
+from scanwright.report.build_files import png_uri
 from scanwright.report.check_pictures import PlacedBody
 from scanwright.report.cut_room import Pinhole, Room, Walls, pinhole_behind, room_about, walls_behind
-from scanwright.report.data_uri import png_uri
 from scanwright.report.density_sphere import Bands, DensitySphere
 
 SQUARE_M, LINE_PX = 1.0, 1.0  # of the grid on floor and walls

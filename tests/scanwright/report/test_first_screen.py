@@ -10,9 +10,8 @@ from scanwright.design.findings import Finding
 from scanwright.design.motion import StopAndGo, Sweep
 from scanwright.design.task.task import load_task
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
-from scanwright.report.first_screen import cards, motion_in_words, title
+from scanwright.report.first_screen import cards, motion_in_words, title, to_do
 from scanwright.report.parts_list import read_parts, usd_range
-from scanwright.report.to_do import to_do
 
 ANGLES = AngleSet(
     task="ground_ahead",
