@@ -125,11 +125,11 @@ def sector(r_low: float, r_high: float, start: float, end: float, z_low: float, 
 def hull(points: Array) -> cq.Solid:
     """Convex hull of points (n, 3) with one planar face per plane of the hull."""
     points = np.unique(np.round(points, 9), axis=0)
-    found = ConvexHull(points)
-    order = np.lexsort(np.round(found.equations, 7).T)
+    convex = ConvexHull(points)
+    order = np.lexsort(np.round(convex.equations, 7).T)
     # triangles of one nearly flat polygon may have planes that differ a little and corners that do not: one face
     plane_of: dict[frozenset[int], Array] = {}
-    for plane in found.equations[order]:
+    for plane in convex.equations[order]:
         flat = np.abs(points @ plane[:3] + plane[3]) < 1e-6
         plane_of.setdefault(frozenset(np.flatnonzero(flat).tolist()), plane)
     faces: list[cq.Face] = []

@@ -8,7 +8,7 @@ from dataclasses import replace
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.bought import BodySpec, bought_of
 from scanwright.cad.assembly.masses import rotor_moment
-from scanwright.cad.assembly.print_beds import require_beds
+from scanwright.cad.assembly.print_beds import require_room_on_bed
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.parts.all_parts import laid_out, parts_of
@@ -38,7 +38,7 @@ def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
     made = {name: spec.make() for name, spec in parts.items() if wanted(spec)}
     bought = {name: spec.make() for name, spec in bodies.items() if wanted(spec)}
     assembly = Assembly(layout, parts, bodies, made, bought)
-    require_beds(assembly)
+    require_room_on_bed(assembly)
     return assembly if last is None or not wanted(last) else _balanced(assembly)
 
 

@@ -17,7 +17,7 @@ from scanwright.cad.layout.loads import Weight, weight_of
 from scanwright.design.arrays import Array
 from scanwright.design.scanner import Scanner
 
-LIDAR_DOUBT_MM = 2.0
+LIDAR_CENTRE_ERROR_MM = 2.0
 """How far a lidar's centre of mass may be from the middle of its box, in any direction: assumed, no data sheet tells.
 
 Motor, mirror and most of the boards lie around its axis; plugs and windows, a tenth of it, do not: 20 mm aside.
@@ -54,10 +54,10 @@ def rotor_weight(scanner: Scanner, stack: Hub, bodies: Mapping[str, Inertial]) -
     return weight_of(scanner, rotor.mass_kg, float(z) - stack.horn / 1000, math.hypot(x, y))
 
 
-def off_axis_doubt_m(bodies: Mapping[str, Inertial]) -> float:
+def off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
     """How far the rotor's centre of mass may be off across the axis, as nobody tells that of the lidar."""
     lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
-    return LIDAR_DOUBT_MM / 1000 * lidar / (lidar + rot)
+    return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
 
 
 def rotor_moment(scanner: Scanner, assembly: Assembly) -> Array:

@@ -11,7 +11,7 @@ from scanwright.design.errors import BuildError
 SLACK_MM = 0.01  # the noise of meshes
 
 
-def require_beds(assembly: Assembly) -> None:
+def require_room_on_bed(assembly: Assembly) -> None:
     """Require a bed for every made part that is printed.
 
     Raises:

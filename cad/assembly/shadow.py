@@ -141,10 +141,10 @@ def _hidden(solid: ray_caster.Scene, origins: Array, directions: Array) -> Mask:
 def at_setting(scanner: Scanner, setting_rad: Array) -> Scanner:
     """The scanner at another setting, its angles rounded as those that parts are built from."""
     names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
-    given = {name: round(math.degrees(angle), 2) for name, angle in zip(names, setting_rad, strict=True)}
+    rounded = {name: round(math.degrees(angle), 2) for name, angle in zip(names, setting_rad, strict=True)}
     angles = scanner.angles.model_copy(
         update={
-            "angles_deg": scanner.angles.angles_deg.model_copy(update=given),
+            "angles_deg": scanner.angles.angles_deg.model_copy(update=rounded),
             "t_world_rot_mm": (0.0, 0.0, 0.0),
         }
     )

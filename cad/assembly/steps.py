@@ -42,4 +42,8 @@ def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
         steps[FIXED_CABLES] = Step(CABLES_TITLE, cables_text(layout), CABLES_CHECK)
     if layout.deck.flat:
         steps[DECK] = ON_DECK if layout.drive.mounted.onto == SERVO_CASE else FRAME_ON_DECK
-    return sorted(steps.items(), key=lambda item: layout.drive.built.index(item[0]))
+    order = list(layout.drive.built)
+    for spec in assembly.parts.values():
+        if spec.after:
+            order.insert(order.index(spec.after) + 1, spec.name)
+    return sorted(steps.items(), key=lambda item: order.index(item[0]))

@@ -172,7 +172,7 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     nuts: Counter[tuple[str, str]] = Counter()
     inserts: Counter[str] = Counter()
     for joint in joints:
-        if joint.stands_out_mm is None:
+        if joint.protrudes_mm is None:
             screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
             nuts[joint.screw.name, joint.screw.nut_standard] += joint.count

@@ -80,7 +80,7 @@ def rounds_of(solid: cq.Solid) -> list[Round]:
         groups.setdefault(key, []).append((low, high, surface.LastUParameter() - surface.FirstUParameter()))
         axes.setdefault(key, (direction, foot))
     piercing = Piercing(solid)
-    found = []
+    rounds = []
     for key, pieces in sorted(groups.items()):
         direction, foot = axes[key]
         hole = bool(key[0])
@@ -90,8 +90,8 @@ def rounds_of(solid: cq.Solid) -> list[Round]:
             beyond = foot + (low - 0.05) * direction, foot + (high + 0.05) * direction
             through = hole and not piercing.between(*beyond)
             ends = triple(foot + low * direction), triple(foot + high * direction)
-            found.append(Round(key[1], triple(direction), *ends, hole, through))
-    return found
+            rounds.append(Round(key[1], triple(direction), *ends, hole, through))
+    return rounds
 
 
 def _joined(pieces: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:

@@ -29,12 +29,12 @@ class Inertial:
 
 def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
     """Of a homogeneous solid in mm."""
-    kg_per_mm3, found = density_g_cm3 * 1e-6, GProp_GProps()
-    BRepGProp.VolumeProperties_s(solid.wrapped, found)  # once: the same integral gives all three
-    matrix = found.MatrixOfInertia()
+    kg_per_mm3, properties = density_g_cm3 * 1e-6, GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid.wrapped, properties)  # once: the same integral gives all three
+    matrix = properties.MatrixOfInertia()
     inertia = np.array([[matrix.Value(i, j) for j in (1, 2, 3)] for i in (1, 2, 3)]) * kg_per_mm3 * 1e-6
-    centre = np.array(found.CentreOfMass().Coord()) / 1000
-    return Inertial(found.Mass() * kg_per_mm3, centre, (inertia + inertia.T) / 2)
+    centre = np.array(properties.CentreOfMass().Coord()) / 1000
+    return Inertial(properties.Mass() * kg_per_mm3, centre, (inertia + inertia.T) / 2)
 
 
 def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> Inertial:

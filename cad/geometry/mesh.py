@@ -70,12 +70,12 @@ def _tessellated(solid: cq.Shape, chord_error: float, chord_angle: float) -> tup
     triangles = []
     for face in shape.Faces():
         place = TopLoc_Location()
-        found = BRep_Tool.Triangulation_s(face.wrapped, place)
-        if found is None:  # a face too small for a triangle
+        facets = BRep_Tool.Triangulation_s(face.wrapped, place)
+        if facets is None:  # a face too small for a triangle
             continue
         to_shape, first = place.Transformation(), len(points) - 1
-        points += [found.Node(i).Transformed(to_shape).Coord() for i in range(1, found.NbNodes() + 1)]
-        corners = np.array([found.Triangle(i).Get() for i in range(1, found.NbTriangles() + 1)], dtype=np.int64)
+        points += [facets.Node(i).Transformed(to_shape).Coord() for i in range(1, facets.NbNodes() + 1)]
+        corners = np.array([facets.Triangle(i).Get() for i in range(1, facets.NbTriangles() + 1)], dtype=np.int64)
         inside_out = face.wrapped.Orientation() == TopAbs_REVERSED
         triangles.append(first + (corners[:, [0, 2, 1]] if inside_out else corners))
     return np.array(points), np.concatenate(triangles)

@@ -26,13 +26,13 @@ def mesh_trials(solids: Mapping[str, cq.Solid], progress: Callable[[str], None])
         for chord in CHORDS:
             progress(f"meshes within {chord:g} mm and {angle:g} rad")
             meshed, seconds = timed(partial(_all_meshed, list(solids.values()), chord, angle))
-            found = [_off(solid) for solid in meshed]
-            triangles = sum(count for _, count in found)
+            trials = [_off(solid) for solid in meshed]
+            triangles = sum(count for _, count in trials)
             yield Trial(
                 choice="mesh of the parts",
                 method=f"{angle:g} rad between neighbours",
                 setting=f"{chord:g} mm",
-                error=max(off for off, _ in found),
+                error=max(off for off, _ in trials),
                 unit="mm",
                 seconds=seconds,
                 size=f"{triangles:,} triangles",

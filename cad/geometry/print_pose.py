@@ -88,19 +88,19 @@ def _flats(mesh: TriMesh, faces: _Faces) -> Array:
     """
     hull = ConvexHull(mesh.vertices)
     corners = mesh.vertices[hull.vertices]
-    found: list[tuple[float, Array]] = []
+    contacts: list[tuple[float, Array]] = []
     for normal in _directions(faces):
         reach = float((corners @ normal).max())
         lies = (faces.normals @ normal > 1 - 1e-8) & (faces.middles @ normal > reach - FLAT)
         area = float(faces.areas[lies].sum())
         if area > 0:
-            found.append((area, normal))
-    if not found:
+            contacts.append((area, normal))
+    if not contacts:
         a, b, c = (mesh.vertices[hull.simplices[:, i]] for i in range(3))
         largest = np.argsort(-np.linalg.norm(np.cross(b - a, c - a), axis=1), kind="stable")
         return hull.equations[largest[:20], :3]
-    found.sort(key=lambda item: (-round(item[0], 1), *np.round(item[1], 6)))
-    return np.array([normal for area, normal in found if area >= CONTACT_SHARE * found[0][0]])
+    contacts.sort(key=lambda item: (-round(item[0], 1), *np.round(item[1], 6)))
+    return np.array([normal for area, normal in contacts if area >= CONTACT_SHARE * contacts[0][0]])
 
 
 def _directions(faces: _Faces) -> list[Array]:
@@ -110,8 +110,8 @@ def _directions(faces: _Faces) -> list[Array]:
     index = index.reshape(-1)
     area = np.bincount(index, weights=faces.areas)
     sums = np.stack([np.bincount(index, weights=faces.areas * faces.normals[:, i]) for i in range(3)], axis=1)
-    kept = area > 0.01 * area.max()
-    return list(sums[kept] / np.linalg.norm(sums[kept], axis=1, keepdims=True))
+    large = area > 0.01 * area.max()
+    return list(sums[large] / np.linalg.norm(sums[large], axis=1, keepdims=True))
 
 
 def _pose(mesh: TriMesh, faces: _Faces, down: Array, bed: tuple[float, float, float]) -> PrintPose:

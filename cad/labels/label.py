@@ -29,7 +29,7 @@ from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
 from scanwright.cad.labels.engrave import Groove, engrave, groove_of
 from scanwright.cad.labels.flats import Flat, flat_at, flats_of
 from scanwright.cad.labels.lettering import Lettering, Place
-from scanwright.cad.labels.sight import Sight
+from scanwright.cad.labels.visibility import Visibility
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
@@ -105,14 +105,14 @@ class Ground:
     def room(self, flat: Flat) -> shapely.Polygon:
         """What of a face the middle lines of strokes may take."""
         half = self.groove.width / 2
-        taken = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
+        occupied = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
         if self.front is not None and flat.face.isSame(self.front.flat.face):
             width, height = FRONT.size
             corners = self.front.put(np.array([[0, 0], [width, 0], [width, height], [0, height]]))
             word = shapely.Polygon(flat.along(self.front.flat.at(corners)))
-            taken.append(word.buffer(MARGIN + 2 * half, join_style="mitre"))
+            occupied.append(word.buffer(MARGIN + 2 * half, join_style="mitre"))
         outline = shapely.Polygon(flat.outline.exterior)
-        return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(taken))
+        return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(occupied))
 
     def turns(self, flat: Flat) -> list[Array]:
         """Circuits to turn lettering on a face: the more upright first, of equal ones lengthwise."""
@@ -142,7 +142,7 @@ class Ground:
 
 def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
     """Engrave every printed part that has room."""
-    sight, done = Sight(assembly), Labelled()
+    visibility, done = Visibility(assembly), Labelled()
     groove, up = groove_of(scanner.printer), scanner.angles.T_world_rot(0.0)[2, :3]
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
@@ -154,9 +154,9 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
             if front is None:
                 why = "a hole of the seat is in the way of the word; the V in the edge says it too"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
-        flats = [flat for flat in flats_of(solid, FACES, LEAST_MM2) if not sight.touched(flat)]
+        flats = [flat for flat in flats_of(solid, FACES, LEAST_MM2) if not visibility.touched(flat)]
         ground = Ground(flats, Piercing(solid), groove, scanner.printer.min_wall_mm, up, front)
-        views = partial(sight.views, turning=part.turns)
+        views = partial(visibility.views, turning=part.turns)
         label = label_on(ground, label_texts(scanner, part, config_hash), views)
         if label is None:
             why = "none of its flat faces that mate with nothing has room for one"
@@ -194,10 +194,10 @@ def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
         views: which points of a face an eye before it sees, a row for each position of what turns.
     """
     rooms = [(flat, ground.room(flat)) for flat in ground.flats]
-    in_sight = [(flat, part) for flat, room in rooms for part in _in_sight(flat, room, views)]
+    visible_rooms = [(flat, part) for flat, room in rooms for part in _visible_parts(flat, room, views)]
     for seen, some, longest, height in product((True, False), (texts, texts[-1:]), LONGEST, HEIGHTS):
         lines = Lettering(tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest)), height)
-        for place in _places(ground, in_sight if seen else rooms, lines.size):
+        for place in _places(ground, visible_rooms if seen else rooms, lines.size):
             points = place.put(_grid(lines.size))
             reads = not seen or bool(views(place.flat, points).all(axis=1).any())
             if reads and ground.is_thick(place.flat, points):
@@ -232,17 +232,17 @@ def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -
     return place if flat.outline.contains(word) else None
 
 
-def _in_sight(flat: Flat, room: shapely.Polygon, views: Views) -> list[shapely.Polygon]:
+def _visible_parts(flat: Flat, room: shapely.Polygon, views: Views) -> list[shapely.Polygon]:
     """What of a room an eye sees, to squares of STEP, for each position of what turns: the largest first."""
     x0, y0, x1, y1 = flat.outline.bounds
     xs, ys = np.arange(x0 + STEP / 2, x1 + STEP / 2, STEP), np.arange(y0 + STEP / 2, y1 + STEP / 2, STEP)
     points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
     points = points[shapely.contains_xy(flat.outline, points[:, 0], points[:, 1])]
-    found = []
+    visible = []
     for seen in np.unique(views(flat, points), axis=0):
         low, high = points[seen] - STEP / 2 - OVERLAP, points[seen] + STEP / 2 + OVERLAP
-        found.append(room if seen.all() else room.intersection(shapely.union_all(shapely.box(*low.T, *high.T))))
-    return sorted(found, key=lambda part: -round(part.area, 1))
+        visible.append(room if seen.all() else room.intersection(shapely.union_all(shapely.box(*low.T, *high.T))))
+    return sorted(visible, key=lambda part: -round(part.area, 1))
 
 
 def _places(ground: Ground, rooms: Sequence[Room], size: tuple[float, float]) -> Iterator[Place]:

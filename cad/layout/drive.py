@@ -24,7 +24,7 @@ from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Bearing, Belt, Servo, SlipRing
 from scanwright.design.left_out import LeftOut
 
-Body = Literal["base", "rotor", "servo_horn"]
+Body = Literal["base", "rotor", "horn"]
 Point = tuple[float, float, float]
 BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
 Record = TypeVar("Record")
@@ -190,7 +190,7 @@ class DriveLayout:
         no_hub_tie: why the hub has no seat for a tie; empty if it may have one.
         stator_exit: of the leads of the ring's stator, if the catalogue says.
         bears: whether the servo bears a counterweight of a mass [g] at a height besides the rotor.
-        built: parts and products in the order in which they are put in.
+        built: parts and products in the order in which they are put in; other parts say which one they follow.
         left_out: parts that this scanner does not need.
         borne: parts that another one keeps along the axis without a screw, by a bearing or a retaining ring.
     """

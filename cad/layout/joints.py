@@ -62,7 +62,7 @@ class Joint:
         thread_mm: of thread, or of material before the nut.
         thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
         slot_mm: width and length of the slots that they may slide in, if not holes.
-        stands_out_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
+        protrudes_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
         heel_mm: from a lone screw, or the line of a pair, to the edge over which the part tips off; None for others.
     """
 
@@ -75,7 +75,7 @@ class Joint:
     thread_mm: float
     thread: Thread | None = None
     slot_mm: tuple[float, float] | None = None
-    stands_out_mm: float | None = None
+    protrudes_mm: float | None = None
     heel_mm: float | None = None
 
     @property
@@ -86,14 +86,14 @@ class Joint:
     @property
     def length_mm(self) -> int:
         """Of a screw's shank."""
-        if self.stands_out_mm is not None:
-            return round(self.grip_mm + self.stands_out_mm)
+        if self.protrudes_mm is not None:
+            return round(self.grip_mm + self.protrudes_mm)
         return shank_mm(self.screw, self.grip_mm, self.fixing, self.thread_mm)
 
     @property
     def number(self) -> str:
         """The standard's designation."""
-        if self.stands_out_mm is not None:
+        if self.protrudes_mm is not None:
             return f"{self.screw.name} of the {self.part}"
         return f"ISO {4026 if self.fixing == 'grub' else 4762} {self.screw.name} x {self.length_mm}"
 

@@ -68,7 +68,7 @@ class Hold:
     """
 
     engaged_mm: float
-    asked_mm: float
+    needed_mm: float
     preload_n: float
     torque_nm: float
     pull_n: float
@@ -93,8 +93,8 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     head = _under_head_mm2(joint, hole)
     in_nut = joint.fixing in ("nut", "trap", "deck")
     engaged = screw.nut_height if in_nut else joint.length_mm - joint.grip_mm
-    if in_nut and joint.stands_out_mm is not None:
-        engaged = min(engaged, joint.stands_out_mm - joint.thread_mm)
+    if in_nut and joint.protrudes_mm is not None:
+        engaged = min(engaged, joint.protrudes_mm - joint.thread_mm)
     pulls = {"the screw": proof, f"{under.name} under the head": head * under.strength_mpa}
     if joint.inserts:
         engaged = min(engaged, INSERT_LENGTH)
@@ -107,12 +107,12 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     else:
         pulls[f"the thread in {into.name}"] = _strips(screw, engaged, into)
     preload = min(PRELOAD * proof, head * under.pressure_mpa, min(pulls.values()) / 1.5)
-    asked = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
+    needed = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
     pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": _wall(joint, under)}
     pull_by, push_by = min(pulls, key=pulls.__getitem__), min(pushes, key=pushes.__getitem__)
     return Hold(
         engaged_mm=engaged,
-        asked_mm=asked,
+        needed_mm=needed,
         preload_n=preload,
         torque_nm=_two_digits(NUT_FACTOR * preload * screw.nominal / 1000),
         pull_n=pulls[pull_by],
@@ -126,11 +126,11 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
 def _under_head_mm2(joint: Joint, hole: float) -> float:
     """What a head bears on: less the hole, or the strip of a slot that is longer than the head."""
     head = joint.screw.head_diameter
-    whole = math.pi / 4 * head**2
+    disc = math.pi / 4 * head**2
     if joint.slot_mm is None:
-        return whole - math.pi / 4 * hole**2
+        return disc - math.pi / 4 * hole**2
     width = joint.slot_mm[0]
-    return whole - width / 2 * math.sqrt(head**2 - width**2) - head**2 / 2 * math.asin(width / head)
+    return disc - width / 2 * math.sqrt(head**2 - width**2) - head**2 / 2 * math.asin(width / head)
 
 
 def stress_area_mm2(screw: Screw) -> float:
@@ -148,7 +148,7 @@ def _wall(joint: Joint, under: Material) -> float:
 
 
 def _loosens(joint: Joint, under: Material, into: Material) -> str:
-    if joint.stands_out_mm is not None:
+    if joint.protrudes_mm is not None:
         return f"it is tightened by hand, and nothing but that holds it: look at the {joint.part} each time"
     creeps = "the plastic creeps: tighten once more after a day" if under.plastic or into.plastic else "vibration"
     if joint.inserts:

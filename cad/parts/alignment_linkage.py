@@ -41,8 +41,8 @@ from scanwright.cad.layout.rotor.linkage import (
     cross_thread_mm,
     neck_corners,
 )
-from scanwright.cad.parts.fins import FAR, fins_beside
-from scanwright.cad.parts.linkage_hub import hub, hub_cuts, tie_slots, tongue
+from scanwright.cad.parts.fins import FAR, fins_of
+from scanwright.cad.parts.linkage_hub import hub, hub_cuts, tie_lug, tie_slots
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.parts.sub_plate import front_mark, lidar_joint
 from scanwright.cad.screws import Trap
@@ -69,9 +69,9 @@ OF_LIDAR = (
 )
 RETRIES = 5
 WIDER = 0.03  # of the ways of drivers, each time: they may graze the rim of the hub
-TRAP_WAY = 15.0  # below the plate: the neck may begin there
-MARK_WAY = 8.0  # of the mark beyond the plate: a neck that is thicker there keeps a wall
-DRIVER_WAY = 150.0
+TRAP_LENGTH = 15.0  # below the plate: the neck may begin there
+MARK_LENGTH = 8.0  # of the mark beyond the plate: a neck that is thicker there keeps a wall
+DRIVER_LENGTH = 150.0
 DRIVER_DEEP = 8.0  # below the plate, where a wall beside a driver's way is measured: the neck tapers
 DRIVER_WALL = 3.0  # what would be less is open
 
@@ -149,14 +149,14 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
 class Shapes:
     """What the linkage is made of, each in its place: `alignment_linkage` and the preview put it together.
 
-    Both do it in this order: plate and neck, less room and beside, of which the body of the plate stays; with the hub,
+    Both do it in this order: plate and neck, less room and fins, of which the body of the plate stays; with the hub,
     less the room; less the holes.
     """
 
     plate: cq.Shape
     neck: cq.Shape
     room: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
-    beside: list[cq.Shape]  # the fan, and what would be a fin of the neck
+    fins: list[cq.Shape]  # the fan, and what would be a fin of the neck
     hub: cq.Shape
     holes: list[cq.Shape]  # and marks
 
@@ -172,13 +172,13 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
         corners = neck_corners(p, attempt)
         neck = corners @ p.stack.R()
-        beside = [*fan, *fins_beside(p.top, p.body, p.cables, neck), *_opened(p, neck)]
+        fins = [*fan, *fins_of(p.top, p.body, p.cables, neck), *_opened(p, neck)]
         marked = [*_holes(p), _plate_mark(p, neck), *(slot for tie in p.plate_ties for slot in tie_slots(tie))]
         return Shapes(
             plate=_plate(p).moved(laser),
             neck=solids.hull(corners),
             room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p, attempt))],
-            beside=[shape.moved(laser) for shape in beside],
+            fins=[shape.moved(laser) for shape in fins],
             hub=hub(p),
             holes=[*(shape.moved(laser) for shape in marked), *hub_cuts(p)],
         )
@@ -190,7 +190,7 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
         body: cq.Shape = checked(shapes.plate.fuse(shapes.neck))
     with building(ALIGNMENT_LINKAGE, "free room of lidar, cables and fan", "tilt", tilt):
         # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
-        body = _largest(body.cut(*shapes.room, *shapes.beside))
+        body = _largest(body.cut(*shapes.room, *shapes.fins))
     with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm") as checked:
         body = checked(body.fuse(shapes.hub).cut(*shapes.room))
     with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm") as checked:
@@ -220,7 +220,7 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
     low = p.top - PLATE_THICKNESS
     plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
     if p.plate_ties:
-        plate = plate.fuse(*(tongue(tie) for tie in p.plate_ties))
+        plate = plate.fuse(*(tie_lug(tie) for tie in p.plate_ties))
     if p.ears is None:
         return plate
     (x0, y0, _), (x1, y1, _) = p.ears
@@ -232,12 +232,12 @@ def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
     if p.ears is not None:
         return []
     low = p.top - PLATE_THICKNESS
-    return _for_screws(p, p.screw.head_room + WIDER * attempt, low - DRIVER_WAY, low)
+    return _for_screws(p, p.screw.head_room + WIDER * attempt, low - DRIVER_LENGTH, low)
 
 
 def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
     """From the ways of drivers outwards, or of heads, where they run beside the surface: else a skin is left of it."""
-    low, high = p.top - PLATE_THICKNESS - DRIVER_WAY, p.top - PLATE_THICKNESS
+    low, high = p.top - PLATE_THICKNESS - DRIVER_LENGTH, p.top - PLATE_THICKNESS
     below = high - DRIVER_DEEP
     if p.ears is not None:
         low, high = _pockets(p)
@@ -245,8 +245,8 @@ def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
     opened = []
     for place in p.holes:
         out = np.array(place) / math.hypot(*place)
-        beside = np.array([[*(place + (p.screw.head_room + DRIVER_WALL) * out), below]])
-        if not in_hull(beside, neck, 0.0).any():
+        fins = np.array([[*(place + (p.screw.head_room + DRIVER_WALL) * out), below]])
+        if not in_hull(fins, neck, 0.0).any():
             end = place + 2 * max(p.half_x, p.half_y) * out
             opened.append(solids.slot(p.screw.head_room, place, end.tolist(), low, high))
     return opened
@@ -276,14 +276,14 @@ def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.
     """Pocket in the plate's lower face and the nut's way into it; its flats face the ends of the ear."""
     outline = outlines.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
     low = p.top - PLATE_THICKNESS
-    return solids.prism(outline, low - TRAP_WAY, low + trap.depth)
+    return solids.prism(outline, low - TRAP_LENGTH, low + trap.depth)
 
 
 def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
     """FRONT: a V in the edge at +x, half the plate deep, and through what the neck has there. Laser frame."""
     x = p.half_x if p.stack.sub_plate != "x" else p.half_x + EAR_REACH
     low, high = p.top - PLATE_THICKNESS / 2, p.top + 1.0
-    beyond = np.arange(2.0, MARK_WAY, 0.5)
+    beyond = np.arange(2.0, MARK_LENGTH, 0.5)
     ends = np.array(list(itertools.product(x + beyond, (-4.0, 0.0, 4.0), (low, high))))
     free = ~in_hull(ends, neck, 0.1).reshape(len(beyond), -1).any(axis=1)
     return solids.prism(front_mark(x, float(beyond[np.argmax(free)])), low, high)

@@ -154,9 +154,9 @@ def _inside(p: BearingTower) -> cq.Shape:
     """Seats, the way between them, and the chamber."""
     stack = p.stack
     seat, width = stack.carrier.outer_mm / 2 + p.fit / 4, stack.carrier.width_mm
-    way = stack.carrier.outer_mm / 2 - LIP
+    passage = stack.carrier.outer_mm / 2 - LIP
     upper = solids.upright(seat, stack.tower_top - width, stack.tower_top + 1.0)
-    middle = solids.upright(way, stack.lower_bottom, stack.tower_top)
+    middle = solids.upright(passage, stack.lower_bottom, stack.tower_top)
     lower = solids.upright(seat, stack.lower_bottom - 0.5, stack.lower_bottom + width)
     chamber = solids.upright(stack.chamber_radius, stack.tower_bottom - 1.0, stack.lower_bottom)
     return upper.fuse(middle, lower, chamber)
@@ -193,8 +193,8 @@ def _shelf(p: BearingTower) -> cq.Shape:
     end = stack.centre + stack.slot_x + TRAVEL + PLATE_SCREW.head_room + 1.0
     back = -stack.tower_radius
     outline = [[-MARKED, low], [end, low], [end, high], [-MARKED, high], [back, 12.0], [back, -12.0]]
-    whole = solids.prism(outline, bottom, top)
-    return whole.cut(solids.box((root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)))
+    shelf = solids.prism(outline, bottom, top)
+    return shelf.cut(solids.box((root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)))
 
 
 def _corner_slot(trap: Trap, floor: float, azimuth: float) -> cq.Solid:

@@ -30,8 +30,9 @@ RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubi
 
 RING_STEP = Step(
     "Capsule into the tower",
-    "Lead the rotor's leads up the shaft and out by its windows, those of each cable by the one that the step of the "
-    "leads names, if it names one, and slide the disc into the tower from below until the soft tube sits in the shaft. "
+    "Lead the rotor's leads up the shaft and out by its windows, those of each cable by the one that the step "
+    '"Leads between lidar and ring" names, if there is one, and slide the disc into the tower from below until the '
+    "soft tube sits in the shaft. "
     f"{screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
     "turned by hand, the shaft takes the rotor along without slipping",
 )

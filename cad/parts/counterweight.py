@@ -16,7 +16,7 @@ from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.drive import towards
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import Joint, screws, upright_axes
-from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, COUNTERWEIGHT, SUB_PLATE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.counterweight import LONGER, SCREW, Counterweight
 from scanwright.cad.parts.part_spec import PartSpec, Step
@@ -51,6 +51,7 @@ def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
         step=Step(
             "Counterweight on the linkage", words, "no screw stands out above the bar, which lies flat on the ear"
         ),
+        after=SUB_PLATE,
         process="sawn",
         material=bar.stock,
         work=f"{len(bar.screws)} threads {SCREW.name}",

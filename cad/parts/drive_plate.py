@@ -62,7 +62,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
 def _joints(servo: Servo, p: DrivePlate, thread: Thread) -> Iterator[Joint]:
     """The plate on the servo, and on the tower."""
     stack = p.stack
-    R, t, heads = stack.turn(), stack.beside() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_HEAD
+    R, t, heads = stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_HEAD
     axes, grip = placed_axes(upright_axes(p.holes, heads, -1.0), R, t), heads - p.ears
     yield Joint(
         DRIVE_PLATE,
@@ -117,4 +117,4 @@ def drive_plate(p: DrivePlate) -> cq.Solid:
             for _, y in stack.arms_y:
                 cuts.append(solids.slot(p.slot / 2, (x - TRAVEL, y), (x + TRAVEL, y), low - 1.0, high + 1.0))
         plate = checked(body.cut(*cuts).clean())
-    return plate.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
+    return plate.moved(solids.location(stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0]))

@@ -18,11 +18,11 @@ from scanwright.design.arrays import Array
 
 FAR = 200.0  # beyond any linkage
 THIN = 3.0  # beside the lidar, what would stand thinner than this is cut off
-CLAW = 7.0  # likewise outside of a cable
+PRONG = 7.0  # likewise outside of a cable
 INTO = 0.3  # below the rooms of lidar and cables: no ridge stays along their edges
 
 
-def fins_beside(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> list[cq.Shape]:
+def fins_of(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> list[cq.Shape]:
     """What the tapering hull would leave thinner than THIN beside the lidar, and than CLAW outside its cables.
 
     On each side: all beyond it, less the prism over where the hull is thicker there. No face lies in one of
@@ -39,18 +39,18 @@ def fins_beside(top: float, body: Box, cables: tuple[Box, ...], corners: Array) 
     everywhere = (-FAR, FAR)
     sides = [(axis, edge, everywhere, top - INTO, THIN) for axis, edge in ((0, x0), (0, x1), (1, y0), (1, y1))]
     for (cx0, cy0, cz0), (cx1, cy1, _) in cables:
-        sides.append((1, cy0 if cy0 < 0 else cy1, (cx0, cx1 - 1.4), cz0 - INTO, CLAW))
+        sides.append((1, cy0 if cy0 < 0 else cy1, (cx0, cx1 - 1.4), cz0 - INTO, PRONG))
     cuts: list[cq.Shape] = []
     for axis, edge, reach, above, least in sides:
         outward, up = math.copysign(1.0, edge) * np.eye(3)[axis], np.array([0.0, 0.0, 1.0])
         along = np.cross(up, outward)
         first, last = sorted(float(along[1 - axis]) * end for end in reach)
-        beside: cq.Shape = solids.box((first, above, -0.5), (last, FAR, FAR))
+        fin: cq.Shape = solids.box((first, above, -0.5), (last, FAR, FAR))
         thick = _thick(planes, outward, abs(edge), least, np.stack([along, up], axis=1))
         if thick is not None:
-            beside = beside.cut(solids.prism(thick, -1.0, FAR + 1.0))
+            fin = fin.cut(solids.prism(thick, -1.0, FAR + 1.0))
         frame = np.stack([along, up, outward], axis=1)
-        cuts.append(beside.moved(solids.location(frame, edge * np.eye(3)[axis])))
+        cuts.append(fin.moved(solids.location(frame, edge * np.eye(3)[axis])))
     return cuts
 
 

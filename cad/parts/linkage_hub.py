@@ -28,7 +28,7 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
     if p.ear is not None:
         hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
     if p.hub_tie is not None:
-        hub = hub.fuse(tongue(p.hub_tie))
+        hub = hub.fuse(tie_lug(p.hub_tie))
     return hub
 
 
@@ -38,7 +38,7 @@ def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
     return [*_crossed(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p), *ties]
 
 
-def tongue(seat: TieSeat) -> cq.Shape:
+def tie_lug(seat: TieSeat) -> cq.Shape:
     """The tongue of a cable tie, in the frame of its seat."""
     low = (seat.inner, seat.aside - seat.half_width, seat.low)
     return solids.box(low, (seat.end, seat.aside + seat.half_width, seat.high)).moved(solids.about_axis(seat.azimuth))

@@ -84,6 +84,7 @@ class PartSpec:
         turns: whether it turns about the rotation axis, or stands still.
         make: its solid, rotation frame at gamma = 0, mm; raises BuildError.
         step: that puts it in; None if that of what it sits on does.
+        after: part or product whose step it follows, unless the drive lists it in `built`.
         process: how it is made.
         material: what it is made from, where that is not what the printer prints.
         work: what else is done to it.
@@ -105,6 +106,7 @@ class PartSpec:
     turns: bool
     make: Callable[[], cq.Solid]
     step: Step | None = None
+    after: str = ""
     process: Process = "printed"
     material: str = ""
     work: str = ""

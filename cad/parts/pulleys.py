@@ -119,7 +119,7 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack),
-        joints=(replace(horn, axes=placed_axes(horn.axes, stack.turn(), stack.beside() * [1.0, 1.0, 0.0])),),
+        joints=(replace(horn, axes=placed_axes(horn.axes, stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0])),),
     )
 
 
@@ -160,7 +160,7 @@ def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
             radius = boss + printer.fit_clearance_mm / 4
             cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + HORN_BOSS_ROOM))
         made = checked(body.cut(*cuts).clean())
-    return made.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
+    return made.moved(solids.location(stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0]))
 
 
 def drive_envelope(stack: BeltStack) -> cq.Solid:
@@ -169,11 +169,11 @@ def drive_envelope(stack: BeltStack) -> cq.Solid:
     low, high = stack.teeth_low, stack.teeth_top
     foot = solids.upright(pulley_foot_radius(stack.servo), stack.horn, low + 0.5)
     with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
-        whole = foot.fuse(
+        envelope = foot.fuse(
             solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)
         )
-        swept = checked(whole)
-    return swept.moved(solids.location(stack.turn(), stack.beside() * [1.0, 1.0, 0.0]))
+        swept = checked(envelope)
+    return swept.moved(solids.location(stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0]))
 
 
 def _teeth_words(stack: BeltStack) -> str:

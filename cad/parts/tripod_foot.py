@@ -20,7 +20,7 @@ from scanwright.cad.layout.modules.tripod_foot import (
     FLOOR,
     HEEL,
     OVER_NUTS,
-    STANDS_OUT,
+    PROTRUDES,
     TripodFoot,
     corner_turn,
 )
@@ -48,6 +48,7 @@ def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
         turns=False,
         make=partial(tripod_foot, place.deck, p),
         step=Step("Tripod foot", words, "no screw stands out below the plate, and the nut does not turn"),
+        after=BASE_MOUNT,
         lifted="deck",
         joints=tuple(_joints(place.deck, p)),
     )
@@ -75,7 +76,7 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
         grip_mm=DECK_MM,
         thread_mm=p.thickness if p.tripod.trap is None else FLOOR,
         thread=p.tripod,
-        stands_out_mm=STANDS_OUT,
+        protrudes_mm=PROTRUDES,
         heel_mm=HEEL,
     )
 

@@ -80,15 +80,15 @@ def places(model: Model, points: Array) -> Places:
     return Places(cell[known], _shapes_and_slopes((at - corner)[known])[0], known)
 
 
-def solve(model: Model, modulus: float, poisson: float, held: Places, held_mm2: float, loads: Array) -> Array:
+def solve(model: Model, modulus: float, poisson: float, clamped: Places, clamped_mm2: float, loads: Array) -> Array:
     """Displacements of all nodes.
 
     Args:
         model: the body.
         modulus: of elasticity [MPa].
         poisson: ratio.
-        held: points spread evenly over the surface that cannot move.
-        held_mm2: its area.
+        clamped: points spread evenly over the surface that cannot move.
+        clamped_mm2: its area.
         loads: [N], shape (n, 3, cases).
 
     Returns:
@@ -99,13 +99,13 @@ def solve(model: Model, modulus: float, poisson: float, held: Places, held_mm2: 
     """
     cubes = _of_cubes(model.grid.parts, poisson)
     matrices = (modulus * model.grid.edge * ((model.share + OUTSIDE) @ cubes)).reshape(-1, 20, 3, 20, 3)
-    spring = HOLD * modulus / model.grid.edge * held_mm2 / len(held.cell)
-    springs = spring * held.shapes[:, :, None] * held.shapes[:, None, :]
+    spring = HOLD * modulus / model.grid.edge * clamped_mm2 / len(clamped.cell)
+    springs = spring * clamped.shapes[:, :, None] * clamped.shapes[:, None, :]
     for axis in range(3):
-        np.add.at(matrices[:, :, axis, :, axis], held.cell, springs)
+        np.add.at(matrices[:, :, axis, :, axis], clamped.cell, springs)
     stiffness = _summed(model.nodes, matrices, model.count)
-    way = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    factors = splu(stiffness.tocsc(), **way)
+    options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    factors = splu(stiffness.tocsc(), **options)
     return np.asarray(factors.solve(loads.reshape(-1, loads.shape[2])).reshape(loads.shape))
 
 

@@ -73,7 +73,7 @@ def _on_grid(
     grid = _grid(triangles, edge)
     model = elastic.model_of(grid, filled(triangles, grid))
     washers = _discs(np.array(deck.deck_holes), INSIDE, carried.washer_mm, deck.screw.nominal / 2)
-    held = elastic.places(model, washers)
+    clamped = elastic.places(model, washers)
     seats = _discs(np.array(mounted.holes), mounted.ears - INSIDE, carried.seat_mm, mounted.screw.nominal / 2)
     seats = (seats - centre) @ R
     at = elastic.places(model, seats)
@@ -83,7 +83,7 @@ def _on_grid(
     loads = elastic.weight(model, density * 1e-6 * down)
     loads += elastic.pull(model, at, shared(seats, carried.mass_kg * down, lever))
     washer_mm2 = len(washers) * STEP**2
-    moved = elastic.solve(model, modulus, POISSON, held, washer_mm2, loads)
+    moved = elastic.solve(model, modulus, POISSON, clamped, washer_mm2, loads)
     return R @ rigid(seats, elastic.moved(model, at, moved))[1][:, 0]
 
 

@@ -99,14 +99,14 @@ def _on_grid(
     body = np.max([filled(part, grid) for part in triangles], axis=0)
     model = elastic.model_of(grid, body)
     spigot, spigot_mm2 = _spigot(stack)
-    held = elastic.places(model, spigot @ R)
+    clamped = elastic.places(model, spigot @ R)
     points, on_seat = _seat(grid, body, seat)
     at = elastic.places(model, points[on_seat])
     down = STANDARD_GRAVITY_M_S2 * R.T  # columns: gravity along each axis of the rotation frame, laser frame
     loads = elastic.weight(model, density * 1e-6 * down)
     lever = lidar.centre_m * 1000
     loads += elastic.pull(model, at, shared(points[on_seat], lidar.mass_kg * down, lever))
-    moved = elastic.solve(model, modulus, POISSON, held, spigot_mm2, loads)
+    moved = elastic.solve(model, modulus, POISSON, clamped, spigot_mm2, loads)
     shift, rotation = rigid(points[on_seat], elastic.moved(model, at, moved))
     return R @ rotation, R @ shift / 1000
 

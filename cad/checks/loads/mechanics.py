@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from scanwright.cad.assembly.masses import LIDAR_DOUBT_MM, off_axis_doubt_m, rotor_of, rotor_weight
+from scanwright.cad.assembly.masses import LIDAR_CENTRE_ERROR_MM, off_axis_error_m, rotor_of, rotor_weight
 from scanwright.cad.checks.limits import at_most, note, tidy, with_error
 from scanwright.cad.checks.loads.belt import belt_loads
 from scanwright.cad.checks.loads.direct import direct_loads
@@ -13,7 +13,7 @@ from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.loads import FAR_MM, Weight, friction_nm
 from scanwright.cad.layout.names import SERVO
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.layout.rotor.imbalance import keeps_flank, play_matters
+from scanwright.cad.layout.rotor.imbalance import backlash_matters, keeps_flank
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
@@ -31,7 +31,7 @@ def mechanics_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[
     """
     scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
-    error_m = off_axis_doubt_m(bodies)
+    error_m = off_axis_error_m(bodies)
     off = "centre of mass off the axis"
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * error_m),
@@ -74,7 +74,7 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, error_m: float) -
     rubs = friction_nm(scanner)[0]
     servo, torque, error = scanner.servo, weight.across_n * weight.off_axis_m, weight.across_n * error_m
     moment = f"{SERVO}: gravity turns {servo.name} with {with_error(torque, error)} N m"
-    severity: Severity = "warning" if play_matters(scanner) else "note"
+    severity: Severity = "warning" if backlash_matters(scanner) else "note"
     limit: float | None = rubs
     hint = ""
     if torque + error <= rubs:
@@ -84,7 +84,8 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, error_m: float) -
     elif torque <= rubs:
         what = (
             f"less than the friction of ring and bearing ({rubs:g}), but the centre of mass of "
-            f"{scanner.lidar.name} is undocumented: within {LIDAR_DOUBT_MM:g} mm of the middle of its body (assumed)"
+            f"{scanner.lidar.name} is undocumented: within {LIDAR_CENTRE_ERROR_MM:g} mm of the middle of its body "
+            "(assumed)"
         )
         hint = "compare the ripple that `scanwright scan` prints, and move the balancing weight, if any, to reduce it"
     else:

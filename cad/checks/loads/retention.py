@@ -100,11 +100,11 @@ def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hang
 def _screws(joint: Joint, hold: Hold) -> Finding:
     message = (
         f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {hold.engaged_mm:.1f} mm of "
-        f"{'thread' if hold.asked_mm else 'nut or insert'} (at least {hold.asked_mm:.1f}), tightened with "
+        f"{'thread' if hold.needed_mm else 'nut or insert'} (at least {hold.needed_mm:.1f}), tightened with "
         f"{hold.torque_nm:g} N m ({hold.preload_n:.0f} N); cause of loosening: {hold.loosens}"
     )
-    engaged = hold.engaged_mm >= hold.asked_mm - ROUNDING_MM
-    value, limit = tidy(hold.engaged_mm), tidy(hold.asked_mm)
+    engaged = hold.engaged_mm >= hold.needed_mm - ROUNDING_MM
+    value, limit = tidy(hold.engaged_mm), tidy(hold.needed_mm)
     return Finding("screw", "ok" if engaged else "error", _subject(joint), message, value, limit, "mm")
 
 

@@ -57,11 +57,9 @@ BUILT = (
     names.DRIVE_PLATE,
     names.DRIVE_PULLEY,
     names.BASE_MOUNT,
-    names.TRIPOD_FOOT,
     names.FIXED_CABLES,
     names.LIDAR,
     names.SUB_PLATE,
-    names.COUNTERWEIGHT,
     names.ALIGNMENT_LINKAGE,
     names.ROTOR_LEADS,
 )
@@ -85,7 +83,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         shaft=names.MAIN_SHAFT,
         bend=belt_shaft_bend(stack),
         mounted=mounted,
-        servo_pose=(stack.turn(), stack.beside()),
+        servo_pose=(stack.turn(), stack.servo_origin()),
         floor=stack.pulley_top,
         ceiling=stack.tower_top - SHELF,
         lead_exits=partial(_lead_exits, stack),
@@ -154,7 +152,7 @@ def _stations(stack: BeltStack, ring: SlipRing) -> Iterator[Station]:
         shape=case,
     )
     yield round_one(names.DRIVE_PLATE, "base", stack.plate_x, stack.tower_top, stack.tower_top + PLATE)
-    yield round_one(names.DRIVE_PULLEY, "servo_horn", stack.rim_radius, stack.horn, stack.teeth_top)
+    yield round_one(names.DRIVE_PULLEY, "horn", stack.rim_radius, stack.horn, stack.teeth_top)
     half = stack.belt.width_mm / 2
     yield Station(
         name=names.BELT,

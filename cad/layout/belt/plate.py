@@ -44,9 +44,9 @@ def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
     widest = max((x for x, _ in free), default=0.0)
     ys = sorted(y for x, y in free if x == widest and (-x, y) in free)
     if len(ys) < 2:
-        doubt = servo.caution("holes")
+        caution = servo.caution("holes")
         raise BuildError(
-            f"{DRIVE_PLATE}: ears: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
+            f"{DRIVE_PLATE}: ears: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
             f"pairs of front holes at least {least:.2f} mm from its axis, beside the pulley"
         )
     return DrivePlate(

@@ -142,14 +142,14 @@ def _check_heads(stack: BeltStack, printer: Printer) -> None:
     screw = SCREWS[servo.horn_screw]
     place = f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}"
     heads = f"the heads of the {screw.name} screws of {servo.name}"
-    middle, beside = servo.horn_circle_mm / 2, screw.head_room + printer.min_wall_mm
-    if middle + beside > stack.tip_radius - stack.belt.tooth_height_mm:
+    middle, around = servo.horn_circle_mm / 2, screw.head_room + printer.min_wall_mm
+    if middle + around > stack.tip_radius - stack.belt.tooth_height_mm:
         raise BuildError(
             f"{place}: {heads} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
         )
     boss = servo.horn_boss_diameter_mm
     over_boss = stack.pulley_seat - stack.horn - servo.horn_boss_height_mm - HORN_BOSS_ROOM
-    if over_boss < printer.min_wall_mm and middle - beside < boss / 2:
+    if over_boss < printer.min_wall_mm and middle - around < boss / 2:
         raise BuildError(f"{place}: {heads} leave no wall around its boss of {boss:g} mm")
 
 

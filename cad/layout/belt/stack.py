@@ -273,21 +273,21 @@ class BeltStack(Hub):
         c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.quarter % 4]
         return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
 
-    def beside(self) -> Array:
+    def servo_origin(self) -> Array:
         """Where the horn's axis meets its face, rotation frame, shape (3,)."""
         return self.turn() @ [self.centre, 0.0, self.horn]
 
     @property
     def horn_axis(self) -> tuple[float, float]:
         """Where the horn's axis meets the plane z = 0."""
-        return float(self.beside()[0]), float(self.beside()[1])
+        return float(self.servo_origin()[0]), float(self.servo_origin()[1])
 
 
 def case_corners(stack: BeltStack) -> Array:
     """Of the servo's case where it stands, rotation frame, shape (8, 3)."""
     low, high = stack.servo.case_min_mm, stack.servo.case_max_mm
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    return corners @ stack.turn().T + stack.beside()
+    return corners @ stack.turn().T + stack.servo_origin()
 
 
 def drive_corners(stack: BeltStack) -> Array:

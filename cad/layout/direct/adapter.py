@@ -41,9 +41,9 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter | None:
     screw = SCREWS[servo.front.screw]
     holes = fork_holes(servo, stack)
     if not holes:
-        doubt = servo.caution("holes")
+        caution = servo.caution("holes")
         raise BuildError(
-            f"{SLIP_RING_ADAPTER}: fork: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
+            f"{SLIP_RING_ADAPTER}: fork: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
             f"pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
         )
     fork = Ears(

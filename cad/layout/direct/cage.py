@@ -87,9 +87,9 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
     if len(holes) < 4:
-        doubt = servo.caution("holes")
+        caution = servo.caution("holes")
         raise BuildError(
-            f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{doubt}: {servo.name} needs two "
+            f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
             f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
     return Ears(

@@ -27,7 +27,6 @@ from scanwright.design.scanner import Scanner
 BUILT = (
     names.SERVO_FRAME,
     names.BASE_MOUNT,
-    names.TRIPOD_FOOT,
     names.DECK,
     names.SERVO_SHAFT,
     names.HORN_CUP,
@@ -39,7 +38,6 @@ BUILT = (
     names.FIXED_CABLES,
     names.LIDAR,
     names.SUB_PLATE,
-    names.COUNTERWEIGHT,
     names.ALIGNMENT_LINKAGE,
     names.ROTOR_LEADS,
 )
@@ -102,9 +100,7 @@ def _stations(
     )
     if frame is not None:
         yield Station(name=names.SERVO_FRAME, body="base", z_mm=(frame.low, frame.high), radius_mm=frame.reach_x)
-    yield Station(
-        name=stack.shaft, body="servo_horn", z_mm=(stack.horn, stack.spigot_top), radius_mm=stack.flange_radius
-    )
+    yield Station(name=stack.shaft, body="horn", z_mm=(stack.horn, stack.spigot_top), radius_mm=stack.flange_radius)
     if cage is not None and ring is None:
         yield Station(name=names.CAGE_BASE, body="base", z_mm=(cage.low, cage.high), radius_mm=stack.cage_outer)
     if ring is not None:

@@ -20,7 +20,7 @@ from scanwright.design.scanner import Scanner
 GRIP = 2.5  # of the plate, under the heads of the servo's screws
 HORN_ROOM = 0.5  # around what turns in the plate's opening
 OVER_HEADS = 0.5  # between the heads and what turns above them
-PLAY = 0.3  # around the case
+GAP = 0.3  # around the case
 LEG = 5.0
 WINDOW = 8.0  # half width of the opening between two legs, about the servo's plug
 LEAST_LEG = 8.0
@@ -119,7 +119,7 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
             f"{printer.min_wall_mm:g}"
         )
     (x0, y0, z0), (x1, y1, _) = servo.case_min_mm, servo.case_max_mm
-    half_x = max(-x0, x1) + PLAY
+    half_x = max(-x0, x1) + GAP
     exit_y = (y0 + y1) / 2 if servo.cable_exit_mm is None else servo.cable_exit_mm[1]
     middle = min(max(exit_y, y0 + LEAST_LEG + WINDOW), y1 - LEAST_LEG - WINDOW)
     window = middle - WINDOW, middle + WINDOW

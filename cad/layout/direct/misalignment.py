@@ -20,7 +20,7 @@ from scanwright.design.scanner import Scanner
 TRUED_MM = 0.05  # on the indicator over a turn: the flange is tapped within the play of its screws
 INNER_RING_MM = 0.013  # Kia of a bearing of the normal class, 18 to 30 mm, ISO 492
 SLEEVE_FIT_MM = 0.02  # most play of g6 in the inner ring, on the diameter: ISO 286, ISO 492
-BEARING_PLAY_MM = 0.02  # most radial clearance of the normal group, 24 to 30 mm, ISO 5753-1
+BEARING_CLEARANCE_MM = 0.02  # most radial clearance of the normal group, 24 to 30 mm, ISO 5753-1
 CAGE_SET_MM = 0.02  # that the cage springs off the sleeve's middle when its screws are tightened: assumed
 WARMER_K = 20.0  # than when it was set
 PLASTIC_GROWS_PER_K = 70e-6  # PLA and PETG; the case is taken not to grow
@@ -53,7 +53,7 @@ def offsets_mm(ears: Ears) -> dict[str, float]:
         f"sleeve trued to {TRUED_MM:g} over a turn": TRUED_MM / 2,
         "runout of the inner ring": INNER_RING_MM / 2,
         "sleeve in the inner ring": SLEEVE_FIT_MM / 2,
-        "clearance of the bearing": BEARING_PLAY_MM / 2,
+        "clearance of the bearing": BEARING_CLEARANCE_MM / 2,
         "cage as it is set": CAGE_SET_MM,
         f"cage {WARMER_K:g} K warmer": PLASTIC_GROWS_PER_K * WARMER_K * from_axis,
     }

@@ -124,10 +124,10 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     room, boss = _room_on_horn(servo), servo.horn_boss_diameter_mm / 2
     collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(room, boss + COLLAR_WALL_MIN)))
     if collar > room:
-        doubt = servo.caution("horn_circle_mm")
+        mark = servo.caution("horn_circle_mm")
         raise BuildError(
             f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
-            f"{servo.horn_circle_mm:g} mm{doubt} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"
+            f"{servo.horn_circle_mm:g} mm{mark} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"
         )
     thickness = 4.0
     return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)

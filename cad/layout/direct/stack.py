@@ -55,7 +55,7 @@ GROOVES = {
 CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
 CAGE_WALL = 5.0
 CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
-BEARING_PLAY = 0.3  # along the axis: room for what bonds the bearing
+BEARING_SLACK = 0.3  # along the axis: room for what bonds the bearing
 CAGE_GAP = 1.0  # between hub and cage
 WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
@@ -112,7 +112,7 @@ class DirectStack(Hub):
     @property
     def cage_seat(self) -> float:
         """Height of the lip that the bearing lies on, if it falls down its play."""
-        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm) - BEARING_PLAY
+        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm) - BEARING_SLACK
 
     @property
     def cage_roof(self) -> float:

@@ -17,7 +17,7 @@ from scanwright.design.catalogue.products import Printer
 LEAST = 8.0  # thickness: the nut and a floor under it
 FLOOR = 2.0  # under the tripod's nut: its screw stands out little
 OVER_NUTS = 2.8  # of the mount's screws
-STANDS_OUT = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; a longer one finds room
+PROTRUDES = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; a longer one finds room
 HEEL = 19.0  # half the width of the narrowest plate of a tripod's head that it stands on: assumed
 
 

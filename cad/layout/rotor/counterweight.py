@@ -21,7 +21,7 @@ from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM
 from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, play_matters, torque_nm
+from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
 from scanwright.cad.layout.rotor.linkage import CROSS_SCREW, Ear, LinkageBody
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
@@ -118,7 +118,7 @@ def counterweight_of(
         plate_ties: tongues of its plate.
         neck: corners of its neck, shape (n, 3).
     """
-    if not play_matters(scanner):
+    if not backlash_matters(scanner):
         return _without(f"the play of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
     if tilt_sine(scanner) < UPRIGHT:
         return _without("gravity does not turn an upright axis")

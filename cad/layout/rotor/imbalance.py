@@ -55,13 +55,13 @@ def torque_nm(scanner: Scanner, moment: float) -> float:
     return moment * 1e-6 * STANDARD_GRAVITY_M_S2 * tilt_sine(scanner)
 
 
-def keeps_flank(scanner: Scanner, moment: Array, doubt: float = 0.0) -> bool:
+def keeps_flank(scanner: Scanner, moment: Array, error: float = 0.0) -> bool:
     """Whether a sweep stays where gravity turns the rotor one way only, and so keeps the gears on one flank.
 
     Args:
         scanner: angles and products.
         moment: mass times distance from the axis, shape (2,), or the distance alone: any unit.
-        doubt: how far that may be off in any direction, same unit.
+        error: how far that may be off in any direction, same unit.
     """
     motion = scanner.angles.motion
     if not isinstance(motion, Sweep):
@@ -71,11 +71,11 @@ def keeps_flank(scanner: Scanner, moment: Array, doubt: float = 0.0) -> bool:
     x = np.cos(gamma) * moment[0] - np.sin(gamma) * moment[1]
     y = np.sin(gamma) * moment[0] + np.cos(gamma) * moment[1]
     torque = x * down[1] - y * down[0]
-    least = doubt * math.hypot(down[0], down[1])
+    least = error * math.hypot(down[0], down[1])
     return bool((torque > least).all() or (torque < -least).all())
 
 
-def play_matters(scanner: Scanner) -> bool:
+def backlash_matters(scanner: Scanner) -> bool:
     """Whether the play of the servo's gears shows in a cloud; where nobody tells it, it does."""
-    play = scanner.servo.backlash_deg
-    return play is None or play > noise_deg(scanner)
+    backlash = scanner.servo.backlash_deg
+    return backlash is None or backlash > noise_deg(scanner)

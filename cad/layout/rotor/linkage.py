@@ -37,7 +37,7 @@ CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0
 BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
 HEEL = 8.0  # how far the neck reaches below a lying plate
 BACK = 6.0  # and behind its lower half: it carries the lidar like a bracket, thick at its foot
-BESIDE_RING = 0.03  # by how much [rad] the sector of a full fan ends before what the ring hides
+RING_MARGIN = 0.03  # by how much [rad] the sector of a full fan ends before what the ring hides
 FIN_HALF = 0.06  # half of a sector [rad] in which the neck would stand as a fin
 
 
@@ -204,7 +204,7 @@ def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ..
     if half < FIN_HALF:
         return tuple(pieces)
     if len(pieces) > 1:  # a full fan has beams on both sides of the sector, and those beside the ring are to be free
-        half = max(FIN_HALF, half - BESIDE_RING)
+        half = max(FIN_HALF, half - RING_MARGIN)
     centre = math.atan2(-q[1], -q[0])
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):
         low, high = centre + turn - half, centre + turn + half

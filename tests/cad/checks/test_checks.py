@@ -264,7 +264,7 @@ def test_what_nobody_tells_of_a_lidars_weight_is_told_with_every_torque(monkeypa
     assert (flanks.severity, flanks.limit) == ("warning", 0.005)
     assert "the centre of mass of UTM-30LX is undocumented" in flanks.message
     assert "back and forth" in found(0.006)["flanks"].message
-    monkeypatch.setattr(masses, "LIDAR_DOUBT_MM", 0.5)
+    monkeypatch.setattr(masses, "LIDAR_CENTRE_ERROR_MM", 0.5)
     assert found(0.001)["flanks"].severity == "ok"
 
 

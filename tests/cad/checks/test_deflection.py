@@ -115,8 +115,8 @@ def test_a_printed_cup_turns_on_its_horn_as_the_same_cup_in_finite_elements():
     for azimuth in layout.linkage.cross_azimuths:  # the nuts' slots
         aside = rim @ [-math.sin(azimuth), math.cos(azimuth), 0.0]
         rim = rim[(np.abs(aside) > 4.0) | (rim @ [math.cos(azimuth), math.sin(azimuth), 0.0] < 0)]
-    force, held_mm2 = np.array([3.0, 0, 0]), math.pi * servo.horn_diameter_mm**2 / 4
-    moved = moved_points(mesh, np.eye(3), 2.5, root, held_mm2, rim, force, modulus / 1e6, 0.35)
+    force, clamped_mm2 = np.array([3.0, 0, 0]), math.pi * servo.horn_diameter_mm**2 / 4
+    moved = moved_points(mesh, np.eye(3), 2.5, root, clamped_mm2, rim, force, modulus / 1e6, 0.35)
     turned_rad = -np.polyfit(rim[:, 0], moved[:, 2], 1)[0]
     lever_m = (stack.spigot_top - stack.hub_bottom) / 1000
     beam = shaft_bend(stack, modulus).rotation_of(force, np.cross([0, 0, lever_m], force))

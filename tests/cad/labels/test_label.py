@@ -15,7 +15,7 @@ from scanwright.cad.labels.engrave import engrave, groove_of
 from scanwright.cad.labels.flats import flat_at, flats_of
 from scanwright.cad.labels.glyphs import letters, text_width
 from scanwright.cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
-from scanwright.cad.labels.sight import Sight
+from scanwright.cad.labels.visibility import Visibility
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.solids import box, upright
 from scanwright.design.left_out import LeftOut
@@ -124,7 +124,7 @@ def test_labels_are_where_an_eye_finds_them(made):
 
 def test_faces_that_mate_or_are_covered_are_known(made):
     assembly = made.result.assembly
-    sight, R, seat = Sight(assembly), assembly.layout.stack.R(), assembly.layout.linkage.seat
+    sight, R, seat = Visibility(assembly), assembly.layout.stack.R(), assembly.layout.linkage.seat
     on_seat = flat_at(assembly.made["alignment_linkage"], R @ [0.0, 0.0, seat], R[:, 2])
     assert sight.touched(on_seat) and not sight.views(on_seat, np.zeros((1, 2)), True).any()
     deck = -np.array(assembly.layout.deck.normal)

@@ -19,6 +19,7 @@ from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
 from scanwright.cad.geometry.holes import Piercing, rounds_of
 from scanwright.cad.layout.joints import DECK_MM, shank_mm
+from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import SCREWS, thread_hole, trap_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.deck_holes import Rectangle
@@ -268,7 +269,7 @@ def test_a_screw_that_moves_is_noticed(parts_of):
     scanner = SETTINGS["upright on the deck"]
     assembly = parts_of(scanner)
     turned = scanner.servo.model_copy(update={"horn_first_hole_deg": 10.0})
-    moved = replace(assembly.layout, scanner=replace(scanner, servo=turned))
+    moved = laid_out(replace(scanner, servo=turned))
     joint = next(joint for joint in moved.joints if joint.onto == "servo_horn")
     _, holes = read_joints(scanner, assembly)["servo_shaft", "servo_horn"]
     assert not any(_is_on(axis, hole) for axis in joint.axes for hole, _ in holes)

@@ -336,7 +336,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert (tie.quantity, tie.note.split(";")[0]) == (2, "1 at the shaft, 1 at the foot of the mount")
     assert "Close a cable tie around shaft and bundles" in text and "behind the plate" not in text
     assert len(set(re.findall(r"by the shaft's window at (\d+) deg", text))) == 2
-    assert "one of its windows" not in text and 'by the one that the step "Leads between lidar and ring" tells' in text
+    assert "one of its windows" not in text and 'by the one that the step "Leads between lidar and ring" names' in text
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
@@ -369,9 +369,9 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
     teeth = next(text for text in said["drive_pulley"] if text.startswith("80 teeth for GT2-6, pitch 2:"))
     pitch, tips = map(float, re.search(r"pitch diameter ([\d.]+), over the tips ([\d.]+)", teeth).groups())
     flat = section(made.meshes["drive_pulley"], made.stack.belt_middle)
-    radii = np.linalg.norm(np.asarray(flat.exterior.coords) - made.stack.beside()[:2], axis=1)
+    radii = np.linalg.norm(np.asarray(flat.exterior.coords) - made.stack.servo_origin()[:2], axis=1)
     assert pitch == pytest.approx(160 / np.pi, abs=0.005) and tips == pytest.approx(2 * radii.max(), abs=0.01)
-    horn = made.stack.beside()
+    horn = made.stack.servo_origin()
     zero = next(text for text in said["drive_pulley"] if text.startswith("Their zero is"))
     assert list(map(float, re.findall(r"-?[\d.]+(?=,| in)", zero))) == pytest.approx(horn.tolist(), abs=0.01)
 
@@ -382,8 +382,9 @@ def test_the_frame_chain_names_the_servo_beside_the_axis(made):
     drive, bodies = made.assembly.layout.drive, link_bodies(made.scanner, made.assembly)
     servo, rot = bodies["servo"], bodies["rot"]
     text = urdf_text(made.scanner, drive, bodies, {"servo": [], "rot": []})
-    horn = drive.stack.beside()
-    low, high = np.array(drive.shapes[0].low), np.array(drive.shapes[0].high)
+    horn = drive.stack.servo_origin()
+    (case,) = [station.shape for station in drive.stations if station.name == "servo"]
+    low, high = np.array(case.low), np.array(case.high)
     centre = (low + high) / 2
     assert sorted(high - low) == pytest.approx([40.2, 41.0, 61.1]) and f"{centre[0] / 1000:.6g}" in text
     assert np.linalg.norm(centre[:2] - horn[:2]) < 20

@@ -77,7 +77,7 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 4
     text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
-    assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their traps" in text
+    assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their pockets" in text
     assert without_traps(PRINTER, joints) == []
     core = thread_in_part(M3, PRINTER, room_for_nut=False)
     plain = [replace(cage, fixing="thread", thread=core)]

@@ -337,7 +337,7 @@ def test_wrong_input_is_one_line(command, tmp_path):
         ([one, one], "given twice"),
         ([one, tmp_path], "is a folder; name a file of a cloud"),
         ([one, tmp_path / "r.mcap"], "`scanwright assemble`"),
-        ([one, tmp_path / "absent.las"], "absent.las: not a LAS file"),
+        ([one, tmp_path / "absent.las"], "absent.las: cannot read: No such file"),
     ):
         code, _, complaints = command("register", *words, "-o", tmp_path / "map.ply")
         assert code == 2

@@ -23,7 +23,7 @@ DECK_BELOW = 0.2  # of its face in this picture: a foot that lies on it is found
 GRID = 3.0  # between the points of a face where touch is looked for
 
 
-class Sight:
+class Visibility:
     """Bodies and deck of one scanner, to look at the faces of its parts."""
 
     def __init__(self, assembly: Assembly) -> None:
