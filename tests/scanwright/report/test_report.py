@@ -251,7 +251,7 @@ def test_steps_are_headings_paragraphs_and_lists():
 def test_a_picture_of_the_steps_stands_in_the_page_itself():
     shown = steps_html("## A\n\n![A <b>](a.png)\n\n![B](b.png)", {"a.png": "data:image/png;base64,AA=="}.get)
     image = '<img src="data:image/png;base64,AA==" alt="A &lt;b&gt;">'
-    assert shown == f'<h3>A</h3>\n<div class="wide">{image}</div>\n<p>![B](b.png)</p>'
+    assert shown == f'<h3>A</h3>\n<div class="picture">{image}</div>\n<p>![B](b.png)</p>'
 
 
 @given(st.text(st.characters(exclude_characters="#*`-\r\n", exclude_categories=["C", "Z"]), min_size=1))
