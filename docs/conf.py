@@ -1,8 +1,8 @@
 """How the pages are made: `uv run sphinx-build -n -W --keep-going docs docs/_build`.
 
-The docstrings of this project write names, formulas and files alike in single backquotes. Such a word becomes a link
-where it names something of ours. Where it claims to (it begins with one of our packages, or is the path of a file or
-page) and there is no such thing, the build fails.
+The docstrings of this project write names, formulas and files in single backquotes. Such a word becomes a link
+if it names something of ours. If it seems to (it begins with one of our packages, or is the path of a file or
+page) but does not exist, the build fails.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def describe_commands(app: Any) -> None:
 
     from scanwright.cli.app import app as commands
 
-    page = ["# Commands", "", "`scanwright COMMAND --help` says the same.", ""]
+    page = ["# Commands", "", "`scanwright COMMAND --help` prints the same.", ""]
     for name, command in sorted(get_command(commands).commands.items()):  # type: ignore[attr-defined]
         page += [f"## {name}", "", str(command.help).replace("<", "&lt;"), ""]
         for parameter in command.params:
@@ -86,6 +86,18 @@ def describe_commands(app: Any) -> None:
     folder = Path(app.srcdir) / "reference/cli"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "commands.md").write_text("\n".join(page))
+    for group in commands.registered_groups:
+        for command in group.typer_instance.registered_commands:
+            _hide_source(command.callback)
+
+
+def _hide_source(function: Any) -> None:
+    """Let Sphinx read the defaults of a command from its signature if a decorator gave it further options."""
+    while function is not None:
+        inner = vars(function).get("__wrapped__")
+        if "__signature__" in vars(function):
+            vars(function).pop("__wrapped__", None)
+        function = inner
 
 
 def describe_checks(app: Any) -> None:
@@ -102,15 +114,15 @@ def describe_files(app: Any) -> None:
     write_schema_pages(Path(app.srcdir) / "reference/files")
 
 
-def name_rooms(_app: Any, page: str, source: list[str]) -> None:
-    """A room is called by its name, not "package"; its modules follow without a heading over them."""
+def name_packages(_app: Any, page: str, source: list[str]) -> None:
+    """Title the page of a package with its name alone; its modules follow without a heading over them."""
     if page.startswith("reference/"):
         text = re.sub(r"^(Subpackages|Submodules)\n-+\n", "", source[0], flags=re.MULTILINE)
         source[0] = re.sub(r"^(\S+) (package|module)\n(=+|-+)$", r"\1\n\3", text, flags=re.MULTILINE)
 
 
 def points_nowhere(_app: Any, _env: Any, node: Any, contnode: Any) -> Any:
-    """Leave words that name nothing of ours as they are; None lets Sphinx complain about those that claim to."""
+    """Leave words that name nothing of ours unchanged; None lets Sphinx warn about those that seem to."""
     target = str(node.get("reftarget", ""))
     if node.get("refdomain") != "py":
         return None
@@ -129,7 +141,7 @@ def _is_something(name: str) -> bool:
 
 
 def drawn_as_typed(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
-    """Formulas, tables and sketches stand indented behind a blank line: show them as they are."""
+    """Show formulas, tables and sketches, which are indented after a blank line, as they are."""
     for k in range(len(lines) - 1, 1, -1):
         before = next((line for line in reversed(lines[: k - 1]) if line.strip()), "")
         if lines[k].strip() and not lines[k - 1].strip() and _indent(lines[k]) >= _indent(before) + 4:
@@ -149,7 +161,7 @@ def setup(app: Any) -> None:
     """Called by Sphinx."""
     for heavy in ("cadquery", "matplotlib.figure", "numba", "scipy.spatial"):
         import_module(heavy)  # once: Sphinx forks its readers
-    app.connect("source-read", name_rooms)
+    app.connect("source-read", name_packages)
     app.connect("builder-inited", describe_commands)
     app.connect("builder-inited", describe_checks)
     app.connect("builder-inited", describe_files)

@@ -1,8 +1,8 @@
-"""The gallery of the docs: eight tasks from eight worlds, each with its answer, its scanner and a scan of its world.
+"""The gallery of the docs: eight tasks for eight uses, each with its result, its scanner and a scan of its world.
 
     uv run python -m benchmarks.scanwright.gallery [NAME...]
 
-A task that is not shipped is written by `scanwright new` from the words that stand on the page. Every one is built into
+`scanwright new` writes a task that is not shipped, with the options on the page. Every one is built into
 `out/`, its scanner drawn from `assembly.glb`, and every beam of one full scan cast in the world of
 `gallery_worlds.py`, with the noise of the data sheet. Writes `docs/gallery.md` and its pictures; with names only those
 are made anew, and the others are taken from `out/`. Needs OpenGL without a screen (Debian: libegl1).
@@ -51,15 +51,15 @@ class Entry:
 
     Attributes:
         name: of the task.
-        title: of its part of the page.
-        words: what `scanwright new` is told; none for a shipped task.
+        title: of its section of the page.
+        words: options of `scanwright new`; none for a shipped task.
         world: makes the bodies around it.
         height_m: of the optical centre in that world.
         shown: which points [m], shape (n, 3), are drawn, as booleans, so that one looks into rooms.
         eye: from where [m].
         target: where to [m].
         degrees: how wide.
-        learnt: what it taught.
+        learnt: the lesson of this task.
     """
 
     name: str
@@ -85,9 +85,9 @@ ENTRIES = (
         (-3.6, -3.4, 3.0),
         (1.6, 0, 0.1),
         34,
-        "The setting that J alone would take is blind in a cone of 0.58 deg in the middle of what counts; the "
-        "best one without a hole costs 0.086 % of the beams per ball (`scanwright optimise ground_ahead`). "
-        "Hanging and standing give the same J; the build takes the one whose parts hide less.",
+        "The mount with the lowest J alone is blind in a cone of 0.47 deg in the middle of the region. The best mount"
+        " without a blind spot costs 0.097 % of the beams per ball (`scanwright optimise ground_ahead`). Hanging and "
+        "upright builds have the same J; the build is the one whose parts block fewer beams.",
     ),
     Entry(
         "quadruped",
@@ -100,9 +100,9 @@ ENTRIES = (
         (-3.6, -5.0, 4.6),
         (1.2, 0.1, 0.5),
         36,
-        "Ground and ceiling at once want an axis almost upright. An upright axis with one tilt is as good within 2 %, "
-        "and easier to build; rolling, the mount that comes to mind first, is a quarter worse. Three lengths were "
-        "enough to say what of the robot is in the way.",
+        "For ground and ceiling at once the best axis is almost upright. An upright axis with one tilt is as good "
+        "within 2 %, and easier to build. Rolling, the obvious mount, is a quarter worse. Three lengths are enough to"
+        " describe the part of the robot that blocks beams.",
     ),
     Entry(
         "mine",
@@ -114,8 +114,8 @@ ENTRIES = (
         (-7.0, -8.0, 4.2),
         (-0.6, 0.6, 1.1),
         42,
-        "A band all around wants its axis upright, and one tilt of the scan plane is enough: its dense edges then lie "
-        "on the walls. The second angle that the search found gains nothing, so build the tilt.",
+        "For a band all around the best axis is upright, and one tilt of the scan plane is enough: its dense edges "
+        "are then on the walls. The second angle gains nothing, so build the tilt.",
     ),
     Entry(
         "forest_plot",
@@ -127,9 +127,8 @@ ENTRIES = (
         (-17, -15, 13),
         (0, 0, 1.5),
         44,
-        "The same kind of band as in the mine, steeper, wants the plane tilted more: 73 deg instead of 58. "
-        "At half a minute a turn the lines are less than 3 cm apart on a stem 5 m away; the period is one number "
-        "of the task.",
+        "The band is like that of the mine but steeper, so the plane is tilted more: 73 deg instead of 58. At half a "
+        "minute a turn the lines are less than 3 cm apart on a stem 5 m away. The period is one number of the task.",
     ),
     Entry(
         "ceiling",
@@ -141,8 +140,8 @@ ENTRIES = (
         (-9.0, -9.5, 8.5),
         (0.3, 0.2, 0.9),
         37,
-        "Where the scanner hangs fixes its axis, and only two angles are searched: 1,369 settings in place of 3.7 "
-        "million. One of the two is enough: a tilt alone loses nothing.",
+        "The ceiling fixes the axis, so only two angles are searched: 1,369 mounts instead of 3.7 million. One of the"
+        " two is enough: a tilt alone loses nothing.",
     ),
     Entry(
         "stairs",
@@ -155,9 +154,9 @@ ENTRIES = (
         (-1.7, -3.6, 3.2),
         (1.7, 0.1, 0.75),
         42,
-        "J alone would leave a quarter of what counts unseen, as a logarithm forgives a direction without beams "
-        "where others have many; having no hole costs 6.4 %. At 3 s a turn there were 30 lines and no steps to be "
-        "seen: this climber stands still for 9 s.",
+        "J alone would leave a quarter of the region unseen, because a logarithm tolerates directions without beams "
+        "if others have many. Avoiding blind spots costs 6.4 %. At 3 s a turn there are 30 lines, and no steps are "
+        "visible: this climber stands still for 9 s.",
     ),
     Entry(
         "shelf",
@@ -169,9 +168,9 @@ ENTRIES = (
         (-2.6, -1.6, 2.0),
         (1.3, 0, 1.1),
         38,
-        "A tilted mount is hardly worth having here, 1 % over rolling, and `compare` says so before anything is "
-        "printed. A lidar that sees all around sees its own mount in every scan: those beams are known and left "
-        "out, on the side that nobody asked for.",
+        "A tilted mount gains only 1 % over rolling, and `compare` shows this before you print anything. A lidar with"
+        " a view of 360 deg sees its own mount in every scan. These beams are known and dropped; they are on the side"
+        " outside the region.",
     ),
     Entry(
         "landing_pad",
@@ -183,8 +182,8 @@ ENTRIES = (
         (-4.2, -5.6, 5.0),
         (0, 0, 0.1),
         40,
-        "The axis points straight down, and one tilt of the scan plane is enough. The toolbox on the pad is found "
-        "in 4 s; straight below, where the axis points, what is smaller than 28 cm may go unseen.",
+        "The axis points straight down, and one tilt of the scan plane is enough. The toolbox on the pad is visible "
+        "in 4 s. Straight below, where the axis points, objects smaller than 28 cm can be missed.",
     ),
 )
 
@@ -206,15 +205,17 @@ def main() -> None:
 
 INTRODUCTION = """# Gallery
 
-Eight tasks from eight worlds. Left the scanner that was built, right one full scan of it in a simulated world, the
-noise of the data sheet included; the red ball is the scanner, larger than it is. All of this page is made by
-`python -m benchmarks.scanwright.gallery`: tasks, parts, scans, pictures and figures.
+Eight tasks for eight uses, with the scanner that was built for each. Choose the one most like yours as a start.
 
-**Do not print the parts with a slip ring of Senring yet.** The real UH1256 is longer than that of the catalogue, and
-its leads are thicker. `build` prints a warning for each such product, `scanwright catalogue NAME` has the reasons.
-Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real devices
-have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and scans do not
-depend on the holes.
+Each picture shows the scanner on the left, and one full scan of a simulated world on the right, with the noise of
+the data sheet. The red ball is the scanner, larger than in reality. `python -m benchmarks.scanwright.gallery` makes
+this page: tasks, parts, scans, pictures and figures.
+
+**Do not print the parts with a slip ring of Senring.** The real UH1256 is longer than that of the catalogue, and its
+leads are thicker. `build` prints a warning for each such product, and `scanwright catalogue NAME` has the reasons.
+Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real
+devices have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and
+scans do not depend on the holes.
 """
 
 
@@ -231,7 +232,7 @@ def made(entry: Entry) -> None:
 
 
 def picture(entry: Entry, folder: Path) -> Image.Image:
-    """The scanner, and beside it what it measures."""
+    """Return the scanner, with its cloud to the right."""
     both = Image.new("RGB", (SCANNER_PX[0] + CLOUD_PX[0], CLOUD_PX[1]), "white")
     both.paste(scanner(folder / "assembly.glb"), (0, 0))
     both.paste(cloud(entry, sw.load_angles(folder / "angles.json")), (SCANNER_PX[0], 0))
@@ -278,7 +279,7 @@ def section(entry: Entry, folder: Path) -> str:
     shadow = load_self_occlusion(folder / "own_body.npz")[0]
     planes = on_planes(loaded, problem, mounting_rad(angles), shadow)
     first_three = cards(angles, answer(loaded, angles, shadow), planes, None)[:3]
-    result = " ".join(f"{card.headline}. {card.text}" for card in first_three)
+    result = [f"{card.headline}. {card.text}" for card in first_three]
     found = angles.angles_deg
     four = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)
     words = (
@@ -286,7 +287,8 @@ def section(entry: Entry, folder: Path) -> str:
         if entry.words
         else f"build {entry.name}"
     )
-    told = f"Axis {four[0]:g}, {four[1]:g} deg; scan plane {four[2]:g}, {four[3]:g} deg. {result}"
+    mount = f"Axis {four[0]:g}, {four[1]:g} deg; scan plane {four[2]:g}, {four[3]:g} deg."
+    points = "\n".join(fill(f"- {sentence}", 119, subsequent_indent="  ") for sentence in (mount, *result))
     return f"""## {entry.title}
 
 ```console
@@ -295,7 +297,7 @@ $ scanwright {words}
 
 ![The scanner of {entry.name}, and one full scan of its world](pictures/gallery/{entry.name}.png)
 
-{fill(told, 119)}
+{points}
 
 {fill(entry.learnt, 119)}
 """

@@ -1,6 +1,6 @@
 """The catalogue against a table of facts: what agrees, what differs, and what the file itself states."""
 
-from benchmarks.design.catalogue_facts import compared, number_of
+from benchmarks.catalogue.facts import compared, number_of
 
 
 def row(field, value, file="utm-30lx.toml"):

@@ -21,10 +21,10 @@ NEEDS = {  # a file that is not there would be named first, if anything were loo
     ),
     ("studio", "no_such_task"): ("viser", "studio needs a page server: pip install 'scanwright[pages]'"),
     ("scan", "no_such", "--live"): ("websockets", "scan --live needs a page server: pip install 'scanwright[pages]'"),
-    ("convert", "no_such.ply", "b.las"): ("laspy", "b.las: .las needs laspy: pip install 'scanwright[clouds]'"),
-    ("convert", "a.laz", "b.ply"): ("lazrs", "a.laz: .laz needs laspy and lazrs: pip install 'scanwright[clouds]'"),
-    ("convert", "no_such.ply", "b.pcd"): ("pypcd4", "b.pcd: .pcd needs pypcd4: pip install 'scanwright[clouds]'"),
-    ("register", "no_such.ply", "-o", "b.e57"): ("pye57", "b.e57: .e57 needs pye57: pip install 'scanwright[clouds]'"),
+    ("convert", "no_such.ply", "b.las"): ("laspy", "b.las: las needs laspy: pip install 'scanwright[clouds]'"),
+    ("convert", "a.laz", "b.ply"): ("lazrs", "a.laz: laz needs laspy and lazrs: pip install 'scanwright[clouds]'"),
+    ("convert", "no_such.ply", "b.pcd"): ("pypcd4", "b.pcd: pcd needs pypcd4: pip install 'scanwright[clouds]'"),
+    ("register", "no_such.ply", "-o", "b.e57"): ("pye57", "b.e57: e57 needs pye57: pip install 'scanwright[clouds]'"),
 }
 
 
@@ -43,7 +43,7 @@ def test_on_a_computer_without_a_wheel_the_line_does_not_send_in_circles(monkeyp
     monkeypatch.setattr("platform.machine", lambda: "aarch64")
     code, _, (line,) = command("convert", "a.e57", "b.ply")
     assert code == 2
-    assert "no wheel for Linux on aarch64: take another format" in line
+    assert "no wheel for Linux on aarch64: choose another format" in line
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems bring the library")

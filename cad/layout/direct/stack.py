@@ -156,6 +156,8 @@ class DirectStack(Hub):
             waist_diameter: of its waist, in the metal at hand.
         """
         z, shaft = np.asarray(above_horn), self.shaft_diameter / 2
+        if self.foot_radius > 0:  # a cone of 45 deg above the foot
+            return np.minimum(shaft, self.collar_radius + np.maximum(z - self.foot_height, 0.0))
         if self.cup_bore > 0:
             return np.where(z < self.flange_thickness, self.collar_radius, shaft)
         radius = np.full(z.shape, shaft)
@@ -167,7 +169,7 @@ class DirectStack(Hub):
 
     def bore_at(self, above_horn: Array) -> Array:
         """Radius inside the shaft at heights above the horn: 0 where it is solid."""
-        return np.where(np.asarray(above_horn) < self.flange_thickness, 0.0, self.cup_bore / 2)
+        return np.where(np.asarray(above_horn) < self.horn_grip, 0.0, self.cup_bore / 2)
 
     def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
         """Middles and thicknesses of slices of the shaft above the horn; none of them spans an edge of it.
@@ -178,7 +180,9 @@ class DirectStack(Hub):
         """
         waist = self.collar_height + self.waist_length
         slope = (self.shaft_diameter - waist_diameter) / 2
-        edges = np.clip([0.0, self.flange_thickness, self.collar_height, waist, waist + slope, length], 0.0, length)
+        cone = self.foot_height, self.horn_grip, self.foot_height + self.shaft_diameter / 2 - self.collar_radius
+        bounds = [0.0, self.flange_thickness, self.collar_height, waist, waist + slope, length]
+        edges = np.sort(np.clip([*bounds, *(cone if self.foot_radius > 0 else ())], 0.0, length))
         pieces, within = np.diff(edges)[:, None], (np.arange(SLICES) + 0.5) / SLICES
         return (edges[:-1, None] + pieces * within).ravel(), np.repeat(pieces / SLICES, SLICES)
 

@@ -206,7 +206,7 @@ def test_schema_and_catalogue(command):
     _, out, _ = command("catalogue", "--kind", "lidar", "--min-range-m", "8", "--max-mass-g", "200", "--json")
     listed = {product["name"]: product for product in json.loads(out)["products"]}
     assert {"UST-20LX", "RPLIDAR S2"} <= set(listed) and "UTM-30LX" not in listed
-    assert listed["UST-10LX"]["provenance"]["mass_g"]["verified"] is True
+    assert listed["UST-20LX"]["provenance"]["range_max_mm"]["verified"] is True
 
 
 def test_import_and_assemble_a_real_recording(command, data, tmp_path):

@@ -1,6 +1,6 @@
 """Compare the catalogue with a table of facts about the real devices, row by row.
 
-    uv run python -m benchmarks.design.catalogue_facts PATH_OF_FACTS_CSV
+    uv run python -m benchmarks.catalogue.facts PATH_OF_FACTS_CSV
 
 The table has the columns file, field, found_value, source and certainty. Rows whose value is a number, or a list of
 numbers, are compared with the record of that file; the others need a person. Prints every difference with source and

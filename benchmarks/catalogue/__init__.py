@@ -1,0 +1,1 @@
+"""The catalogue against facts about the real devices."""

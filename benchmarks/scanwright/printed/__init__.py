@@ -1,0 +1,1 @@
+"""Printed output in the pages comes from runs."""

@@ -1,0 +1,65 @@
+"""Printed output in the pages is marked well, and a run is compared with it as the pages mean it."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.scanwright.printed.blocks import blocks_of, with_output
+
+ROOT = Path(__file__).parents[2]
+PAGE = """Text.
+
+<!-- printed: mask in [0-9.]+ s$ -->
+```console
+$ scanwright optimise task
+J = -6.1
+[...]
+computed in 1.0 s
+```
+
+<!-- printed -->
+```console
+$ scanwright catalogue
+A 1
+B 2
+```
+"""
+
+
+def test_every_marked_block_of_the_pages_is_well_formed():
+    pages = [ROOT / "README.md", *(page for page in (ROOT / "docs").rglob("*.md") if "_build" not in page.parts)]
+    commands = [block.command for page in pages for block in blocks_of(page.read_text(encoding="utf-8"))]
+    assert {command.split()[1] for command in commands} >= {"optimise", "evaluate"}
+
+
+def test_gaps_and_masked_text_agree_with_any_run():
+    first, second = blocks_of(PAGE)
+    assert first.agrees(["J = -6.1", "computed in 7.5 s"])
+    assert first.agrees(["J = -6.1", "more", "and more", "computed in 7.5 s"])
+    assert not first.agrees(["J = -6.2", "computed in 1.0 s"])
+    assert not first.agrees(["J = -6.1", "computed in 1.0 s", "more"])
+    assert second.agrees(["A 1", "B 2"]) and not second.agrees(["A 1", "more", "B 2"])
+
+
+def test_new_output_keeps_the_gaps_and_the_masked_text():
+    first, second = blocks_of(PAGE)
+    assert first.renewed(["J = -6.2", "more", "computed in 7.5 s"]) == ["J = -6.2", "[...]", "computed in 1.0 s"]
+    page = with_output(PAGE, second, second.renewed(["A 1", "C 3", "B 4"]))
+    assert page == PAGE.replace("B 2\n", "C 3\nB 4\n")
+    with pytest.raises(ValueError, match="no line like"):
+        first.renewed(["computed in 7.5 s"])
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "fault"),
+    [
+        ("console\n$ scanwright c", "text\n$ scanwright c", "line 11: no console block"),
+        ("$ scanwright c", "$ ls", "line 11: a block is one line"),
+        ("A 1\nB 2\n", "", "line 11: a block is one line"),
+        (": mask", ": hide", "line 3: unknown option"),
+        ("in [0-9.]+", "in [0-9.+", "line 3: mask"),
+    ],
+)
+def test_a_wrong_mark_is_named(right, wrong, fault):
+    with pytest.raises(ValueError, match=fault):
+        blocks_of(PAGE.replace(right, wrong))
