@@ -42,9 +42,9 @@ from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.density_sphere import density_sphere
+from scanwright.report.first_screen import cards
 from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
 from scanwright.report.room_picture import room_picture
-from scanwright.report.sentences import sentences
 from scanwright.studio.panel.facts import Judge
 from scanwright.studio.panel.panel_html import facts_html, kept_html, scale_html
 from scanwright.studio.state import Setting
@@ -146,7 +146,7 @@ def _report(drawn: RandomTask, folder: Path, picture: bool) -> None:
         room_picture(loaded.task, folder, problem, setting, sphere, [], shadow)
         landscape(planes[:, :3], PLANE, angles, "J")
         landscape(axes, AXIS, angles, "J")
-    sentences(angles, found, 2 * np.tan(problem.ball_rad), on_planes(loaded, problem, setting, shadow))
+    cards(angles, found, on_planes(loaded, problem, setting, shadow), None)
     other_mounts(problem, loaded.task, setting, planes)
     found.as_built.lines()
     if shadow is not None:

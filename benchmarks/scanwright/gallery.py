@@ -35,7 +35,7 @@ from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.firmware_io.emulators.simulated import simulated_recording
 from scanwright.report.answer import answer, mounting_rad, problem_as_built
-from scanwright.report.sentences import sentences
+from scanwright.report.first_screen import cards
 
 DOCS = Path(__file__).parents[2] / "docs"
 OUT = Path("out")
@@ -278,7 +278,8 @@ def section(entry: Entry, folder: Path) -> str:
     problem = problem_as_built(loaded, angles)
     shadow = load_self_occlusion(folder / "own_body.npz")[0]
     planes = on_planes(loaded, problem, mounting_rad(angles), shadow)
-    said = sentences(angles, answer(loaded, angles, shadow), 2 * float(np.tan(problem.ball_rad)), planes)
+    first_three = cards(angles, answer(loaded, angles, shadow), planes, None)[:3]
+    result = [f"{card.headline}. {card.text}" for card in first_three]
     found = angles.angles_deg
     four = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)
     words = (
@@ -287,7 +288,7 @@ def section(entry: Entry, folder: Path) -> str:
         else f"build {entry.name}"
     )
     mount = f"Axis {four[0]:g}, {four[1]:g} deg; scan plane {four[2]:g}, {four[3]:g} deg."
-    points = "\n".join(fill(f"- {sentence}", 119, subsequent_indent="  ") for sentence in (mount, *said))
+    points = "\n".join(fill(f"- {sentence}", 119, subsequent_indent="  ") for sentence in (mount, *result))
     return f"""## {entry.title}
 
 ```console

@@ -42,37 +42,15 @@ def main() -> None:
         )
         for page in (wide, phone):
             page.goto(address)
-        wide.locator("#checks summary").last.click()
-        wide.locator("#checks button.where").last.click()
-        wide.click("#everything")
-        pictures = [
-            stacked(shot(wide, "#scanner"), shot(wide, "#checks").crop((0, 0, 960, 500))),
-            stacked(shot(wide, "#sphere-view"), shot(wide, "#settings .pair")),
-            on_screen(phone),
-        ]
+        pictures = [on_screen(wide), on_screen(phone)]
         beside(pictures).quantize(COLOURS).save(HERE / "report.png", optimize=True)
         chromium.close()
 
 
-def shot(page: Page, selector: str) -> Image.Image:
-    """One element of a page, once its pictures are drawn."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    return Image.open(io.BytesIO(page.locator(selector).screenshot())).convert("RGB")
-
-
 def on_screen(page: Page) -> Image.Image:
-    """What a window shows."""
+    """What a window shows, once its pictures are drawn."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-
-
-def stacked(*pictures: Image.Image) -> Image.Image:
-    """One below the other."""
-    out = Image.new("RGB", (max(p.width for p in pictures), sum(p.height + GAP for p in pictures)), "white")
-    y = 0
-    for picture in pictures:
-        out.paste(picture, (0, y))
-        y += picture.height + GAP
-    return out
 
 
 def beside(pictures: list[Image.Image]) -> Image.Image:

@@ -19,10 +19,11 @@ from scanwright.firmware_io.clouds.formats import write_clouds
 from scanwright.firmware_io.scan.live_feed import CloudGrowth
 from scanwright.firmware_io.scan.scan_end import LOST, ScanEnd
 from scanwright.live.ruler import Ruler
-from scanwright.serving.style import Colours, banner_html, note_html, ramp
+from scanwright.serving.style import COLOUR_STOPS, Colours, banner_html, note_html, ramp
 
 ColourBy = Literal["height", "range", "intensity", "time"]
 COLOUR_BY: tuple[ColourBy, ...] = get_args(ColourBy)
+UNITS: dict[ColourBy, str] = {"height": " m", "range": " m", "intensity": "", "time": " s"}
 CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
 MOST_POINTS = 5_000_000  # the page drops the oldest beyond, and says so
 POINT_M = 0.012  # 12 mm; the slider offers 2 to 50
@@ -40,8 +41,11 @@ class _Chunk:
 class CloudView:
     """The page of one scan."""
 
-    def __init__(self, server: viser.ViserServer, name: str, centre_m: Vector) -> None:
-        """`name` is that of saved files, `centre_m` the optical centre, the origin of ranges."""
+    def __init__(
+        self, server: viser.ViserServer, name: str, centre_m: Vector, full_scan_s: float | None = None
+    ) -> None:
+        """`name` is that of saved files, `centre_m` the optical centre; `full_scan_s` is None if it is unknown."""
+        self._full_scan_s, self._latest_s = full_scan_s, 0.0
         self._server, self._name, self._centre_m = server, name, centre_m
         self.chunks: deque[_Chunk] = deque()
         self._number = 0
@@ -56,6 +60,7 @@ class CloudView:
         self.facts = server.gui.add_html("")
         self._line = server.gui.add_html(note_html("waiting for the first scan"))
         self.by = server.gui.add_dropdown("colour by", COLOUR_BY, initial_value="height")
+        self.legend = server.gui.add_html("")
         self._size = server.gui.add_slider("point size [mm]", 2.0, 50.0, 1.0, 1000 * POINT_M)
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
@@ -75,13 +80,14 @@ class CloudView:
             self._spread(values)
             self._append(growth.points_m, values)
             self.points += len(growth.points_m)
+            self._latest_s = max(self._latest_s, float(growth.time_s.max()))
             while sum(len(chunk.points_m) for chunk in self.chunks) > MOST_POINTS:
                 oldest = self.chunks.popleft()
                 self.forgotten += len(oldest.points_m)
                 oldest.handle.remove()
         left = f"; the view dropped the oldest {self.forgotten:,}" if self.forgotten else ""
         left += f"; it dropped {growth.lost:,} scans, the recording none" if growth.lost else ""
-        self.facts.content = note_html(f"{self.points:,} points{left}")
+        self.facts.content = note_html(f"{self.points:,} points{self._progress()}{left}")
         for line in growth.lines:
             self.tell(line)
         if growth.end is not None and growth.end != self.end:
@@ -115,6 +121,14 @@ class CloudView:
             write_clouds(path, [self.cloud()])
             event.client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
 
+    def _progress(self) -> str:
+        """Return how much of the present full scan is done."""
+        if not self._full_scan_s or not self.points:
+            return ""
+        scans, in_scan_s = divmod(self._latest_s, self._full_scan_s)
+        share = in_scan_s / self._full_scan_s
+        return f"; full scan {scans + 1:.0f}: {share:.0%} ({in_scan_s:.1f} of {self._full_scan_s:g} s)"
+
     def _append(self, points_m: Float32s, values: dict[ColourBy, Float32s]) -> None:
         if self.chunks and len(self.chunks[-1].points_m) < CHUNK_POINTS:
             chunk = self.chunks[-1]
@@ -138,7 +152,7 @@ class CloudView:
 
     def _spread(self, values: dict[ColourBy, Float32s]) -> None:
         """Widen the colour scales; recolour all points if the present one grew by much."""
-        grown = False
+        grown = not self.legend.content
         for by, new in values.items():
             low, high = (float(x) for x in np.percentile(new, [1, 99]))
             before = self._spans.get(by, (low, high))
@@ -154,12 +168,26 @@ class CloudView:
         return ramp((chunk.values[by][_out_of_order(chunk)] - low) / max(high - low, 1e-6))
 
     def _recolour(self) -> None:
+        by = self.by.value if self.by.value in COLOUR_BY else "height"
+        if by in self._spans:
+            self.legend.content = scale_html(*self._spans[by], UNITS[by])
         for chunk in list(self.chunks):
             chunk.handle.colors = self._colours(chunk)
 
     def _resize(self) -> None:
         for chunk in list(self.chunks):
             chunk.handle.point_size = float(np.clip(self._size.value, 1.0, 200.0)) / 1000
+
+
+def scale_html(low: float, high: float, unit: str) -> str:
+    """Return the colour scale from a lowest to a highest value."""
+    stops = ", ".join(f"rgb{stop}" for stop in COLOUR_STOPS)
+    bar = f'<div style="height:10px;margin:2px 0;background:linear-gradient(to right, {stops})"></div>'
+    ends = "".join(f"<span>{end:.1f}{unit}</span>" for end in (low, high))
+    return (
+        f'<div style="font-size:12px;margin:2px 12px">{bar}'
+        f'<div style="display:flex;justify-content:space-between">{ends}</div></div>'
+    )
 
 
 def _out_of_order(chunk: _Chunk) -> Int64[ndarray, " n"]:

@@ -86,7 +86,9 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
     in_use = angles_in_use(folder)
     placing = Placing(in_use.angles, own_body_of(in_use.path))
     with guarded_server(f"Scanwright: scan of {folder.name}") as (server, gate):
-        view = CloudView(server, folder.name, in_use.angles.T_world_rot(0.0)[:3, 3])
+        motion = in_use.angles.motion
+        full_scan_s = None if motion is None else motion.duration_s
+        view = CloudView(server, folder.name, in_use.angles.T_world_rot(0.0)[:3, 3], full_scan_s)
         telling.send(gate.address)
 
         def tell_of_visitor() -> None:

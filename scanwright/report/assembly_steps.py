@@ -25,7 +25,7 @@ def steps_html(text: str, address: Callable[[str], str | None] = lambda _: None)
         source = None if picture is None else address(picture[2])
         if picture is not None and source is not None:
             alt = html.escape(picture[1])
-            blocks.append(f'<div class="wide"><img src="{html.escape(source)}" alt="{alt}"></div>')
+            blocks.append(f'<div class="picture"><img src="{html.escape(source)}" alt="{alt}"></div>')
         elif heading is None:
             lines = block.splitlines()
             listed = all(line.startswith("- ") for line in lines)

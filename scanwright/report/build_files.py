@@ -1,21 +1,27 @@
-"""Readers of a build folder's files: None if a file is missing, an error if no build wrote it."""
+"""Readers of a build folder's files: None if a file is missing, an error if no build wrote it.
+
+Pictures become data addresses, so that the page needs no other file.
+"""
 
 from __future__ import annotations
 
 import csv
+import io
 import json
+from base64 import b64encode
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
+from PIL import Image
 
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
-from scanwright.report.data_uri import data_uri
 
 T = TypeVar("T")
+KINDS = {".png": "image/png", ".svg": "image/svg+xml"}
 
 
 def read(path: Path, reader: Callable[[Path], T]) -> T | None:
@@ -58,3 +64,15 @@ def read_columns(path: Path, columns: tuple[str, ...]) -> Array:
 def read_picture(path: Path) -> str:
     """Return a picture as a data address."""
     return data_uri(path.read_bytes(), path.suffix)
+
+
+def data_uri(data: bytes, suffix: str = ".png") -> str:
+    """Return the file of a picture as an address; `suffix` is its kind."""
+    return f"data:{KINDS[suffix]};base64,{b64encode(data).decode('ascii')}"
+
+
+def png_uri(image: Image.Image) -> str:
+    """Return a picture as the address of a PNG."""
+    stream = io.BytesIO()
+    image.save(stream, format="PNG")
+    return data_uri(stream.getvalue())

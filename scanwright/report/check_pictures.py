@@ -15,9 +15,10 @@ from PIL import Image
 from scanwright.design.arrays import Array
 from scanwright.design.scene.parallel_view import in_front, view_of
 from scanwright.design.scene.ray_caster import build_scene
-from scanwright.report.data_uri import png_uri
+from scanwright.report.build_files import png_uri
 
 SIZE_PX = 200, 150  # pixels, wide and high
+STILL_PX = 720, 480
 FINER = 2  # rays per pixel and side
 YAW_RAD, PITCH_RAD = np.radians(40.0), np.radians(22.0)  # as in scanner.js
 MARGIN = 1.04
@@ -70,12 +71,23 @@ def bodies_named(
     return tuple(sorted(names))
 
 
+def still(bodies: Mapping[str, PlacedBody]) -> str:
+    """Return a picture of the scanner in its colours, PNG as a data address: for a page that cannot draw in 3D."""
+    width, height = STILL_PX
+    view = view_of(_corners(bodies), STILL_PX, YAW_RAD, PITCH_RAD, MARGIN)
+    each = [view.shown(build_scene(body.triangles_m)) for body in bodies.values()]
+    first_m, colour = in_front(each).away_m, np.full((width * height, 3), 255.0)
+    for shown, body in zip(each, bodies.values(), strict=True):
+        front = np.isfinite(first_m) & (shown.away_m <= first_m + 1e-6)
+        colour[front] = 255 * shown.brightness[front, None] * np.array(body.colour)
+    return png_uri(Image.fromarray(colour.reshape(height, width, 3).round().astype(np.uint8)).quantize(COLOURS))
+
+
 class CheckPictures:
     """Pictures of one scanner, each drawn once."""
 
     def __init__(self, bodies: Mapping[str, PlacedBody]) -> None:
-        corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
-        view = view_of(corners, (SIZE_PX[0] * FINER, SIZE_PX[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
+        view = view_of(_corners(bodies), (SIZE_PX[0] * FINER, SIZE_PX[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
         self._each = {name: view.shown(build_scene(body.triangles_m)) for name, body in bodies.items()}
         self._all = in_front(list(self._each.values()))
         self._drawn: dict[tuple[str, ...], str] = {}
@@ -96,3 +108,7 @@ class CheckPictures:
         width, height = SIZE_PX
         fine = colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
         return png_uri(Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS))
+
+
+def _corners(bodies: Mapping[str, PlacedBody]) -> Array:
+    return np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])

@@ -6,14 +6,14 @@ a build have the same colours.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import LogNorm, Normalize
-from numpy.typing import NDArray
+from matplotlib.colors import Normalize, to_hex
+from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
@@ -25,10 +25,11 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.report.answer import mounting_rad
-from scanwright.report.data_uri import png_uri
+from scanwright.report.build_files import png_uri
 
 STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
-DARKEST = 300  # ratio of most to fewest beams of the scale: as in density.png
+FEWEST, MOST_BANDS = 5, 8  # beams at the lowest edge of a band, and bands
+DENSEST = 0.98  # of the sphere is not denser than the highest edge or twice of it: the rest lies about the axis
 WORST = 0.9  # quantile of the axes: the worst ones would use most of the shades
 # the palette: shades of the map, then what is no shade
 SHADES = 250
@@ -44,13 +45,39 @@ Indices = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
+class Bands:
+    """Bands of beam density whose edges double, so that a step of colour is the same ratio everywhere.
+
+    Attributes:
+        edges: beams, rising; what is below the first one is a band too.
+    """
+
+    edges: tuple[int, ...]
+
+    def __call__(self, density: ArrayLike) -> Array:
+        """Return the band of each density as a share of the colour scale, 0 for the lowest, 1 for the highest."""
+        return np.searchsorted(self.edges, density, side="right") / len(self.edges)
+
+    def key(self) -> list[tuple[str, str]]:
+        """Return the colour of each band and the fewest beams in it, the lowest first."""
+        words = [f"<{self.edges[0]}", *map(str, self.edges)]
+        return [(to_hex(colormaps["cividis"](i / len(self.edges))), word) for i, word in enumerate(words)]
+
+
+def bands_to(highest: float) -> Bands:
+    """Return the bands up to a density: the edges are `FEWEST` times powers of 2."""
+    top = max(0, int(np.log2(max(highest, FEWEST) / FEWEST)))
+    return Bands(tuple(FEWEST * 2**power for power in range(max(0, top - MOST_BANDS + 2), top + 1)))
+
+
+@dataclass(frozen=True, slots=True)
 class SphereMap:
     """One picture of the sphere.
 
     Attributes:
         title: what it shows.
-        low: of its scale, the dark end, in words.
-        high: the bright end.
+        low: of its scale, the dark end, in words; empty if it has the bands of the sphere.
+        high: the bright end, likewise.
         picture: PNG as a data address.
     """
 
@@ -66,12 +93,14 @@ class DensitySphere:
 
     Attributes:
         maps: at least one.
+        bands: colour scale of the density maps.
         axis_world: direction of the rotation axis.
         middle: mean direction of the weight, of length 1; (0, 0, 0) if it is all around.
         below: share of the weight below the horizon.
     """
 
     maps: tuple[SphereMap, ...]
+    bands: Bands
     axis_world: tuple[float, ...]
     middle: tuple[float, ...]
     below: float
@@ -111,16 +140,18 @@ def density_sphere(
     densities = {own: mean_density_at(problem, setting, directions, shadow)}
     for mount in mounts:
         densities[f"{mount.name}, without parts"] = mean_density_at(problem, mount.angles_rad, directions)
-    maps = _drawn(densities, weight, masked)
+    area, order = np.sqrt(1 - directions[:, 2] ** 2), densities[own].argsort()
+    bands = bands_to(densities[own][order][np.searchsorted(area[order].cumsum(), DENSEST * area.sum())])
+    maps = _drawn(densities, bands, weight, masked)
     if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
         maps.append(_over_axes(axes, step_deg, directions, shape))
     axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
-    counts = weight.ravel() * np.sqrt(1 - directions[:, 2] ** 2)
+    counts = weight.ravel() * area
     middle = counts @ directions / max(float(counts.sum()), 1e-12)
     length = float(np.linalg.norm(middle))
     middle *= (length > NOWHERE) / max(length, NOWHERE)
     below = float(counts[directions[:, 2] < 0].sum() / max(float(counts.sum()), 1e-12))
-    return DensitySphere(tuple(maps), axis, tuple(middle.round(6).tolist()), below)
+    return DensitySphere(tuple(maps), bands, axis, tuple(middle.round(6).tolist()), below)
 
 
 def _look(x: float, y: float, z: float) -> tuple[float, float]:
@@ -139,13 +170,10 @@ def _directions() -> tuple[Array, tuple[int, int]]:
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3), t.shape
 
 
-def _drawn(densities: dict[str, Array], weight: Array, masked: NDArray[np.bool_]) -> list[SphereMap]:
+def _drawn(densities: dict[str, Array], bands: Bands, weight: Array, masked: NDArray[np.bool_]) -> list[SphereMap]:
     maps = {name: density.reshape(weight.shape) for name, density in densities.items()}
-    highest = max(float(density.max()) for density in maps.values())
-    scale = LogNorm(max(1.0, highest / DARKEST), max(highest, 2.0), clip=True)
-    words = f"{scale.vmin:,.0f} beams or fewer", f"{scale.vmax:,.0f}"
     return [
-        SphereMap(f"density of {name}", *words, _png(_framed(_shades(density, scale, density < 1e-9), weight, masked)))
+        SphereMap(f"density of {name}", "", "", _png(_framed(_shades(density, bands, density < 1e-9), weight, masked)))
         for name, density in maps.items()
     ]
 
@@ -166,9 +194,9 @@ def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int
     )
 
 
-def _shades(values: Array, scale: Normalize, nothing: NDArray[np.bool_]) -> Indices:
+def _shades(values: Array, scale: Callable[[Array], ArrayLike], nothing: NDArray[np.bool_]) -> Indices:
     """Return palette entries of values, the brightest shade for the highest."""
-    shade = np.minimum(SHADES - 1, np.asarray(scale(values)) * SHADES)
+    shade = (SHADES - 1) * np.asarray(scale(values))
     return np.where(nothing, NOTHING, shade).astype(np.uint8)
 
 

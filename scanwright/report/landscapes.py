@@ -17,7 +17,7 @@ from scanwright.design.objective.score import score
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.optimum import price
 from scanwright.design.task.task import Task
-from scanwright.report.data_uri import data_uri
+from scanwright.report.build_files import data_uri
 
 PLANE = ("alpha_laser", "beta_laser")
 AXIS = ("alpha_rot", "beta_rot")

@@ -5,6 +5,9 @@ If a file is missing, the page names it and omits what needs it; only `angles.js
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +15,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
 from scanwright.cad.checks.checks_json import read_checks
-from scanwright.design.angles import AngleSet, load_angles
+from scanwright.design.angles import load_angles
 from scanwright.design.arrays import Array
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
@@ -23,13 +26,14 @@ from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
-from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_table, read_text
-from scanwright.report.check_pictures import CheckPictures, bodies_named
+from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_text
+from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
 from scanwright.report.density_sphere import density_sphere
+from scanwright.report.first_screen import cards, count, motion_in_words, title, to_do
 from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
+from scanwright.report.parts_list import read_parts
 from scanwright.report.room_picture import room_picture
 from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_glb, placed_bodies, scanner_scene
-from scanwright.report.sentences import sentences
 
 REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
@@ -58,47 +62,57 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
     """
     angles = load_angles(folder / "angles.json")
     on_task, on_bodies = begin(_on_task, folder), begin(_on_bodies, folder)
-    bom = read(folder / "bom.csv", read_table)
+    parts = read(folder / "bom.csv", read_parts)
     planes = read(folder / "search.csv", _planes)
     axes = read(folder / "axes.csv", _axes)
-    checks = _checks(folder)
+    findings = read(folder / "checks.json", read_checks)
+    files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     facts = {
         "angles": angles,
-        "motion": _motion(angles),
+        "motion": motion_in_words(angles.motion),
         "off_deg": OFF_DEG,
         "directions": DIRECTIONS,
-        "total": None if bom is None else next((row for row in bom if row.get("kind") == "total"), None),
-        "density": read(folder / "density.svg", read_picture),
+        "parts": parts,
         "planes": planes,
         "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
         "axes": axes,
         "axes_picture": None if axes is None else landscape(axes, AXIS, angles, "lowest J, any scan plane"),
         "any_J": planes is not None and bool(np.isfinite(planes[:, 2]).any()),
-        "checks": checks,
+        "checks": None if findings is None else by_severity(findings),
+        "todo": to_do(files, findings or (), parts),
         "share": percent,
-        "bom": bom,
-        "steps": read(
-            folder / "assembly.md",
-            lambda path: steps_html(read_text(path), lambda name: read(folder / name, read_picture)),
-        ),
+        "count": count,
+        "steps": read(folder / "assembly.md", partial(_steps, folder)),
         "wiring": read(folder / "wiring.svg", read_picture),
         "wiring_words": read(folder / "wiring.md", _wiring_words),
         "drawings": {path.stem: read_picture(path) for path in sorted((folder / "drawings").glob("*.svg"))},
-        "sheets": [f"drawings/{path.name}" for path in sorted((folder / "drawings").glob("*.pdf"))],
+        "sheets": [name for name in files if name.startswith("drawings/") and name.endswith(".pdf")],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
         "manifest": read(folder / "manifest.json", _manifest),
         "task_text": read(folder / "task.toml", read_text),
         **on_task(),
         **on_bodies(),
     }
-    seen = None if facts["answer"] is None else facts["answer"].as_built.own
-    facts["J"], facts["J_error"] = (angles.J, angles.J_error) if seen is None else (seen.J, seen.J_error)
     try:
         return _environment().get_template("page.html.j2").render(facts)
     except UndefinedError as error:
         raise BuildError(
             f"{folder}: a file in it is not as a build writes it ({error}): build the folder again"
         ) from error
+
+
+def by_severity(findings: Iterable[Finding]) -> dict[Severity, list[list[Finding]]]:
+    """Return findings by severity; those of one kind about one subject together."""
+    grouped: dict[Severity, dict[tuple[str, str], list[Finding]]] = {severity: {} for severity in SEVERITIES}
+    for finding in findings:
+        grouped[finding.severity].setdefault((finding.subject, finding.code), []).append(finding)
+    return {severity: list(groups.values()) for severity, groups in grouped.items()}
+
+
+def _steps(folder: Path, path: Path) -> list[str]:
+    """Return HTML of what comes before the first step, and of each step."""
+    texts = re.split(r"\n(?=## )", read_text(path))
+    return [steps_html(text, lambda name: read(folder / name, read_picture)) for text in texts]
 
 
 def _wiring_words(path: Path) -> tuple[str, str]:
@@ -111,7 +125,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
     """Return what needs the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
-        return dict.fromkeys(("objective", "ball_deg", "answer", "sphere", "room", "sentences", "mounts"))
+        return dict.fromkeys(("title", "objective", "ball_deg", "answer", "sphere", "room", "cards", "mounts"))
     angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
     assembly = read(folder / "assembly.glb", load_glb)
     scanner = [] if assembly is None else about_centre(assembly, angles)
@@ -124,33 +138,29 @@ def _on_task(folder: Path) -> dict[str, Any]:
     sphere = density_sphere(problem, angles, mounts, axes, task.angles.step_deg, shadow)
     figures = on_planes(loaded, problem, setting, shadow)
     return {
+        "title": title(loaded),
         "objective": task.density.objective,
         "ball_deg": task.density.ball_radius_deg,
         "answer": result,
         "sphere": sphere,
         "room": room_picture(task, folder, problem, setting, sphere, scanner, shadow),
-        "sentences": sentences(angles, result, 2 * np.tan(problem.ball_rad), figures),
+        "cards": cards(angles, result, figures, read(folder / "bom.csv", read_parts)),
         "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 
 
 def _on_bodies(folder: Path) -> dict[str, Any]:
     """Return what shows the scanner and its hidden beams."""
-    angles, checks, bom = load_angles(folder / "angles.json"), _checks(folder), read(folder / "bom.csv", read_table)
-    own_body = read(folder / "own_body.npz", load_self_occlusion)
+    angles, findings = load_angles(folder / "angles.json"), read(folder / "checks.json", read_checks)
+    parts, own_body = read(folder / "bom.csv", read_parts), read(folder / "own_body.npz", load_self_occlusion)
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
+    bodies = None if assembly is None else placed_bodies(assembly)
     return {
         "hidden": None if own_body is None else hidden_by(own_body[0]),
         "scene": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
-        "places": {} if checks is None or assembly is None else _places(assembly, checks, bom),
+        "still": None if bodies is None else still(bodies),
+        "places": {} if bodies is None else _places(bodies, findings or (), {} if parts is None else parts.bought),
     }
-
-
-def _checks(folder: Path) -> dict[Severity, list[Finding]] | None:
-    checks = read(folder / "checks.json", read_checks)
-    if checks is None:
-        return None
-    return {severity: [check for check in checks if check.severity == severity] for severity in SEVERITIES}
 
 
 def _planes(path: Path) -> Array:
@@ -178,18 +188,6 @@ def _manifest(path: Path) -> dict[str, Any]:
     return manifest | {"files": {name: facts for name, facts in manifest["files"].items() if name != REPORT}}
 
 
-def _motion(angles: AngleSet) -> str:
-    motion = angles.motion
-    if motion is None:
-        return "The motion is not known."
-    if motion.mode == "spin":
-        return f"{motion.duration_s:g} s: one turn at constant speed."
-    if motion.mode == "sweep":
-        low, high = motion.limits_deg
-        return f"{motion.duration_s:g} s: from {low:g} to {high:g} deg and back."
-    return f"{motion.duration_s:g} s: {motion.stops} stops of {motion.dwell_s:g} s in one turn."
-
-
 def _not_drawn(folder: Path) -> str:
     """Return why the page draws no scanner; empty if it does."""
     path = folder / "assembly.glb"
@@ -201,12 +199,10 @@ def _not_drawn(folder: Path) -> str:
 
 
 def _places(
-    assembly: Any, checks: dict[Severity, list[Finding]], bom: list[dict[str, str]] | None
+    bodies: dict[str, PlacedBody], findings: Iterable[Finding], bought: dict[str, str]
 ) -> dict[str, dict[str, Any]]:
-    """Return the bodies of each subject of a check and a picture of them; a subject without bodies is left out."""
-    bodies = placed_bodies(assembly)
+    """Return bodies and a picture of each subject of an error or a warning; a subject without bodies has none."""
     pictures = CheckPictures(bodies)
-    bought = {row.get("number", ""): row.get("part", "") for row in bom or () if row.get("kind") == "bought"}
-    codes = {check.subject: check.code for each in checks.values() for check in each}
+    codes = {finding.subject: finding.code for finding in findings if finding.severity in ("error", "warning")}
     named = {subject: bodies_named(code, subject, bodies, bought) for subject, code in codes.items()}
     return {subject: {"bodies": names, "picture": pictures.picture(names)} for subject, names in named.items() if names}

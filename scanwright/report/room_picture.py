@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib import colormaps
-from matplotlib.colors import LogNorm
 from numpy import ndarray
 from PIL import Image
 from scipy.ndimage import binary_dilation
@@ -27,15 +26,15 @@ from scanwright.design.scene import ray_caster
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.shapes import MeshRegion
 from scanwright.design.task.task import Task
+from scanwright.report.build_files import png_uri
 from scanwright.report.check_pictures import PlacedBody
 from scanwright.report.cut_room import Pinhole, Room, Walls, pinhole_behind, room_about, walls_behind
-from scanwright.report.data_uri import png_uri
-from scanwright.report.density_sphere import DensitySphere
+from scanwright.report.density_sphere import Bands, DensitySphere
 
 SQUARE_M, LINE_PX = 1.0, 1.0  # of the grid on floor and walls
 ARROW_M, ARROW_WIDE_M = 0.6, 0.05
 POST_M = 0.008  # half of the line from the scanner down to the floor
-SCALE = 1, 99  # percentiles of the density on the walls, between which the colours are
+COLOURS = 64  # of the file
 INK, LIGHT, MASKED, HATCH, ROBOT = (np.array([float(grey)] * 3) for grey in (17, 255, 221, 119, 150))
 HATCH_PX = 16  # period of the hatching
 LITTLE = 0.02  # share of the weight below the horizon, under which the floor is cut away
@@ -58,15 +57,11 @@ class RoomPicture:
         picture: PNG as a data address.
         marks: words on it.
         words: description of the room.
-        low: mean beams within the ball at the dark end of its colours.
-        high: at the bright end.
     """
 
     picture: str
     marks: tuple[Mark, ...]
     words: str
-    low: float
-    high: float
 
 
 def room_picture(
@@ -85,7 +80,7 @@ def room_picture(
         folder: of the files that it names.
         problem: the same as numbers.
         setting: (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
-        sphere: mean direction of the weight.
+        sphere: bands of the colours, and mean direction of the weight.
         scanner: its bodies about the optical centre; none if unknown.
         shadow: beams that they block; None if unknown.
 
@@ -97,29 +92,33 @@ def room_picture(
     camera = pinhole_behind(room, np.array(sphere.middle), from_below)
     rays = camera.rays()
     walls = walls_behind(room, camera, rays)
-    picture, low, high = _painted(problem, setting, shadow, room, camera, walls)
+    picture = _painted(problem, setting, shadow, sphere.bands, camera, walls, room)
     level_m = room.high[2] if from_below else room.low[2]  # of the ceiling, if the floor is cut away
     post = PlacedBody(_post(level_m), False, (0.35, 0.35, 0.35))
     _add_bodies(picture, camera, rays, [*scanner, post, *_robot(task, folder)])
     ahead = np.array([room.high[0] - ARROW_M, 0.0, level_m])
     places = camera.shares(np.array([[0.0, 0, 0], ahead]))
     marks = [Mark(text, *map(float, at.round(4))) for text, at in zip(("scanner", "ahead"), places, strict=True)]
-    return RoomPicture(_png(picture), tuple(marks), f"{words}; its squares are {SQUARE_M:g} m wide", low, high)
+    return RoomPicture(_png(picture), tuple(marks), f"{words}; its squares are {SQUARE_M:g} m wide")
 
 
 def _painted(
-    problem: Problem, setting: Setting, shadow: SelfOcclusion | None, room: Room, camera: Pinhole, walls: Walls
-) -> tuple[Array, float, float]:
-    """Return each pixel's colour, shape (rows, columns, 3), NaN outside, and the density of darkest and brightest."""
+    problem: Problem,
+    setting: Setting,
+    shadow: SelfOcclusion | None,
+    bands: Bands,
+    camera: Pinhole,
+    walls: Walls,
+    room: Room,
+) -> Array:
+    """Return each pixel's colour, shape (rows, columns, 3), NaN outside."""
     inside, size = walls.inside, camera.size
     points = walls.points_m[inside]
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)
     density = mean_density_at(problem, setting, directions, shadow)
     weight = problem.field.weight_at(directions)
     masked = problem.field.masked_at(directions)
-    seen = (density > UNSEEN) & ~masked
-    low, high = (float(end) for end in np.percentile(density[seen], SCALE)) if seen.any() else (1.0, 2.0)
-    colour = 255 * colormaps["cividis"](LogNorm(low, max(high, 1.01 * low), clip=True)(density))[:, :3]
+    colour = 255 * colormaps["cividis"](bands(density))[:, :3]
     colour[density <= UNSEEN] = LIGHT
     row, column = (index.ravel()[inside] for index in np.indices(size))
     hatch = (row + column) % HATCH_PX < HATCH_PX // 4
@@ -135,7 +134,7 @@ def _painted(
     picture[_steps(walls.face.reshape(size).astype(float))] = INK
     _draw(picture, _arrow(walls, room).reshape(size), 0)
     picture[~inside.reshape(size)] = np.nan
-    return picture, low, high
+    return picture
 
 
 def _draw(picture: Array, line: Bool[ndarray, "rows columns"], wider: int) -> None:
@@ -211,4 +210,5 @@ def _png(picture: Array) -> str:
     """Return the picture as a data address; NaN is transparent."""
     opaque = np.where(np.isnan(picture[..., :1]), 0.0, 255.0)
     pixels = np.concatenate([np.nan_to_num(picture, nan=255.0), opaque], axis=2)
-    return png_uri(Image.fromarray(pixels.round().astype(np.uint8)))
+    image = Image.fromarray(pixels.round().astype(np.uint8))
+    return png_uri(image.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))

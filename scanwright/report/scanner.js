@@ -27,10 +27,7 @@
       float facing = lit ? abs(normalize(cross(dFdx(eye), dFdy(eye))).z) : 1.0;
       shown = vec4(mix(own.rgb, vec3(1.0), lit ? 0.12 : 0.0) * (0.35 + 0.65 * facing), own.a);
     }`, ["model", "view", "projection", "colour", "stopped_colour", "lit"]);
-  if (!uniform) {
-    canvas.hidden = true;
-    return;
-  }
+  if (!uniform) return; // the still picture remains
   const scene = JSON.parse(element("scene").textContent);
   const PALE = [0.6, 0.6, 0.6, 0.13];
 
@@ -127,8 +124,8 @@
       gl.bindVertexArray(body.array);
       gl.drawElements(gl.TRIANGLES, body.count, body.type, 0);
     };
-    const whole = (body) => !picked || picked.has(body.name);
-    for (const body of bodies.filter(whole)) drawBody(body, [...body.colour, 1]);
+    const inFront = (body) => !picked || picked.has(body.name);
+    for (const body of bodies.filter(inFront)) drawBody(body, [...body.colour, 1]);
     gl.uniform1i(uniform.lit, 0);
     const ink = webgl.ink(canvas);
     gl.uniformMatrix4fv(uniform.model, false, scene.axis);
@@ -147,7 +144,7 @@
       gl.drawArrays(gl.TRIANGLES, 0, 9);
       webgl.placed(ahead, webgl.product(projection, view), grid.tip);
     }
-    for (const body of bodies.filter((other) => !whole(other))) drawBody(body, PALE);
+    for (const body of bodies.filter((other) => !inFront(other))) drawBody(body, PALE);
     if (fan && fanShown.checked && share === 0 && (!picked || picked.has("lidar_body"))) {
       gl.bindVertexArray(fan.array);
       markStopped(degrees);
@@ -185,7 +182,7 @@
     last = 0;
     delete axis.dataset.exact;
     element("spin").setAttribute("aria-pressed", String(on));
-    element("spin").textContent = on ? "Stop the axis" : "Turn the axis";
+    element("spin").textContent = on ? "Stop" : "Turn";
     redraw();
   };
   const pick = (names) => {
@@ -204,12 +201,13 @@
   for (const control of [apart, fanShown]) control?.addEventListener("input", redraw);
   for (const button of document.querySelectorAll("button[data-bodies]")) {
     button.addEventListener("click", () => {
+      element("view-scanner").checked = true;
       pick(button.dataset.bodies.split(" "));
       canvas.scrollIntoView({ block: "center" });
     });
     button.disabled = false;
   }
-  element("hint").hidden = true;
-  element("controls").hidden = false;
+  element("still").hidden = true;
+  for (const part of ["canvas", "controls"]) element(part).hidden = false;
   redraw();
 })();

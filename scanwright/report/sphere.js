@@ -91,7 +91,8 @@
 
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST); // bands have sharp edges
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
   const choose = async (number) => {
     const image = element(`sphere-${number}`);
@@ -100,6 +101,8 @@
     const { title, low, high } = scene.views[number];
     canvas.setAttribute("aria-label", `A ball of all directions: ${title}. Arrow keys turn it, plus and minus zoom.`);
     element("sphere-title").textContent = title;
+    element("sphere-bands").hidden = low !== "";
+    element("sphere-scale").hidden = low === "";
     element("sphere-low").textContent = low;
     element("sphere-high").textContent = high;
     ready = true;

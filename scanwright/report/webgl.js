@@ -70,22 +70,22 @@ const webgl = (() => {
   const ground = (canvas) => getComputedStyle(canvas).backgroundColor.match(/\d+/g).slice(0, 3).map((part) => part / 255);
   const ink = (canvas) => getComputedStyle(canvas).color.match(/\d+/g).slice(0, 3).map((part) => part / 255);
 
-  // an empty picture as large as the canvas is shown, and its width over its height
+  // an empty picture as large as the canvas is shown (a hidden one keeps its size), and its width over its height
   const cleared = (gl) => {
     const canvas = gl.canvas;
     const scale = Math.min(2, window.devicePixelRatio || 1);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * scale)));
-    if (canvas.width !== width || canvas.height !== height) {
+    if (canvas.clientWidth && (canvas.width !== width || canvas.height !== height)) {
       canvas.width = width;
       canvas.height = height;
     }
-    gl.viewport(0, 0, width, height);
+    gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(...ground(canvas), 1);
     gl.depthMask(true); // before clearing: a depth that is not written is not cleared either
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.disable(gl.BLEND);
-    return width / height;
+    return canvas.width / canvas.height;
   };
 
   // calls `draw(now)` once for any number of requests before the next frame

@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 
 from scanwright.cli import devices
 from scanwright.design.angles import Angles, AngleSet
-from scanwright.design.errors import DeviceError, UnsafeError, UnsafeNote
+from scanwright.design.errors import DeviceError, ScanwrightError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.assembly.deskew import deskew
 from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
@@ -115,6 +115,18 @@ def test_angles_that_come_twice_or_late_do_no_harm():
     assert more.lost == 3
 
 
+def test_the_view_states_its_progress_and_the_unit_of_its_colours():
+    points = np.outer(np.linspace(0, 1, 101), [0, 0, 3]).astype(np.float32)
+    with guarded_server("a page") as (server, _):
+        view = CloudView(server, "scan", np.zeros(3), 18.0)
+        assert view.legend.content == ""
+        view.add(CloudGrowth(points, np.zeros(101, np.float32), np.full(101, 22.5, np.float32), (), 2))
+        assert "101 points; full scan 2: 25% (4.5 of 18 s); it dropped 2 scans" in view.facts.content
+        assert "0.0 m" in view.legend.content and "3.0 m" in view.legend.content
+        view.by.value = "time"
+        assert "22.5 s" in view.legend.content
+
+
 def test_the_view_counts_what_it_shows_and_what_it_forgets(monkeypatch):
     monkeypatch.setattr(cloud_view, "CHUNK_POINTS", 500)
     monkeypatch.setattr(cloud_view, "MOST_POINTS", 2000)
@@ -155,7 +167,7 @@ SHINES = UnsafeNote("its laser may still be on: no answer")
 ENDS = {
     "done": (scan_end.finished(summary(left_out={BETWEEN_STOPS: 8}), ["wrote 90 points"]), "wrote 90 points"),
     "lossy": (scan_end.finished(summary(left_out={"bad packets": 12})), "dropped 12: bad packets"),
-    "reconnected": (scan_end.finished(summary(reconnects=2)), "the lidar was away 2 times"),
+    "reconnected": (scan_end.finished(summary(reconnects=2)), "lidar reconnects: 2"),
     "failed": (
         scan_end.failed(noted(DeviceError("<b>nothing</b> came"), OFF)),
         "<b>nothing</b> came",
@@ -165,7 +177,7 @@ ENDS = {
     "laser may be on": (scan_end.failed(noted(DeviceError("the line was cut"), OFF, SHINES)), SHINES),
     "stopped": (scan_end.stopped(noted(KeyboardInterrupt(), OFF)), OFF),
     "stopped, servo turns": (scan_end.stopped(noted(KeyboardInterrupt(), TURNS)), TURNS),
-    "stopped, unheard": (scan_end.stopped(KeyboardInterrupt()), "what the servo does was not heard"),
+    "stopped, unheard": (scan_end.stopped(KeyboardInterrupt()), "state of the servo unknown"),
 }
 OUTCOMES = {
     "reconnected": "lossy",
@@ -320,7 +332,7 @@ def test_a_scan_program_that_goes_away_leaves_an_unknown_state_on_the_page(monke
 
 
 def test_a_page_that_cannot_be_served_is_one_line(tmp_path):
-    with pytest.raises(DeviceError, match="the page could not be served"), live_page(tmp_path, wanted=True):
+    with pytest.raises(ScanwrightError, match="the page could not be served"), live_page(tmp_path, wanted=True):
         pytest.fail("there are no angles in that folder")
 
 

@@ -118,12 +118,15 @@ def write_folder(folder):
     checks = [Finding("wall", s, places[s], f"{s} of {EVIL}") for s in ("ok", "note", "warning", "error", "ok")]
     (folder / "checks.json").write_text(checks_text(checks))
     rows = ["bought,lidar,UTM-30LX,1,Hokuyo,,5000.0,5000.0,5000.0,5000.0,2016,370.0,,yes,"]
+    rows += [f"printed,base_mount,1,1,,,,,0.0,0.0,,9.1,,,solid after {'drawings/' * 9}base_mount.pdf"]
     rows += ["nut,hexagon nut,ISO 4032 M4,4" + 11 * ","]
     rows += ['total,all rows,,,,,,5438.5,5400,5500,,,,,"sum of 4"']
     header = "kind,part,number,quantity,supplier,supplier_number,unit_usd,total_usd,low_usd,high_usd,priced,mass_g,"
     header += "source,verified,note"
     (folder / "bom.csv").write_text("\n".join([header, *rows, ""]))
-    (folder / "assembly.md").write_text(f"# Title\n\nLook at `exploded.glb`.\n\n## 1. Servo\n\n**4 x M4** {EVIL}\n")
+    (folder / "assembly.md").write_text(
+        f"# Title\n\nLook at `exploded.glb`.\n\n![Plate](density.png)\n\n## 1. Servo\n\n**4 x M4** {EVIL}\n"
+    )
     (folder / "wiring.svg").write_text(
         f"<svg xmlns='http://www.w3.org/2000/svg'><text>{html.escape(EVIL)}</text></svg>"
     )

@@ -13,7 +13,7 @@ from scanwright.design.motion import Sweep
 from scanwright.design.task.task import load_task
 from scanwright.report.answer import hidden_by
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
-from scanwright.report.density_sphere import SHADES
+from scanwright.report.density_sphere import SHADES, bands_to
 from scanwright.report.page import report_html
 from scanwright.report.scanner_scene import load_glb, placed_bodies
 
@@ -68,7 +68,7 @@ def test_a_sweep_stays_within_its_limits(folder):
 def test_a_scanner_too_large_for_a_page_is_left_out(folder, monkeypatch):
     monkeypatch.setattr("scanwright.report.page.LARGEST_BYTES", 100)
     page = Page(report_html(folder))
-    assert "too much for one page" in page.text["scanner"] and "canvas" not in page.ids
+    assert "too much for one page" in page.text["result"] and "canvas" not in page.ids
 
 
 def test_the_pictures_of_the_sphere_show_what_is_where():
@@ -100,7 +100,16 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
     np.testing.assert_allclose(ball.axis_world, [1, 0, 0], atol=1e-6)
 
 
-def test_axes_that_nobody_searched_stay_white():
+def test_bands_double_and_reach_the_densest_direction():
+    assert bands_to(77.0).edges == (5, 10, 20, 40)
+    edges = bands_to(3000.0).edges
+    assert edges == (40, 80, 160, 320, 640, 1280, 2560) and bands_to(0.0).edges == (5,)
+    bands = bands_to(3000.0)
+    np.testing.assert_allclose(bands([0, 39.9, 40, 2559, 2560, 1e5]), np.array([0, 0, 1, 6, 7, 7]) / 7)
+    assert [word for _, word in bands.key()] == ["<40", "40", "80", "160", "320", "640", "1280", "2560"]
+
+
+def test_axes_without_a_search_stay_white():
     loaded = load_task(Path("ground_ahead"))
     few = AXES[np.abs(AXES[:, 0] - 60) <= 15]
     axes = picture(sphere(loaded, few).maps[-1].picture)

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib import colormaps
-from matplotlib.colors import LogNorm
 from PIL import Image
 
 from scanwright.design.angles import Angles, AngleSet
@@ -17,12 +16,13 @@ from scanwright.design.objective.problem import problem_of
 from scanwright.design.task.task import load_task
 from scanwright.report.check_pictures import PlacedBody
 from scanwright.report.cut_room import Room, pinhole_behind, room_about, walls_behind
-from scanwright.report.density_sphere import DensitySphere, density_sphere
+from scanwright.report.density_sphere import Bands, DensitySphere, density_sphere
 from scanwright.report.room_picture import room_picture
 
 SETTING = np.radians([180.0, 55.0, 80.0, -80.0])
 AHEAD_AND_DOWN = np.array([0.8, 0.0, -0.6])
-SPHERE = DensitySphere((), (0.0, 0.0, 1.0), tuple(AHEAD_AND_DOWN), 1.0)
+BANDS = Bands((50, 100, 200, 400))
+SPHERE = DensitySphere((), BANDS, (0.0, 0.0, 1.0), tuple(AHEAD_AND_DOWN), 1.0)
 GROUND = {"shape": "ground", "from_m": 0.5, "to_m": 3.0, "width_m": 2.0, "height_m": 0.4}
 
 
@@ -55,10 +55,10 @@ def colour_at(drawn, point):
 
 @pytest.mark.parametrize("point", [(1.3, 0.45, -0.4), (2.4, -0.6, -0.4), (2.45, 1.3, -0.4), (3.0, 0.5, 0.5)])
 def test_floor_and_walls_have_the_colour_of_their_direction(drawn, point):
-    problem, room, _, _ = drawn
+    problem = drawn[0]
     direction = np.array(point) / np.linalg.norm(point)
     density = mean_density_at(problem, SETTING, direction[None])[0]
-    wanted = 255 * np.array(colormaps["cividis"](LogNorm(room.low, room.high, clip=True)(density)))[:3]
+    wanted = 255 * np.array(colormaps["cividis"](BANDS(density)))[:3]
     np.testing.assert_allclose(colour_at(drawn, point)[:3], wanted, atol=12)
 
 
@@ -127,7 +127,7 @@ def test_a_robot_is_drawn_where_its_mesh_is(tmp_path):
     mask = {"shape": "mesh", "file": str(tmp_path / "robot.stl"), "sensor_m": [0.2, 0.0, 0.4]}
     loaded = task(mask=[mask])
     room = room_picture(loaded.task, tmp_path, problem_of(loaded), SETTING, SPHERE, [])
-    image = Image.open(io.BytesIO(b64decode(room.picture.split(",")[1]))).convert("RGB")
+    image = Image.open(io.BytesIO(b64decode(room.picture.split(",")[1]))).convert("RGBA").convert("RGB")
     camera = pinhole_behind(room_about(loaded.task)[0], AHEAD_AND_DOWN, False)
     left, top = camera.shares(np.array([[-0.35, 0.1, -0.2]]))[0]  # on its back
     grey = np.array(image.getpixel((int(left * image.width), int(top * image.height))), dtype=float)

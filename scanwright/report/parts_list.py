@@ -1,0 +1,94 @@
+"""The parts list of `bom.csv` in groups, in the order in which a person needs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from scanwright.report.build_files import read_table
+
+Row = dict[str, str]
+GROUPS = {
+    "Devices": ("bought",),
+    "Parts to print": ("printed", "material"),
+    "Parts to have machined": ("turned", "sawn"),
+    "Screws, nuts, inserts": ("screw", "nut", "insert"),
+    "Wiring": ("wiring",),
+    "Consumables": ("consumable",),
+    "Tools": ("tool",),
+}
+OTHERS = "Others"
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Rows of one kind, and the range of what they cost."""
+
+    title: str
+    rows: tuple[Row, ...]
+
+    @property
+    def usd(self) -> str:
+        """Return the range of the price."""
+        return usd_range(sum(_number(row, "low_usd") for row in self.rows), sum(map(_high, self.rows)))
+
+
+@dataclass(frozen=True, slots=True)
+class PartsList:
+    """All rows but the total, in groups; `total` is None if the file has none."""
+
+    groups: tuple[Group, ...]
+    total: Row | None
+
+    @property
+    def usd(self) -> str:
+        """Return the range of the total, as the file states it."""
+        return "unknown" if self.total is None else usd_range(_number(self.total, "low_usd"), _high(self.total))
+
+    @property
+    def screws(self) -> int:
+        """Return the number of screws."""
+        return sum(int(row["quantity"] or 0) for row in self._rows("screw"))
+
+    @property
+    def bought(self) -> dict[str, str]:
+        """Return the kind of each device by its number."""
+        return {row["number"]: row["part"] for row in self._rows("bought")}
+
+    def made(self, *kinds: str) -> str:
+        """Return how many parts are made in a way, in words."""
+        count = sum(int(row["quantity"] or 1) for row in self._rows(*kinds))
+        return f"{count} part{'' if count == 1 else 's'}"
+
+    def group(self, kind: str) -> Group | None:
+        """Return the group of a kind of row; None if it has no rows."""
+        return next((group for group in self.groups if kind in GROUPS.get(group.title, ())), None)
+
+    def _rows(self, *kinds: str) -> list[Row]:
+        return [row for group in self.groups for row in group.rows if row["kind"] in kinds]
+
+
+def read_parts(path: Path) -> PartsList:
+    """Return the parts list of a `bom.csv`."""
+    rows = read_table(path)
+    title_of = {kind: title for title, kinds in GROUPS.items() for kind in kinds}
+    grouped: dict[str, list[Row]] = {title: [] for title in (*GROUPS, OTHERS)}
+    for row in rows:
+        if row["kind"] != "total":
+            grouped[title_of.get(row["kind"], OTHERS)].append(row)
+    groups = tuple(Group(title, tuple(members)) for title, members in grouped.items() if members)
+    return PartsList(groups, next((row for row in rows if row["kind"] == "total"), None))
+
+
+def usd_range(low: float, high: float) -> str:
+    """Return a range of prices in words; one number if both ends round to it."""
+    ends = dict.fromkeys(f"{end:,.0f}" for end in (low, high))
+    return f"{' to '.join(ends)} USD"
+
+
+def _number(row: Row, column: str) -> float:
+    return float(row[column] or 0.0)
+
+
+def _high(row: Row) -> float:
+    return _number(row, "high_usd")
