@@ -54,10 +54,15 @@ def lidar_cable(lidar: Lidar, y: float) -> cq.Solid:
 
 
 def servo_case(servo: Servo, z: float) -> cq.Solid:
-    """The case, its horn face at height z, with recesses down to the planes of its front and rear holes."""
+    """The case, its horn face at height z, with recesses down to its front and rear holes, and their threads."""
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
     recesses = [solids.upright(EAR_ROOM, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
     recesses += [solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
+    for pattern, inwards in ((servo.front, -1.0), (servo.rear, 1.0)):
+        if pattern.kind != "through":
+            ends = sorted((z + pattern.z_mm, z + pattern.z_mm + inwards * pattern.depth_mm))
+            radius = SCREWS[pattern.screw].nominal / 2
+            recesses += [solids.upright(radius, *ends, *hole) for hole in pattern.places]
     return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
 
 

@@ -366,14 +366,14 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     warned = f"{found['warning']} warning{'' if found['warning'] == 1 else 's'}"
     assert lines[-1] == f"0 errors, {warned}, {found['note']} notes, {found['ok']} passed"
     assert any("sub_plate" in line for line in lines)
-    assert sum(" mm at 10 m)" in line and "bend" in line and "+-" in line for line in lines) == 2
+    assert sum(" mm at 10 m)" in line and "bend" in line and "±" in line for line in lines) == 2
 
     answer = [at_least("clearance", 0.1, 0.4, "mm", "a and b", "gap")]
     monkeypatch.setattr(run, "check_scanner", lambda _scanner, _say: answer)
     code, out, complaints = command("check", tmp_path, "--json")
     assert code == 1
     assert complaints[:2] == [
-        "error: check failed: a and b: gap: 0.1 mm, under 0.4",
+        "error: check failed: a and b: gap: 0.1 mm (at least 0.4)",
         "error: 1 of 1 checks failed: do not make these parts",
     ]
     failed = [entry for entry in json.loads(out)["checks"] if entry["severity"] == "error"]

@@ -240,7 +240,7 @@ def test_screws_into_holes_that_are_not_verified_say_how_to_measure_them():
     assert len(first) == 1 and f"no source verifies holes of {lidar.name}: press paper" in first[0]
 
 
-def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
+def test_a_profile_with_inserts_gets_their_seats_and_lists_them(parts_of):
     scanner = scanner_at(TILTED, printer="fdm-0.4-insert")
     assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
@@ -250,7 +250,7 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
     assert not held and cage.count == 4
     seats = [hole for hole in rounds["slip_ring_adapter"] if hole.hole and hole.diameter == 4.0]
     assert len(seats) == 4 and min(hole.length for hole in seats) > INSERT_LENGTH
-    by_threads = {(joint.part, joint.onto) for joint in made.result.assembly.layout.joints}
+    by_threads = {(joint.part, joint.onto) for joint in laid_out(scanner_at(TILTED)).joints}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 4)]

@@ -69,7 +69,11 @@ def what_is_behind(assembly, part, hole, screw, core, rounds, printer):
         shaft = next(name for name in assembly.made if name != part and name in assembly.turning_parts())
         return Behind(shaft, "grub", 0.0, 0)
     if partner is None:
-        return None if assembly.parts[part].turns else Behind("deck", "deck", DECK_MM, 0)
+        layout = assembly.layout
+        from_below = layout.deck.flat and part == layout.drive.mounted.onto  # by screws of the deck
+        return None if assembly.parts[part].turns or from_below else Behind("deck", "deck", DECK_MM, 0)
+    if partner.onto == "servo_horn":  # drawn as a disc: its threads go on into what is behind
+        return replace(partner, depth=assembly.layout.scanner.servo.horn_thread_depth_mm)
     return partner
 
 
@@ -239,7 +243,7 @@ def half_cylinders(solid, radius, along):
 
 SLOTTED = {
     "a belt": {("drive_plate", "bearing_tower"), ("alignment_linkage", "counterweight")},
-    "small, without a ring": {("alignment_linkage", "lidar_body"), ("alignment_linkage", "counterweight")},
+    "small, without a ring": {("alignment_linkage", "counterweight")},
 }
 
 
