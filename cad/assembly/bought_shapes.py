@@ -23,13 +23,14 @@ CAP_INSET = 1.5
 CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide
 EAR_ROOM = 3.6  # radius of the recess around a case hole
 BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
+THROUGH = 0.25  # of a plain hole around its screw
 STUB = 0.4  # between the stub of a capsule's rotor and its body
 
 
 def lidar_body(lidar: Lidar) -> cq.Solid:
-    """Below the window, with its threaded holes."""
+    """Below the window, with its holes."""
     half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
-    radius = SCREWS[lidar.base.screw].nominal / 2
+    radius = SCREWS[lidar.base.screw].nominal / 2 + (THROUGH if lidar.base.kind == "through" else 0.0)
     threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.base.places]
     body: cq.Shape = solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low))
     if lidar.ears_mm:

@@ -123,7 +123,7 @@ def partner_of(part, hole, screw, rounds, printer):
             threaded = min(abs(other.diameter - size) for size in sizes) < 0.01
             fixing = "trap" if is_trap(other, screw, printer) else "thread" if threaded else "nut"
             depth = CASE_EAR_MM if fixing == "nut" and name == "servo_case" else free_length(other, others, screw, low)
-            order = (not threaded, round(abs(gap), 3))
+            order = (not threaded and name != "lidar_body", round(abs(gap), 3))  # the linkage has holes for drivers
             if best is None or order < best[0]:
                 best = order, Behind(name, fixing, depth, 1 if gaps[0] > gaps[1] else -1)
     return None if best is None else best[1]
