@@ -11,8 +11,8 @@ from scanwright.cad.drawings.patterns import number
 from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
-from scanwright.cad.parts.fits import OnSheet
 from scanwright.cad.parts.part_spec import Process
+from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.scanner import Scanner
 

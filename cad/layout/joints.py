@@ -17,7 +17,7 @@ import numpy as np
 from scanwright.cad.outlines import polygon
 from scanwright.cad.screws import SCREWS, Screw, Thread
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.holes import Pattern
+from scanwright.design.catalogue.holes import HolePattern
 from scanwright.design.catalogue.products import Lidar, Servo
 
 # ISO 4762 and ISO 4026
@@ -172,7 +172,7 @@ def lidar_thread_mm(lidar: Lidar) -> float:
     return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
 
 
-def fixing_of(pattern: Pattern) -> Fixing:
+def fixing_of(pattern: HolePattern) -> Fixing:
     """What holds a screw that goes into the holes of a bought device: their thread, or a nut behind them."""
     return "nut" if pattern.kind == "through" else "thread"
 

@@ -46,8 +46,8 @@ from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.fits import OnSheet, printed_seat
 from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.parts.tolerances import OnSheet, printed_seat
 from scanwright.cad.screws import Trap, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer

@@ -22,8 +22,8 @@ from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, placed_axes, screws, triple, upright_axes
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO_CASE
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.fits import OnSheet
 from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.cad.screws import Thread
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Servo

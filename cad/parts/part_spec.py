@@ -11,7 +11,7 @@ import cadquery as cq
 from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
-from scanwright.cad.parts.fits import OnSheet
+from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.design.catalogue.products import Printer
 
 Process = Literal["printed", "turned", "sawn"]

@@ -40,8 +40,8 @@ from scanwright.cad.layout.names import (
     SHAFT_PULLEY,
 )
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.fits import OnSheet, no_wider
 from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
+from scanwright.cad.parts.tolerances import OnSheet, no_wider
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer

@@ -44,7 +44,7 @@ class Hole(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Pattern:
+class HolePattern:
     """Equal holes in one plane, which hold one part.
 
     Attributes:
@@ -62,17 +62,17 @@ class Pattern:
     depth_mm: float
 
 
-def mounting_holes(holes: Iterable[Hole], face: Face) -> Pattern:
+def mounting_holes(holes: Iterable[Hole], face: Face) -> HolePattern:
     """Return the largest set of equal, usable holes in one plane of a face; without places if there is none."""
     groups: dict[tuple[Size, Kind, float], list[Hole]] = {}
     for hole in holes:
         if hole.axis == face and hole.kind in USABLE:
             groups.setdefault((hole.size, hole.kind, hole.at_mm[2]), []).append(hole)
     if not groups:
-        return Pattern("M3", "tapped", (), 0.0, 0.0)
+        return HolePattern("M3", "tapped", (), 0.0, 0.0)
     (size, kind, z), chosen = max(groups.items(), key=lambda group: len(group[1]))
     places = tuple((hole.at_mm[0], hole.at_mm[1]) for hole in chosen)
-    return Pattern(size, kind, places, z, min(hole.depth_mm for hole in chosen))
+    return HolePattern(size, kind, places, z, min(hole.depth_mm for hole in chosen))
 
 
 def what_holds(holes: Iterable[Hole]) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import to_jsonable_python
 
-from scanwright.design.catalogue.holes import Hole, Pattern, mounting_holes
+from scanwright.design.catalogue.holes import Hole, HolePattern, mounting_holes
 from scanwright.design.catalogue.known_error import KnownError
 from scanwright.design.files.record import Record
 
@@ -186,7 +186,7 @@ class Lidar(Product):
         return {net: tuple(lead.colour for lead in self.leads if lead.net == net) for net in ("+", "-")}
 
     @property
-    def base(self) -> Pattern:
+    def base(self) -> HolePattern:
         """Holes in its base that a plate below it can be screwed to."""
         return mounting_holes((hole for hole in self.holes if hole.at_mm[2] == 0), "-z")
 
@@ -277,12 +277,12 @@ class Servo(Product):
     cable: str | None = Field(default=None, exclude=True, description="between the adapter and the servo")
 
     @property
-    def front(self) -> Pattern:
+    def front(self) -> HolePattern:
         """Holes in the face that the horn comes out of."""
         return mounting_holes(self.holes, "+z")
 
     @property
-    def rear(self) -> Pattern:
+    def rear(self) -> HolePattern:
         """Holes in the opposite face."""
         return mounting_holes(self.holes, "-z")
 

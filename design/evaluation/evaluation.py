@@ -19,7 +19,7 @@ from scanwright.design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, 
 from scanwright.design.evaluation.metres import PlaneFigures, on_planes
 from scanwright.design.evaluation.poles import Pole, PoleChances, pole_chances, require_in_range
 from scanwright.design.objective.ball_search import BallScore, ball_score
-from scanwright.design.objective.holes import Hole, holes, percent
+from scanwright.design.objective.holes import BlindSpot, holes, percent
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
@@ -83,7 +83,7 @@ class Evaluation:
     lever: Lever | None
     score: Score
     ball: BallScore
-    holes: tuple[Hole, ...]
+    holes: tuple[BlindSpot, ...]
     coverage: Coverage
     gaps: Gaps
     cap: BlindCone | None

@@ -31,7 +31,7 @@ UPRIGHT_DEG = 80.0  # beyond it a heading has no meaning
 
 
 @dataclass(frozen=True, slots=True)
-class Hole:
+class BlindSpot:
     """Directions that no start phase brings a beam to, as a cone, or a ring where `inner_deg` is above 0.
 
     Attributes:
@@ -63,7 +63,7 @@ class Hole:
         )
 
 
-def holes(problem: Problem, angles_rad: Setting) -> tuple[Hole, ...]:
+def holes(problem: Problem, angles_rad: Setting) -> tuple[BlindSpot, ...]:
     """Where the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] is blind in the region, the worst first.
 
     Raises:
@@ -73,7 +73,7 @@ def holes(problem: Problem, angles_rad: Setting) -> tuple[Hole, ...]:
     return tuple(sorted((hole for hole in result if hole.weight > NO_BLIND_WEIGHT), key=lambda hole: -hole.weight))
 
 
-def _of_spin(problem: Problem, angles_rad: Setting) -> list[Hole]:
+def _of_spin(problem: Problem, angles_rad: Setting) -> list[BlindSpot]:
     rule, beam_polar, _ = polar_rule(problem, angles_rad, NODES)
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     out = []
@@ -83,12 +83,12 @@ def _of_spin(problem: Problem, angles_rad: Setting) -> list[Hole]:
         about_back = low > 0 and np.pi - low < high  # the nearer end of the axis
         inner, outer = (np.pi - high, np.pi - low) if about_back else (low, high)
         out.append(
-            Hole(_three(-axis if about_back else axis), float(np.degrees(outer)), float(np.degrees(inner)), weight)
+            BlindSpot(_three(-axis if about_back else axis), float(np.degrees(outer)), float(np.degrees(inner)), weight)
         )
     return out
 
 
-def _of_sweep(problem: Problem, angles_rad: Setting) -> list[Hole]:
+def _of_sweep(problem: Problem, angles_rad: Setting) -> list[BlindSpot]:
     """All that is blind, as one cone about its middle."""
     samples = weighted_samples(problem.field, DIRECTIONS)
     R = R_world_rot(angles_rad[0], angles_rad[1])
@@ -99,7 +99,7 @@ def _of_sweep(problem: Problem, angles_rad: Setting) -> list[Hole]:
         return []
     off = np.arccos(np.clip(samples.directions[blind] @ middle / length, -1, 1))
     share = blind_share(samples.weights, blind)
-    return [Hole(_three(middle / length), float(np.degrees(off.max())), 0.0, share)]
+    return [BlindSpot(_three(middle / length), float(np.degrees(off.max())), 0.0, share)]
 
 
 def heading(direction: Vector) -> str:

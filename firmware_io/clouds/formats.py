@@ -50,7 +50,7 @@ FORMATS = (
     CloudFormat("laz", f"{_CLOUDS}.las", ("laspy", "lazrs")),
     CloudFormat("e57", f"{_CLOUDS}.e57", ("pye57",), rows="fields", several=True),
     CloudFormat("npz", f"{_CLOUDS}.npz", rows="fields"),
-    CloudFormat("npy", f"{_CLOUDS}.npy"),
+    CloudFormat("npy", f"{_CLOUDS}.structured_array"),
     CloudFormat("ptx", f"{_CLOUDS}.ptx"),
     *(CloudFormat(name, f"{_CLOUDS}.text", rows="comments") for name in ("xyz", "txt", "asc", "csv", "pts")),
 )

@@ -39,7 +39,7 @@ from scanwright.firmware_io.recording.import_checks.apply import corrected_scan,
 from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
 from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings
-from scanwright.firmware_io.recording.import_checks.survey import Survey, endless, survey_bag
+from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
 from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
@@ -225,7 +225,7 @@ def _time_increment_s(headers: Headers, corrections: Corrections) -> float | Non
     return corrections.time_increment
 
 
-def _corrected(clock: OneClock, survey: Survey, arc_ns: Times, corrections: Corrections) -> OneClock:
+def _corrected(clock: OneClock, survey: BagSurvey, arc_ns: Times, corrections: Corrections) -> OneClock:
     """Return the times after the corrections of stamps."""
     scan_ns, angle_ns, note = clock.scan_ns, clock.angle_ns, clock.note
     if corrections.stamp == "receipt":
@@ -239,7 +239,7 @@ def _remark(code: str, message: str) -> Finding:
     return Finding(code, "warning", "recording", message)
 
 
-def _scan_findings(survey: Survey) -> Iterator[Finding]:
+def _scan_findings(survey: BagSurvey) -> Iterator[Finding]:
     beams = survey.headers.beams
     if survey.left_out["empty_scan"]:
         yield _remark("empty_scans", f"{survey.left_out['empty_scan']} scans have no beam and are left out")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from typer import Argument, Option
 
+from scanwright.cad.checks.checks_json import entries_of, failure_lines
 from scanwright.cli.arguments import AsJson, BuildFolder, Out, TaskFile
 from scanwright.cli.console import (
     ConsoleProgress,
@@ -25,9 +26,7 @@ from scanwright.cli.console import (
 )
 from scanwright.cli.help import Commands
 from scanwright.design.errors import notes_of, require
-
-if TYPE_CHECKING:
-    from scanwright.design.findings import Finding, Severity
+from scanwright.design.findings import Finding, Severity, errors_in, sentence
 
 app = Commands("Parts")
 
@@ -51,7 +50,6 @@ def build(
         print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
-    from scanwright.cad.checks.checks_json import entries_of
 
     try:
         built = api.build(task, out, progress=ConsoleProgress())
@@ -84,8 +82,6 @@ def report(out: BuildFolder) -> None:
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
     """Check the parts of a build (fit, loads, printing)."""
     from scanwright import api
-    from scanwright.cad.checks.checks_json import entries_of
-    from scanwright.design.findings import errors_in, sentence
 
     checks = api.check(out, progress=ConsoleProgress())
     _print_failed_checks(checks)
@@ -128,8 +124,6 @@ def study(
 
 def _print_failed_checks(checks: Sequence[Finding]) -> None:
     """Print the failed checks on standard error, before any result."""
-    from scanwright.cad.checks.checks_json import failure_lines
-
     for line in failure_lines(checks):
         print_error(line)
 

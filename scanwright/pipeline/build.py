@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scanwright.cad.checks.checks_json import read_checks
+from scanwright.cad.files.part_files import PartReport, PartsResult, build_parts, write_files
 from scanwright.cad.kernel import require_kernel
 from scanwright.design.concurrency.processes import Packed, worker_processes
 from scanwright.design.findings import Finding, errors_in, sentence
@@ -23,7 +24,6 @@ from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
-    from scanwright.cad.files.part_files import PartReport, PartsResult
     from scanwright.design.evaluation.as_built import AsBuilt
     from scanwright.design.evaluation.metres import PlaneFigures
     from scanwright.design.left_out import LeftOut
@@ -214,8 +214,6 @@ def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -
 
 def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progress: Progress) -> PartsMade:
     """Write the parts with their labels into the folder."""
-    from scanwright.cad.files.part_files import build_parts
-
     parts = build_parts(scanner, folder, _at(progress, "parts"), lambda _: assembly.open())
     return PartsMade(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
 
@@ -255,7 +253,6 @@ def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
 
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     """Run all stages in order."""
-    from scanwright.cad.files.part_files import write_files
     from scanwright.design.evaluation.as_built import as_built
     from scanwright.design.evaluation.metres import on_planes
     from scanwright.design.search.optimum import find_optimum

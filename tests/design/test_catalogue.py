@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
-from scanwright.design.catalogue.holes import Pattern, mounting_holes
+from scanwright.design.catalogue.holes import HolePattern, mounting_holes
 from scanwright.design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
 from scanwright.design.catalogue.table import FIGURES, chosen, table_lines
 from scanwright.design.errors import TaskError
@@ -313,7 +313,7 @@ def test_a_lidar_file_of_version_0_1_states_threads_in_the_base(tmp_path):
         },
     )
     lidar = load_catalogue(write(tmp_path, text)).get("UTM-30LX", Lidar)
-    assert lidar.base == Pattern("M2.5", "tapped", ((10, 20), (-10, 20), (0, -20)), 0.0, 5.0)
+    assert lidar.base == HolePattern("M2.5", "tapped", ((10, 20), (-10, 20), (0, -20)), 0.0, 5.0)
     assert "holes" in lidar.unverified()
     assert set(lidar.provenance()) >= {"holes"} and "mount_screw" not in lidar.provenance()
 
@@ -330,7 +330,7 @@ def test_a_servo_file_of_version_0_1_states_ears_for_nuts(tmp_path):
         },
     )
     servo = load_catalogue(write(tmp_path, text)).get("MX-64R", Servo)
-    assert servo.front == Pattern("M3", "through", ((11, 4), (-11, 4)), -6.0, 2.0)
+    assert servo.front == HolePattern("M3", "through", ((11, 4), (-11, 4)), -6.0, 2.0)
     assert (len(servo.rear.places), servo.rear.z_mm) == (4, -30.0)
     assert "holes" not in servo.unverified()
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from imports import modules
+from imports import PACKAGE, modules
 
 
 def trees():
@@ -29,6 +29,7 @@ def test_no_sentence_for_people_names_a_class_of_ours():
     spoilt = {
         name: said
         for name, tree in found.items()
-        if (said := [words for words in sentences(tree) if classes & set(re.findall(r"\w+", words))])
+        if name != PACKAGE  # the lists of public names
+        and (said := [words for words in sentences(tree) if classes & set(re.findall(r"\w+", words))])
     }
     assert spoilt == {}

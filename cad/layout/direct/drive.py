@@ -11,7 +11,7 @@ from scanwright.cad.layout import names
 from scanwright.cad.layout.direct.adapter import adapter_of
 from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
 from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, frame_of, needs_frame, no_rear_holes
-from scanwright.cad.layout.direct.leads import lead_exits, stator_exit
+from scanwright.cad.layout.direct.lead_exits import lead_exits, stator_exit
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack

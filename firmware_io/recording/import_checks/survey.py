@@ -19,7 +19,7 @@ from scanwright.firmware_io.recording.import_checks.headers import Headers, head
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Survey:
+class BagSurvey:
     """Scans and angles of a bag; arrays of scans have one entry per usable scan, those of angles one per usable angle.
 
     Attributes:
@@ -49,7 +49,7 @@ def survey_bag(
     angle_source: Source | FrameSource | None,
     table: tuple[Times, Floats] | None,
     corrections: Corrections,
-) -> Survey:
+) -> BagSurvey:
     """Read all scans and angles.
 
     Args:
@@ -106,7 +106,7 @@ def survey_bag(
         angle, note = turned_rad(numbers, angle_source)
     else:
         angle = numbers[:, 0]
-    return Survey(
+    return BagSurvey(
         scan_stamps=Stamps(times(stamps), times(receives)),
         headers=Headers.of(rows, longest),
         endless=sum(without_end),

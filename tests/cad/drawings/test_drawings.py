@@ -29,7 +29,7 @@ from scanwright.cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.parts.fits import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
 from scanwright.cad.solids import box, cylinder, upright
 
 X, Y, Z = np.eye(3)

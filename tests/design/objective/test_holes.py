@@ -9,7 +9,7 @@ from scans import simulated_scan
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.density.beams import blind_zones
 from scanwright.design.density.spin import ball_search
-from scanwright.design.objective.holes import Hole, heading, holes, percent
+from scanwright.design.objective.holes import BlindSpot, heading, holes, percent
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.sphere.directions import weighted_samples
 from scanwright.design.task.task import LoadedTask, Task
@@ -80,4 +80,4 @@ def test_a_share_that_is_there_is_never_written_as_nothing(share, words):
 
 
 def test_a_direction_has_no_negative_zero():
-    assert "about (-0.819, 0.000, 0.574)" in Hole((-0.819, -1e-4, 0.574), 30.0, 0.0, 0.1).words()
+    assert "about (-0.819, 0.000, 0.574)" in BlindSpot((-0.819, -1e-4, 0.574), 30.0, 0.0, 0.1).words()
