@@ -61,9 +61,9 @@ def servo_case(servo: Servo, z: float) -> cq.Solid:
     recesses += [solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
     for pattern, inwards in ((servo.front, -1.0), (servo.rear, 1.0)):
         if pattern.kind != "through":
-            ends = sorted((z + pattern.z_mm, z + pattern.z_mm + inwards * pattern.depth_mm))
+            low, high = sorted((z + pattern.z_mm, z + pattern.z_mm + inwards * pattern.depth_mm))
             radius = SCREWS[pattern.screw].nominal / 2
-            recesses += [solids.upright(radius, *ends, *hole) for hole in pattern.places]
+            recesses += [solids.upright(radius, low, high, x, y) for x, y in pattern.places]
     return solids.box((x0, y0, z + z0), (x1, y1, z + z1)).cut(*recesses).Solids()[0]
 
 
