@@ -260,13 +260,14 @@ shape = "all"
 
 @pytest.fixture(scope="session")
 def made(once):
-    """The build of one tilted scanner, which has a bearing and a counterweight.
+    """The build of one tilted scanner, which has a bearing.
 
     Its folder, what was made and exported, the scanner, and what the command prints: for reading only.
     """
     from scanwright.api import build
-    from scanwright.cad.files import part_files, workshop_files
+    from scanwright.cad.files import workshop_files
     from scanwright.design.concurrency import processes
+    from scanwright.pipeline import build as pipeline
 
     def all_of_it(folder):
         given = {}
@@ -282,7 +283,7 @@ def made(once):
         (folder / "tilted.toml").write_text(TILTED)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(processes, "cores", lambda: 1)  # all of it here
-            patch.setattr(part_files, "build_parts", keeping(part_files.build_parts))
+            patch.setattr(pipeline, "build_parts", keeping(pipeline.build_parts))
             patch.setattr(workshop_files, "export_scanner", keeping(workshop_files.export_scanner))
             built = build(folder / "tilted.toml", folder / "out")
         result, exports = given["build_parts"], given["export_scanner"]

@@ -148,6 +148,8 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     comments = tuple(line[1:].strip() for line in lines if line.startswith("#"))
     T = pose_matrix([x, y, z, *axis, w])
     header = PcdHeader(tuple(fields), (height, width), end[1].decode(), end.end(), T, comments)
+    if max(field.count for field in fields) > len(data):
+        raise RecordingError(f"{path}: COUNT {max(field.count for field in fields)}: more than the bytes of the file")
     least = 2 * sum(field.count for field in fields) if header.encoding == "ascii" else header.layout.itemsize
     room = (len(data) - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)
     if not 0 < rows == header.rows or rows * least > room + 1:

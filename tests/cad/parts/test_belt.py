@@ -119,7 +119,7 @@ def test_what_it_is_made_of(made):
     assert (stack.carrier.name, stack.tube_diameter, stack.shaft_bore, stack.shaft_diameter) == (
         "61805-2RS",
         25,
-        15,
+        12.8,
         12,
     )
     assert stack.upper_middle - stack.lower_middle >= 30
@@ -141,7 +141,7 @@ def test_bores_and_seats_are_coaxial_with_the_axis_and_fit(made):
         ("bearing_tower", stack.lower_middle, bearing.outer_mm + fit / 2),
         ("bearing_tower", (stack.upper_middle + stack.lower_middle) / 2, bearing.outer_mm - 3),
         ("bearing_tower", stack.disc_top + 5, 47.0),
-        ("main_shaft", stack.upper_middle, 15.0),
+        ("main_shaft", stack.upper_middle, 12.8),
         ("shaft_pulley", stack.belt_middle, bearing.bore_mm + fit / 2),
         ("shaft_ring", stack.collar_low + 2, bearing.bore_mm + fit),
         ("slip_ring_adapter", stack.disc_top - 1, 23.0),
@@ -280,7 +280,7 @@ def test_bearings_balance_the_rotor_and_the_belt(made):
 def test_the_shaft_bends_as_unit_loads_say(made):
     """Displacement of one load in the direction of another is the integral of their bending moments over EI."""
     stack = made.stack
-    EI = 70e9 * np.pi / 64 * (0.025**4 - 0.015**4)
+    EI = 70e9 * np.pi / 64 * (0.025**4 - 0.0128**4)
     span = (stack.upper_middle - stack.lower_middle) / 1000
     over = (stack.hub_bottom - stack.upper_middle) / 1000
     x = (np.arange(20000) + 0.5) / 20000 * (span + over)
@@ -347,7 +347,7 @@ def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
     assert len(threads) == 4 and any("M3 through the spigot" in text for text in said)
     assert [text for text in said if text.startswith("Ø") and ":" not in text and text not in threads] == [
         "Ø24.96  +0.02/0",
-        "Ø15 x 83.2 DEEP",
+        "Ø12.8 x 83.2 DEEP",
         "Ø27.9",
         "Ø24.96  +0.02/0",
         "Ø12  0/-0.1",

@@ -118,7 +118,7 @@ def test_the_spot_around_the_axis_is_told_apart_from_the_gaps_elsewhere():
     spot_cm = 2 * 300 * np.tan(np.radians(2.0))
     assert spot_cm <= wall.gap_cm <= 1.1 * spot_cm
     assert wall.gap_off_axis_cm < spot_cm / 2
-    assert re.search(r"gaps of \S+ cm at 3 m, 2\d around the axis; what is", wall.words())
+    assert re.search(r"gaps of \S+ cm at 3 m, 2\d around the axis; an object", wall.words())
     (through,) = on_planes(task, problem_of(task), np.radians((0.0, 90.0, 90.0, 0.0)))
     assert through.gap_off_axis_cm == pytest.approx(through.gap_cm, rel=2 * SLACK)
     assert "around the axis" not in through.words()

@@ -80,4 +80,4 @@ def test_what_drives_no_device_works_and_devices_are_refused_in_one_line(tmp_pat
     assert "another build of this folder is at work" in done.stdout
     assert "two builds" not in done.stdout and "built ['a.txt', 'ahead']" in done.stdout
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
-    assert "holds" in errors[0] and errors[1:] == [f"error: {REFUSED}"] * 2
+    assert "contains task.toml" in errors[0] and errors[1:] == [f"error: {REFUSED}"] * 2
