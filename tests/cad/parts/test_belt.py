@@ -140,7 +140,7 @@ def test_bores_and_seats_are_coaxial_with_the_axis_and_fit(made):
         ("bearing_tower", stack.upper_middle, bearing.outer_mm + fit / 2),
         ("bearing_tower", stack.lower_middle, bearing.outer_mm + fit / 2),
         ("bearing_tower", (stack.upper_middle + stack.lower_middle) / 2, bearing.outer_mm - 3),
-        ("bearing_tower", stack.disc_top + 5, 47.0),
+        ("bearing_tower", stack.disc_top + 1, 47.0),
         ("main_shaft", stack.upper_middle, 12.8),
         ("shaft_pulley", stack.belt_middle, bearing.bore_mm + fit / 2),
         ("shaft_ring", stack.collar_low + 2, bearing.bore_mm + fit),
