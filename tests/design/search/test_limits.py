@@ -192,6 +192,6 @@ def test_holes_between_the_nodes_of_every_setting_are_no_refusal(monkeypatch):
     task, told = loaded(angles=ANGLES | {"step_deg": 45}), []
     free = search(problem_of(task), task.task.angles)
     monkeypatch.setattr(search_module, "best_candidate", with_holes)
-    found = search(problem_of(task), task.task.angles, told.append)
+    found = search(problem_of(task), task.task.angles, lambda step, _=None: told.append(step))
     assert found.best[0].score.J <= free.best[0].score.J and found.least_blind is not None
     assert "no setting of the grid sees all of the region: the lowest J of all" in told

@@ -175,7 +175,7 @@ def test_the_number_of_threads_changes_no_digit(monkeypatch):
 
 
 def found_with(cores, problem, ranges, monkeypatch):
-    monkeypatch.setattr(parallel.os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(parallel, "cores", lambda: cores)
     return search(problem, ranges)
 
 

@@ -172,7 +172,13 @@ def test_what_lies_out_of_range_is_told_by_new_and_optimise(command, tmp_path, m
     _, _, complaints = command("new", "far", *parts, "--see", "wall:500:10")
     told = "warning: weight.0: wall 500 m away, 0 to 2.5 m high ahead: all of it lies beyond the 4 m that UST-10LX sees"
     assert complaints[0].startswith(told)
-    text = Path("far.toml").read_text(encoding="utf-8").replace("[-180, 180]", "0").replace("[-90, 90]", "45")
+    text = (
+        Path("far.toml")
+        .read_text(encoding="utf-8")
+        .replace("s_deg = [-90, 90]", "s_deg = [-90.0, 90]")
+        .replace("[-180, 180]", "0")
+        .replace("[-90, 90]", "45")
+    )
     Path("far.toml").write_text(text, encoding="utf-8")
     _, out, complaints = command("optimise", "far.toml")
     assert (

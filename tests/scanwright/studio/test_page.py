@@ -173,7 +173,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     np.testing.assert_allclose(np.degrees(np.arccos(edge)), 12.0, atol=0.3)  # of what was painted there
     tab(page, "Angles")
     page.get_by_role("button", name="Optimise").click()
-    page.get_by_text("is still looked for").wait_for()
+    page.get_by_text("searching the equivalent mount").wait_for()
     page.get_by_text("with parts, which block").wait_for(timeout=300_000)  # ten times what it needs
     until(lambda: studio.facts.exact and studio.setting == studio.facts.setting)
     dab = studio.judge.loaded.task.weight[1]
