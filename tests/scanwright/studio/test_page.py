@@ -186,7 +186,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
 
     # side by side, and back
     page.get_by_role("button", name="Keep this setting").click()
-    page.get_by_text("kept as A").wait_for()
+    page.get_by_text("saved as A").wait_for()
     enter(page, 0, 10.0)
     until(lambda: studio.setting.angles_deg[0] == 10.0)
     tab(page, "Compare")
