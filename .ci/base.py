@@ -15,7 +15,7 @@ from pathlib import Path
 
 EXTRAS = {  # of the modules below a package, if no name below it has its own
     "scanwright.design": set(),
-    "scanwright.firmware_io": {"laspy", "pye57", "pypcd4", "launch", "builtin_interfaces", "rclpy"},
+    "scanwright.firmware_io": {"laspy", "lzf", "pye57", "pypcd4", "launch", "builtin_interfaces", "rclpy"},
     "scanwright.cad": {"cadquery"},
     "scanwright": {"cadquery", "jinja2", "manifold3d", "msgspec", "viser", "websockets"},
 }
