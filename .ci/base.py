@@ -93,7 +93,7 @@ def scan_the_twins(folder: Path) -> None:
 def refuse_what_needs_an_extra() -> None:
     """One line, and nothing done."""
     told = subprocess.run([COMMAND, "build", "ground_ahead"], text=True, capture_output=True)
-    line = "scanwright: build needs the CAD kernel: pip install 'scanwright[cad]'\n"
+    line = "error: build needs the CAD kernel: pip install 'scanwright[cad]'\n"
     assert (told.returncode, told.stdout, told.stderr) == (2, "", line)
 
 
