@@ -2,7 +2,7 @@
 
     uv run python -m benchmarks.design.optimise [TASK ...] [--other PYTHON ...]
 
-Each task runs in a process of its own, checkout by checkout, twice: the first run loads what is compiled and is not
+Each task runs in a separate process, checkout by checkout, twice: the first run loads what is compiled and is not
 counted.
 """
 

@@ -57,7 +57,7 @@ def hardware_table(out: Path) -> str:
         "lidar, servo, ring",
         "printed",
         "other made parts",
-        "tools beside hex keys",
+        "tools besides hex keys",
         "USD",
         "failed checks",
     ]

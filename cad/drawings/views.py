@@ -96,7 +96,7 @@ def views_of(part: Part) -> list[View]:
 
 
 def has_view(pattern: Pattern) -> bool:
-    """Return whether a pattern gets a view of its own."""
+    """Return whether a pattern gets a separate view."""
     return len(pattern.holes) >= 3 and not parallel(pattern.direction, Z)
 
 

@@ -1,7 +1,7 @@
 """`bom.csv`: everything to print, turn and buy for one scanner, with quantities and prices.
 
 Prices are those of the catalogue, each with its source and year. If it has none, a range of `prices.py` stands in
-columns of its own, stated as an estimate; the last row adds up both and names the rows that have neither.
+separate columns, stated as an estimate; the last row adds up both and names the rows that have neither.
 """
 
 from __future__ import annotations

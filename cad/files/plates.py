@@ -30,7 +30,7 @@ INK, LIGHT, TEXT_PX = (20, 20, 20), (255, 255, 255), 15
 
 
 def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]) -> list[Plate]:
-    """Distribute parts over as few beds as rows of boxes need; a part larger than a bed gets one of its own.
+    """Distribute parts over as few beds as rows of boxes need; a part larger than a bed gets a separate one.
 
     Args:
         printed: parts in their print pose.

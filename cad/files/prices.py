@@ -15,7 +15,7 @@ FILAMENT_USD_PER_KG = (15.0, 35.0)
 UNSURE = (0.7, 1.5)  # least and most over an unverified or old price: assumed
 RECENT = "2024"  # first year whose prices count as they are
 EACH_USD: dict[str, tuple[float, float]] = {
-    "printed": (0.0, 0.0),  # its plastic has a row of its own
+    "printed": (0.0, 0.0),  # its plastic has a separate row
     "turned": (50.0, 180.0),
     JOURNAL_SLEEVE: (25.0, 90.0),
     "sawn": (8.0, 30.0),

@@ -1,7 +1,7 @@
 """How the servo turns the shaft, as data: a list of stations along the axis, and what each kind of drive adds.
 
 Rotation frame at gamma = 0, mm. Only `drive_of` in `cad/layout/layout.py` knows which drives there are; each fills a
-`DriveLayout` in a folder of its own (`direct/`, `belt/`), and everybody else reads it.
+`DriveLayout` in a separate folder (`direct/`, `belt/`), and all other code reads it.
 """
 
 from __future__ import annotations

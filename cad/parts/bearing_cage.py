@@ -97,7 +97,7 @@ def _bell_joint(p: BearingCage, base: str) -> Joint:
 
 
 def base_spec(place: Placement) -> PartSpec | None:
-    """Its base as a part of its own; None if it is the plate of the adapter, or nothing."""
+    """Its base as a separate part; None if it is the plate of the adapter, or nothing."""
     p = place.drive.of(BearingCage)
     if p is None or place.scanner.slip_ring is not None:
         return None

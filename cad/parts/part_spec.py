@@ -95,7 +95,7 @@ class PartSpec:
         angles: those that shape it and stand on its label.
         seat: height in the laser frame of its face towards the lidar; None where it does not carry the lidar.
         lifted: along what the exploded view moves it.
-        sweep: what it fills if it turns about an axis of its own.
+        sweep: what it fills if it turns about another axis.
         joints: what it is screwed to.
         avoid: convex shapes that cables must stay clear of.
         rows: small things that it needs, for the parts list.

@@ -129,7 +129,7 @@ def chosen(
 
 
 def table_lines(products: Iterable[Product]) -> list[str]:
-    """A table for each kind, in words; `MARK` behind what nobody has verified."""
+    """A table for each kind, in words; `MARK` behind unverified values."""
     listed = list(products)
     lines: list[str] = []
     for word, kind in KINDS.items():

@@ -25,7 +25,7 @@ from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
 _LEAST = 32  # samples; with fewer there is nothing to average
 _FINEST = 4  # samples to a knot
-_MOST_REJECTED = 0.1  # share of the samples: of more, nobody can tell which are right
+_MOST_REJECTED = 0.1  # share of the samples; beyond it the right ones cannot be told apart
 _LISTED = 5  # times of rejected samples in a message
 _SWING = 6.0  # residuals beyond this many times their rms are jumps (a stop, a slip), not noise
 _MISSED = 2 / np.sqrt(12)  # of a step; twice what rounding to steps does is motion that the curve misses

@@ -32,7 +32,7 @@ from scanwright.firmware_io.samples import JointLog, Scan
 _CAP_M = 0.05  # a few times the noise of 2D lidars (10 to 30 mm), far below the depth of edges
 _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash, not the way back
 _LAGS_S = np.linspace(-1.0, 1.0, 41)  # delays of drivers and networks, in steps of 50 ms; the minimum is refined
-_VAGUE_S = 0.25  # a delay known worse than this helps nobody
+_VAGUE_S = 0.25  # a delay known worse than this is not used
 _BLOCKS = 8  # of the fan: neighbouring beams see the same things
 _CELLS = 600  # over the common angles; on 60 degrees a tenth of a degree, about one step between scans
 

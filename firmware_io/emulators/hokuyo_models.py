@@ -1,4 +1,4 @@
-"""Which Hokuyo an emulator is: what it says of itself, and its clock.
+"""Model of an emulated Hokuyo: its identity, and its clock.
 
 Texts and statuses are those of captured sensors, except where an entry says otherwise.
 """

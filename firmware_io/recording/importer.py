@@ -143,7 +143,7 @@ def import_bag(
     unit_rad = radians_per(angle_unit) if angle_unit else None
     table = read_table(angle) if angle_source is None else None
     if reserved := {SCAN_TOPIC, JOINT_TOPIC, BEAMS_TOPIC}.intersection(also):
-        raise RecordingError(f"also {min(reserved)}: the recording has a topic of its own under this name")
+        raise RecordingError(f"also {min(reserved)}: the recording already has a topic of this name")
     with open_bag(bag, *parts) as opened:
         opened.check({scan_source.topic, *([] if angle_source is None else [angle_source.topic]), *also})
         survey = survey_bag(opened, scan_source, angle_source, table, corrections)

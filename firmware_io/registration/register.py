@@ -50,7 +50,7 @@ def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Prog
 
     Args:
         views: the clouds; the frame of the first one becomes the world, unless its pose is given.
-        starts: start poses in the world, one for each view, shape (4, 4) each; empty where nobody knows.
+        starts: start poses in the world, one for each view, shape (4, 4) each; empty if unknown.
         progress: callback.
     """
     pairs: dict[tuple[int, int], Pair] = {}

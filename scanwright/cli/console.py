@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Verbosity(Enum):
-    """How much a command prints beside its results."""
+    """How much a command prints in addition to its results."""
 
     QUIET = "quiet"
     USUAL = ""

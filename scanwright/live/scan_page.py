@@ -1,4 +1,4 @@
-"""The page of a scan, in a process of its own so that the scan never waits for a browser.
+"""The page of a scan, in a separate process so that the scan never waits for a browser.
 
 The page is served, and said where, before any device is opened; on a terminal the browser is opened too, and given some
 seconds, so that the first scan is already seen.
@@ -25,7 +25,7 @@ from scanwright.firmware_io.scan.scan_end import LOST
 
 ALONE_S = 10.0  # without a visitor; a page that is reloaded returns sooner
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
-_CLOSED_S = 1.0  # for the page to end if nobody looks at it
+_CLOSED_S = 1.0  # for the page to end if no browser is connected
 OPENED_S = 15.0  # at most until the browser has it
 
 

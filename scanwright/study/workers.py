@@ -43,7 +43,7 @@ def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractCont
 
 
 class SingleProcesses(Executor):
-    """Processes, each in a pool of its own, so that one that dies breaks no other one's work.
+    """Processes, each in a separate pool, so that one that dies does not stop the others.
 
     In one pool the death of a worker ends all the others, and nobody can tell whose unit it was that killed it.
     """

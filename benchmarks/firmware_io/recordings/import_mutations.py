@@ -109,7 +109,7 @@ def _size(rng: Generator, low: float, high: float) -> float:
 
 
 def _some(rng: Generator, count: int, low: float = 0.01, high: float = 0.08) -> Ints:
-    """Random rows, none beside another, none at the ends."""
+    """Random rows, no two adjacent, none at the ends."""
     rows = np.arange(6, count - 6, 5)
     return rng.choice(rows, max(1, min(rows.size, int(count * rng.uniform(low, high)))), replace=False)
 

@@ -1,4 +1,4 @@
-"""`assembly.md`: how to assemble one scanner, with the screws of its own parts and a picture of each step."""
+"""`assembly.md`: how to assemble one scanner, with its screws and a picture of each step."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def painted(view: ParallelView, pieces: Sequence[Piece]) -> Image.Image:
 
 
 def _edges(away: Array, which: Array) -> Array:
-    """Return the pixels of a nearer body at the border to another one, or to a farther piece of its own."""
+    """Return the pixels of a nearer body at the border to another one, or to a farther piece of itself."""
     edge = np.zeros(away.shape, bool)
     for axis in (0, 1):
         for turn in (1, -1):

@@ -1,6 +1,6 @@
 """The cables that do not turn: the servo's, and the leads of the ring's stator, each from its device to the deck.
 
-Nobody draws where either leaves: the catalogue assumes it, and says so. They end tied to a side of the mount's foot, or
+No drawing shows where either leaves: the catalogue marks it as assumed. They end tied to a side of the mount's foot, or
 on the deck beside a servo that stands on it. Rotation frame at gamma = 0, mm.
 """
 

@@ -1,6 +1,6 @@
 """Every number of the frame that holds a servo by the threads in its front. No kernel.
 
-A servo whose rear has only the screws of its own case, such as those of the X series, hangs from a plate on its front.
+A servo whose rear has only case screws, such as those of the X series, hangs from a plate on its front.
 Four legs carry the plate, and their feet are screwed to the deck or to the base mount.
 """
 

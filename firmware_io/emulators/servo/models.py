@@ -21,7 +21,7 @@ def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle
         angle_rad: of the horn.
 
     Raises:
-        DeviceError: nobody has written such an emulator.
+        DeviceError: there is no such emulator.
     """
     for family in all_families().values():
         for table in family.tables:

@@ -252,7 +252,7 @@ class SlamtecEmulator(LidarLine):
         Args:
             lidar: of the catalogue.
             ranging: what it sees.
-            points_error: it measures this part faster than it says.
+            points_error: it measures this part faster than it states.
             jitter_s: packets arrive up to this much late.
             seed: of jitter and faults.
 
