@@ -9,7 +9,10 @@ from pydantic import Field, model_validator
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Printer, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.products import Bearing, Belt, Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.deck_holes import Circle, Rectangle
 from scanwright.design.errors import removal
 from scanwright.design.files.record import Record

@@ -12,7 +12,10 @@ _TYPES = {"number": "number", "integer": "integer", "string": "text", "boolean":
 
 def write_schema_pages(folder: Path) -> None:
     """Write task-file.md and catalogue.md into a folder."""
-    from scanwright.design.catalogue import products
+    from scanwright.design.catalogue.lidar import Lidar
+    from scanwright.design.catalogue.products import Bearing, Belt, Printer
+    from scanwright.design.catalogue.servo import Servo
+    from scanwright.design.catalogue.slip_ring import SlipRing
     from scanwright.design.task.task import Task
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -32,7 +35,7 @@ def write_schema_pages(folder: Path) -> None:
         "millimetres, masses in grams.",
         "",
     ]
-    kinds = (products.Lidar, products.Servo, products.SlipRing, products.Bearing, products.Belt, products.Printer)
+    kinds = (Lidar, Servo, SlipRing, Bearing, Belt, Printer)
     shown: set[str] = set()
     for kind in kinds:
         catalogue += _sections(kind.model_json_schema(), kind.__name__, shown)

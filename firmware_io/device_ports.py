@@ -12,7 +12,8 @@ from pathlib import Path
 from serial.tools import list_ports
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import DeviceError
 from scanwright.design.files.atomic_file import atomic_write, place_in
 

@@ -25,7 +25,9 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.holes import USABLE, Hole
-from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
 

@@ -25,7 +25,10 @@ import numpy as np
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
-from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.progress import no_progress
 from scanwright.design.scanner import Modules, Scanner, scanner_of

@@ -24,7 +24,8 @@ import numpy as np
 
 from scanwright.design.catalogue.catalogue import SHIPPED, load_product
 from scanwright.design.catalogue.holes import Face, mounting_holes
-from scanwright.design.catalogue.products import Product, Servo
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.servo import Servo
 
 TOLERANCE = 1e-6
 RENAMED = {

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.motion import Spin
 from scanwright.design.objective.problem import problem_of

@@ -25,7 +25,8 @@ from benchmarks.design.random_regions import (
 )
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import TaskError
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.shapes import MapRegion, MeshRegion

@@ -26,7 +26,9 @@ from scanwright.cad.layout.drive import DriveLayout, Station
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.parts.part_spec import STEEL, Colour
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Bearing, Belt, Servo, SlipRing
+from scanwright.design.catalogue.products import Bearing, Belt
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 
 CASE, RING, LIDAR, RUBBER = (0.16, 0.16, 0.19), (0.72, 0.58, 0.20), (0.20, 0.23, 0.27), (0.10, 0.10, 0.11)
 WINDOW = (0.35, 0.05, 0.08)

@@ -17,7 +17,10 @@ from scanwright.cad.layout.names import BELT, RING_STATOR
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Bearing, Lidar, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.products import Bearing
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 
 CAP_INSET = 1.5
 CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide

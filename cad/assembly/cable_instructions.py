@@ -97,7 +97,5 @@ def cables_text(layout: Layout) -> str:
             lines.append(f"{what} {runs} as the picture shows and {stops} {ends}: {bent}.")
     if not layout.deck.flat:
         lines.append("Close the cable tie in the two slots of the foot around what lies there: a pull ends there.")
-    lines.append(
-        "No drawing shows where they leave their devices: if yours differ, keep the bends and the ties."
-    )
+    lines.append("No drawing shows where they leave their devices: if yours differ, keep the bends and the ties.")
     return " ".join(lines)

@@ -8,7 +8,7 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.design.catalogue.holes import Hole, what_holds
 from scanwright.design.catalogue.measuring import how_to_measure
-from scanwright.design.catalogue.products import Product
+from scanwright.design.catalogue.product_base import Product
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner

@@ -21,7 +21,11 @@ from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.products import Bearing, Belt
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
 

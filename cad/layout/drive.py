@@ -21,7 +21,9 @@ from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import Screw, Thread
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Bearing, Belt, Servo, SlipRing
+from scanwright.design.catalogue.products import Bearing, Belt
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
 
 Body = Literal["base", "rotor", "horn"]

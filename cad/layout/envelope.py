@@ -14,7 +14,7 @@ from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, A
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 from scanwright.design.task.equivalent_settings import BOUNDS, advice

@@ -18,7 +18,8 @@ from scanwright.cad.outlines import polygon
 from scanwright.cad.screws import SCREWS, Screw, Thread
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.holes import HolePattern
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 
 # ISO 4762 and ISO 4026
 LENGTHS = {

@@ -53,7 +53,7 @@ from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
 from scanwright.cad.parts.tolerances import OnSheet, printed_seat
 from scanwright.cad.screws import SCREWS, Trap
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 
 ROOM = 0.7  # between the bell's foot and what stands beside it
 

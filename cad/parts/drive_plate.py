@@ -26,7 +26,7 @@ from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.cad.screws import Thread
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 
 OF_SERVO = (
     "servo.case_max_mm",

@@ -23,7 +23,8 @@ from scanwright.cad.parts.servo_shaft import on_horn
 from scanwright.cad.parts.tolerances import OnSheet, spigot_in_hub
 from scanwright.cad.screws import SCREWS, Trap, passing_hole
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Printer, Servo
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
 
 AROUND_BOSS = 0.2  # of the horn
 SEATED_ON_RIM = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"

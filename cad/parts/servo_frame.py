@@ -19,7 +19,7 @@ from scanwright.cad.layout.names import SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 
 
 def frame_spec(place: Placement) -> PartSpec | None:

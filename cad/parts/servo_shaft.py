@@ -25,7 +25,8 @@ from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, 
 from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Printer, Servo
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
 
 LINKAGE_ON_SHAFT = (
     "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way only, "

@@ -29,7 +29,7 @@ from scanwright.cad.parts.bearing_cage import around_base, cage_base, on_ears
 from scanwright.cad.parts.part_spec import CRIMPS, ON_CASE, PartSpec, Row, Step
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 
 RING_STEP = Step(
     "Slip ring",

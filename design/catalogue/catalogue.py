@@ -22,17 +22,11 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from scanwright.design.catalogue.holes import with_holes
-from scanwright.design.catalogue.products import (
-    Bearing,
-    Belt,
-    Lidar,
-    Multibeam,
-    Printer,
-    Product,
-    Provenance,
-    Servo,
-    SlipRing,
-)
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Product, Provenance
+from scanwright.design.catalogue.products import Bearing, Belt, Multibeam, Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import TaskError, suggest
 from scanwright.design.files.faults import Fault, faults_in, format_faults
 from scanwright.design.files.text_files import read_toml

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanwright.design.catalogue.products import Product
+from scanwright.design.catalogue.product_base import Product
 
 PATTERN = "press paper on the face so that the holes mark it, and measure between the marks with a caliper"
 WITH_CALIPER = "measure yours with a caliper"

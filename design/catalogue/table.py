@@ -7,7 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from scanwright.design.catalogue.catalogue import KINDS
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Multibeam, Printer, Product, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.products import Bearing, Belt, Multibeam, Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 
 MARK = "?"
 FOOTNOTE = f"{MARK} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scanwright.design.catalogue.products import Lidar, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.electrics.loads import SUPPLY_V, ElectricLoad
 from scanwright.design.electrics.network import Wire
 from scanwright.design.scanner import Scanner

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.electrics.network import Branch, Drop
 from scanwright.design.electrics.sizing import CONVERTER, RING_OHM, fuse_for, wire_drop_v, wire_for
 from scanwright.design.scanner import Scanner

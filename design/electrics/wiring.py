@@ -5,7 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
-from scanwright.design.catalogue.products import Circuits, Lidar, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Circuits
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of
 from scanwright.design.electrics.loads import (
     CHANGER,

@@ -27,7 +27,10 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from scanwright.design.arrays import Array, Counts, Setting
-from scanwright.design.catalogue.products import Lidar, Multibeam, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.products import Multibeam
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.density.ball_count import ball_count
 from scanwright.design.density.beams import ScanLines
 from scanwright.design.evaluation.as_built import seen_of

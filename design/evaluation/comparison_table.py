@@ -6,7 +6,8 @@ import csv
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from scanwright.design.catalogue.products import Multibeam, Product
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.products import Multibeam
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.comparison import AS_BUILT, SCANNERS, ComparisonRow, bought
 from scanwright.design.files.atomic_file import atomic_write

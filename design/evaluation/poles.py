@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.design.arrays import Array, Setting
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import scan_at
 from scanwright.design.errors import TaskError
 from scanwright.design.objective.problem import Problem

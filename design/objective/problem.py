@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from scanwright.design.arrays import Plane
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import NO_LEVER, ScanLines, beam_directions_rot, blind_zones, scan_lines
 from scanwright.design.density.sweep import SweepLines
 from scanwright.design.errors import BuildError, TaskError

@@ -7,7 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from scanwright.design.catalogue.catalogue import Catalogue
-from scanwright.design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import TaskError
 from scanwright.design.files.faults import Fault
 from scanwright.design.motion import Motion, Shortest, Spin, Sweep

@@ -20,7 +20,8 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.camera import Camera
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.deck_holes import DeckHoles
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 from scanwright.design.files.faults import Fault, faults_in, format_faults

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.concurrency.ahead import ahead
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.design.files.atomic_file import check_place

@@ -23,7 +23,7 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats, Rotation
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.assembly.beam_outcome import Verdict, beam_verdicts

@@ -12,7 +12,7 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Rotation, Vector
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import SlipRing
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.servo_plant import Load
 

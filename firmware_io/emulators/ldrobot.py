@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.world import spun_up, turned_deg

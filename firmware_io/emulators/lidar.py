@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging

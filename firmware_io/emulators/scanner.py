@@ -12,7 +12,7 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import SceneError
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import Scene, cast

@@ -23,7 +23,7 @@ from typing import Literal
 
 from scanwright.design.arrays import Floats
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.firmware_io.servo.bus.registers import RPM
 
 Mode = Literal["off", "share", "velocity", "position"]

@@ -10,7 +10,7 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.design.motion import Motion, Spin, Sweep
 from scanwright.design.scene.ray_caster import Scene

@@ -18,7 +18,7 @@ from numpy import ndarray
 from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats, Times
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import TaskError
 from scanwright.design.scene.ray_caster import Hits, Scene, build_scene, cast, load_scene
 

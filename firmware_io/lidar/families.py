@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import cache
 
 from scanwright.design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.installed import with_installed
 from scanwright.firmware_io.lidar.ldrobot.driver import open_ldrobot

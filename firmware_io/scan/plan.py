@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scanwright.design.angles import CALIBRATED, AngleSet, angles_in_use
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import RecordingError, ScanwrightError
 from scanwright.design.files.atomic_file import check_place, place_in
 from scanwright.design.motion import Motion, Spin

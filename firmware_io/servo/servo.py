@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import NoReturn, Self
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import DeviceError, DeviceFaultError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.servo.bus.bus import ServoAnswer
 from scanwright.firmware_io.servo.bus.registers import RPM

@@ -11,7 +11,9 @@ from pathlib import Path
 from scanwright.cad.layout.placement import placement_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import Catalogue
-from scanwright.design.catalogue.products import Lidar, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.electrics.cautions import data_fault
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2

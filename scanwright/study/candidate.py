@@ -13,7 +13,11 @@ from math import exp
 import numpy as np
 
 from scanwright.design.catalogue.catalogue import Catalogue
-from scanwright.design.catalogue.products import Bearing, Belt, Lidar, Product, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.products import Bearing, Belt
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import ScanwrightError, TaskError
 from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import gaps

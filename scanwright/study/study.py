@@ -12,7 +12,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
-from scanwright.design.catalogue.products import Lidar, Printer, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import TaskError, suggest
 from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record

@@ -7,7 +7,11 @@ import pytest
 
 from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
 from scanwright.design.catalogue.holes import HolePattern, mounting_holes
-from scanwright.design.catalogue.products import Lidar, Printer, Product, Servo, SlipRing
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.product_base import Product
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.catalogue.table import FIGURES, chosen, table_lines
 from scanwright.design.errors import TaskError
 

@@ -10,7 +10,8 @@ import pytest
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue import catalogue
 from scanwright.design.catalogue.catalogue import SHIPPED, load_catalogue
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
 from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator

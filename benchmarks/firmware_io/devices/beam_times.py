@@ -18,7 +18,7 @@ import numpy as np
 
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.samples import Scan
 

@@ -17,7 +17,8 @@ from itertools import cycle
 from benchmarks.firmware_io.devices.low_cost_cloud import scanned
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.progress import no_progress
 

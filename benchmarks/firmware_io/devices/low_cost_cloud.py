@@ -23,7 +23,7 @@ from scanwright import api
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.progress import Progress
 from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.clouds.ply import read_ply

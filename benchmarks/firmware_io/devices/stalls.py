@@ -21,7 +21,7 @@ import numpy as np
 
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.firmware_io.emulators import world
 from scanwright.firmware_io.emulators.lidar_line import Machine
 from scanwright.firmware_io.lidar import sensor_line

@@ -14,7 +14,7 @@ import trimesh
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.arrays import Floats, Mask
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import Scene, build_scene, cast
 from scanwright.firmware_io.emulators.world import furnished_room, rays

@@ -17,7 +17,7 @@ from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERV
 from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import measure_first
-from scanwright.design.catalogue.products import Product
+from scanwright.design.catalogue.product_base import Product
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import Scanner
 

@@ -42,7 +42,7 @@ from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.hub import BEARING_STEP
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import SlipRing
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from scanwright.cad.layout.belt.stack import PLATE_SCREW, BeltStack
 from scanwright.cad.layout.names import DRIVE_PLATE
 from scanwright.cad.screws import SCREWS, Screw, passing_hole
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 

@@ -20,7 +20,9 @@ from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height,
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
 from scanwright.cad.screws import SCREWS
-from scanwright.design.catalogue.products import Bearing, Belt, Printer, Servo, SlipRing
+from scanwright.design.catalogue.products import Bearing, Belt, Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 

@@ -29,7 +29,9 @@ import numpy as np
 from scanwright.cad.layout.hub import BEARING_STEP, Hub
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Bearing, Belt, Flange, Rotor, Servo
+from scanwright.design.catalogue.products import Bearing, Belt
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import Flange, Rotor
 
 GRUB = SCREWS["M3"]  # of the pulley on the shaft
 GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat

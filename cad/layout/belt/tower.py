@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from scanwright.cad import outlines
 from scanwright.cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, PLATE_SCREW, BeltStack
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
-from scanwright.design.catalogue.products import Flange
+from scanwright.design.catalogue.slip_ring import Flange
 from scanwright.design.scanner import Scanner
 
 DISC_SCREW = SCREWS["M3"]

@@ -16,7 +16,7 @@ from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.envelope import Box, box_corners
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array, Mask
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 
 BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens
 

@@ -8,7 +8,7 @@ from scanwright.cad.layout.direct.cage import FOOT_RADIUS, Ears, plate_half_x
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.names import SLIP_RING_ADAPTER
 from scanwright.cad.screws import SCREWS, passing_hole
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 

@@ -12,7 +12,8 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import CAGE_BASE
 from scanwright.cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
-from scanwright.design.catalogue.products import Bearing, Servo
+from scanwright.design.catalogue.products import Bearing
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 

@@ -16,7 +16,7 @@ from scanwright.cad.layout.hub import CUP_HUB_WALL
 from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE, horn_thread_mm
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.scanner import Scanner
 
 CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it

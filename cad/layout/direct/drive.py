@@ -19,7 +19,7 @@ from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Stati
 from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.screws import SCREWS
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 

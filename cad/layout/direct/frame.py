@@ -13,7 +13,7 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.names import SERVO_FRAME
 from scanwright.cad.screws import SCREWS, Screw, passing_hole
 from scanwright.design.catalogue.holes import what_holds
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 

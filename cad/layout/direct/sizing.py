@@ -16,7 +16,7 @@ from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 

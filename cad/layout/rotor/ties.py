@@ -18,7 +18,7 @@ from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan
 from scanwright.cad.layout.rotor.linkage import Ear, LinkageBody
 from scanwright.cad.layout.tie_seat import SLOT_ACROSS, TieSeat
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 

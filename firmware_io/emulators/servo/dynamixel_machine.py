@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.firmware_io.emulators.dynamics import HornMotion
 from scanwright.firmware_io.emulators.servo import dynamixel_groups as groups
 from scanwright.firmware_io.emulators.servo.dynamixel_control import count_of, show, wanted

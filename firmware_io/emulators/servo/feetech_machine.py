@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.firmware_io.emulators.dynamics import HornMotion
 from scanwright.firmware_io.emulators.servo import feetech_packets
 from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 
 _NEVER_NS = 1 << 62  # 146 years

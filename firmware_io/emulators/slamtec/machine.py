@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from scanwright.design.arrays import Floats, Times
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.slamtec import packets

@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.lidar.device_clock import DeviceClock, StampCounter
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.lidar.sick.dialogue import ColaDialogue, RefusedError
 

@@ -23,7 +23,8 @@ from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.angles import Angles
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Provenance, Servo
+from scanwright.design.catalogue.product_base import Provenance
+from scanwright.design.catalogue.servo import Servo
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import SCREWS
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import SlipRing
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
 

@@ -26,7 +26,8 @@ from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.design.catalogue.holes import Hole
-from scanwright.design.catalogue.products import Bearing, Servo
+from scanwright.design.catalogue.products import Bearing
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 
 degrees = st.floats(-90, 90)

@@ -39,7 +39,8 @@ from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import prism, upright
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.holes import Hole
-from scanwright.design.catalogue.products import Servo, SlipRing
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 
 

@@ -35,7 +35,8 @@ from scanwright.cad.solids import box, building
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.holes import Hole
-from scanwright.design.catalogue.products import Provenance, SlipRing
+from scanwright.design.catalogue.product_base import Provenance
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scans import simulated_scan
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import (
     ScanLines,
     beam_directions_rot,

@@ -7,7 +7,7 @@ import pytest
 from scans import count_at, simulated_scan
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import beam_directions_rot, is_closed, polar_and_azimuth, scan_lines
 from scanwright.design.density.spin import ball_search
 from scanwright.design.frames import R_world_rot

@@ -12,7 +12,7 @@ from scans import count_at, simulated_scan
 from scipy.spatial.transform import Rotation
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines
 from scanwright.design.density.phase_walk import sort_by_buckets
 from scanwright.design.density.spin import ball_search, mean_count, zones

@@ -11,7 +11,7 @@ from quick_tests import samples
 from scipy.spatial.transform import Rotation
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
 from scanwright.design.density.spin import zones
 from scanwright.design.errors import TaskError

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar as Lidar
+from scanwright.design.catalogue.lidar import Lidar as Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
 from scanwright.firmware_io.emulators.lidar import LidarEmulator

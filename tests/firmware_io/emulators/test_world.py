@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scanwright.design import frames
 from scanwright.design.angles import STANDARD_DEG, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.design.scene.ray_caster import Hits, build_scene, cast
 from scanwright.firmware_io.assembly.deskew import place

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.lidar import families, sensor_line
 from scanwright.firmware_io.lidar.families import family_of, open_lidar

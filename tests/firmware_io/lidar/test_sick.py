@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io.emulators.sick.cola_emulator import SickEmulator, SickMachine
 from scanwright.firmware_io.lidar.families import open_lidar

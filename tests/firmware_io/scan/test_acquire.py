@@ -22,7 +22,7 @@ from quick_tests import samples
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.design.motion import Spin, StopAndGo, Sweep
 from scanwright.design.scene.ray_caster import cast

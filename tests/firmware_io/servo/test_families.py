@@ -1,7 +1,7 @@
 """The families of servos, and their products."""
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.firmware_io.servo import families
 
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.emulators.servo import feetech_packets
 from scanwright.firmware_io.emulators.servo.machine import answers

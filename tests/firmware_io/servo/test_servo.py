@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from patience import until
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Servo
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.emulators.servo.dynamixel_packets import packet_2, status
 from scanwright.firmware_io.servo import guard

@@ -10,7 +10,8 @@ import sys
 import pytest
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Lidar, Servo
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import TaskError
 from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
 from scanwright.design.task.task import load_task

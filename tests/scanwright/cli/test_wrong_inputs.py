@@ -98,7 +98,7 @@ def test_turns_without_end(refused):
 @pytest.mark.parametrize("noise", [np.inf, np.nan, -1.0])
 def test_noise_without_end(noise):
     from scanwright.design.catalogue.catalogue import load_catalogue
-    from scanwright.design.catalogue.products import Lidar
+    from scanwright.design.catalogue.lidar import Lidar
 
     with pytest.raises(TaskError, match=r"noise (inf|nan|-1\.0) mm: 0 to 100000"):
         range_model(load_catalogue().get("UTM-30LX", Lidar), noise)

@@ -1,0 +1,100 @@
+"""What all records of the catalogue share: provenance, known errors, cables. Millimetres, grams."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PrivateAttr
+from pydantic_core import to_jsonable_python
+
+from scanwright.design.catalogue.known_error import KnownError
+from scanwright.design.files.record import Record
+
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+Box = tuple[Triple, Triple]
+UsbId = Annotated[str, Field(pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")]
+
+
+def absent(value: object) -> bool:
+    """Return whether a field that shapes parts is left out of the record, so that others keep their digest."""
+    return value is None
+
+
+class Provenance(Record):
+    """Where a value comes from. `verified` means: two independent sources, or a drawing of the maker."""
+
+    source: str
+    verified: bool
+
+
+class Product(Record):
+    """Base of the catalogue records: name, maker, the provenance of each value, and the values known to be wrong."""
+
+    kind: str
+    name: str
+    maker: str
+    known_wrong: tuple[KnownError, ...] = Field(default=(), exclude=True, description="shapes no part")
+    _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
+
+    def provenance(self) -> dict[str, Provenance]:
+        """Source of each value, by field name."""
+        return self._provenance
+
+    def unverified(self) -> list[str]:
+        """Names of the values that are not verified."""
+        return [field for field, origin in self._provenance.items() if not origin.verified]
+
+    def caution(self, field: str) -> str:
+        """Return what a message adds behind an unverified value; empty if it is verified."""
+        origin = self._provenance.get(field)
+        return "" if origin is None or origin.verified else " (not verified: measure yours)"
+
+    def misfit(self) -> list[str]:
+        """A warning that printed parts will not fit this product, a line for each reason below it; empty if they do."""
+        reasons = [f"  {error.words(self)}" for error in self.known_wrong if not error.fits]
+        return [f"{self.name}: parts printed for it will not fit the real device:", *reasons] if reasons else []
+
+    def facts(self) -> dict[str, Any]:
+        """Every value, and under `provenance` where it comes from, for a program to read."""
+        sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
+        values = {field: to_jsonable_python(getattr(self, field)) for field in type(self).model_fields}
+        return {**values, "provenance": sources}
+
+    def lines(self) -> list[str]:
+        """Every value with its source, in words."""
+        values = []
+        for field, origin in self._provenance.items():
+            value = json.dumps(to_jsonable_python(getattr(self, field)))
+            values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
+        wrong = [f"  ! {error.words(self)}   [{error.source}]" for error in self.known_wrong]
+        mark = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
+        known = ["  ! does not agree with the real device"] if wrong else []
+        return [f"{self.name} ({self.maker})", *values, *wrong, mark, *known]
+
+
+Rating = Literal["usb2", "ethernet100", "none"]
+Link = Literal["usb", "usb-powered", "ethernet", "serial"]
+
+
+class Lead(Record):
+    """One wire of a power lead. A net that has several colours differs from one revision of the cable to the next."""
+
+    net: Literal["+", "-"]
+    colour: str
+
+
+class TiedPin(Record):
+    """A pin that must be joined to another pin of the same plug if nothing drives it."""
+
+    pin: str
+    to: str
+
+
+class Circuits(Record):
+    """Equal circuits of a slip ring; a circuit for signals has less noise, not less current."""
+
+    count: int = Field(gt=0)
+    amps: float = Field(gt=0)
+    use: Literal["power", "signal", "any"]

@@ -1,0 +1,82 @@
+"""Records of slip rings. Millimetres, grams."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from scanwright.design.catalogue.product_base import (
+    Circuits,
+    Pair,
+    Product,
+    Rating,
+    absent,
+)
+from scanwright.design.files.record import Record
+
+
+class Flange(Record):
+    """The flange of a capsule, by which its stator is held; mm."""
+
+    diameter_mm: float = Field(gt=0)
+    thickness_mm: float = Field(gt=0)
+    below_top_mm: float = Field(ge=0, description="of its face towards the rotor below the body's end there")
+    circle_mm: float = Field(gt=0)
+    holes: int = Field(gt=1)
+    hole_mm: float = Field(gt=0)
+    screw: Literal["M2.5", "M3", "M4", "M5"]
+
+
+class Rotor(Record):
+    """The stub of a capsule's rotor, out of which its leads come; mm."""
+
+    diameter_mm: float = Field(gt=0)
+    length_mm: float = Field(gt=0)
+
+
+class SlipRing(Product):
+    """A slip ring; `bore_mm = 0` is a capsule, `length_mm` that of its body, and it needs `flange` and `rotor`."""
+
+    kind: Literal["slip_ring"]
+    bore_mm: float = Field(ge=0)
+    outer_diameter_mm: float = Field(gt=0)
+    length_mm: float = Field(gt=0)
+    mass_g: float = Field(gt=0)
+    max_rpm: float | None = Field(default=None, gt=0)
+    circuits: str
+    ways: tuple[Circuits, ...] | None = Field(
+        default=None, exclude=True, description="circuits by current; shapes no part"
+    )
+    lead_diameter_mm: float | None = Field(
+        default=None, gt=0, exclude=True, description="of the bundle that goes to one outlet; shapes no part"
+    )
+    lead_bend_radius_mm: float | None = Field(
+        default=None, gt=0, exclude=True, description="least one of its middle; shapes no part"
+    )
+    stator_exit: Literal["side", "end"] | None = Field(
+        default=None, exclude=True, description="where the stator's leads leave, at its lower end; shapes no part"
+    )
+    price_usd: float | None = Field(default=None, gt=0)
+    friction_nm: Pair | None = Field(
+        default=None, exclude_if=absent, description="drag of its brushes and seals, least and most"
+    )
+    data: Rating | None = Field(default=None, exclude=True, description="fastest data it is rated for; shapes no part")
+    flange: Flange | None = Field(default=None, exclude_if=absent)
+    rotor: Rotor | None = Field(default=None, exclude_if=absent)
+
+    @model_validator(mode="after")
+    def _capsules_have_a_flange(self) -> SlipRing:
+        if self.bore_mm > 0:
+            return self
+        if self.flange is None or self.rotor is None:
+            raise ValueError("bore_mm = 0 is a capsule: tell its flange and rotor, or take a through bore (12.7 mm)")
+        if self.flange.circle_mm + self.flange.hole_mm > self.flange.diameter_mm:
+            raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} leaves no edge around its holes")
+        if self.flange.circle_mm - self.flange.hole_mm < self.outer_diameter_mm:
+            raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} puts its holes into outer_diameter_mm")
+        if self.flange.below_top_mm + self.flange.thickness_mm > self.length_mm:
+            raise ValueError(f"flange.below_top_mm {self.flange.below_top_mm:g} lies beyond length_mm")
+        if self.rotor.diameter_mm >= self.outer_diameter_mm:
+            raise ValueError(f"rotor.diameter_mm {self.rotor.diameter_mm:g} is not below outer_diameter_mm")
+        return self
