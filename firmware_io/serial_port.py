@@ -43,7 +43,7 @@ def open_serial_port(port: str, baud: int, read_timeout_s: float | None = None) 
         opened = _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=_WRITE_S)
         _keep_lines_on_close(opened.fileno())
         return opened
-    except (OSError, ValueError) as error:  # pyserial's own are OSErrors
+    except (OSError, ValueError, termios.error) as error:  # pyserial's own are OSErrors
         raise DeviceError(_why_not_opened(port, error)) from error
 
 

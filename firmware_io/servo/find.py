@@ -154,7 +154,7 @@ def _any_table(packets: PacketFormat) -> ControlTable:
 
 
 def _identity(unit: ServoUnit) -> ControlTable | int | None:
-    """The table of a servo that answers; its model number where nobody knows that; None where it tells none.
+    """The table of a servo that answers; its model number if that is unknown; None if it has none.
 
     Families that share a form of packets read each other's registers as numbers of models. So a servo must have its own
     id, too, where the table says.

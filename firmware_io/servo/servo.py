@@ -98,6 +98,8 @@ class ServoDriver:
             trouble = error
         self._bus.close()
         answered = self._guard.dismiss(at_rest=trouble is None)  # which tries longer
+        if isinstance(trouble, UnsafeError):  # the guard's packet is the one that had no effect
+            raise trouble
         if trouble and not answered:
             raise UnsafeError(f"{self}: could not be stopped: cut its power ({trouble})") from trouble
         if trouble and not isinstance(trouble, DeviceError):
@@ -272,7 +274,7 @@ class ServoDriver:
         if self._unit.has_torque():  # a late goal turns the torque of a Feetech on again
             self._unit.write(self._table.torque, 0)
             if self._unit.has_torque():
-                raise DeviceError(f"{self}: its torque stays on: cut its power")
+                raise UnsafeError(f"{self}: its torque stays on: cut its power")
         self._rest()
 
     def _here(self) -> float:

@@ -189,7 +189,7 @@ class SlamtecLidar(LineDriver):
         series = SERIES.get(info.model >> 4)
         if series is None or model not in (None, series.model):
             other = f"a model {info.model:#04x} of Slamtec's" if series is None else f"a {series.model}"
-            raise DeviceError(f"{self._line.name}: this is {other}, not a {model}")
+            raise DeviceError(f"{self._line.name}: this is {other}, {f'not a {model}' if model else 'not supported'}")
         if self.serial_number not in ("", info.serial_number):
             raise DeviceError(f"{self._line.name}: this is {info.serial_number}, not {self.serial_number}")
         self._motor = series.motor

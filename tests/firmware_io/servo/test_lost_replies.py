@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import DeviceError, UnsafeError
 from scanwright.firmware_io.scan.scan_summary import ScanSummary
 from scanwright.firmware_io.servo import guard, servo
 from scanwright.firmware_io.servo.servo import open_servo
@@ -86,6 +86,8 @@ def test_torque_that_stays_on_is_an_error(opened):
     bus.write = stuck
     with pytest.raises(DeviceError, match="its torque stays on: cut its power"):
         driver.release()
+    with pytest.raises(UnsafeError, match="its torque stays on: cut its power"):
+        driver.close()  # the watchdog's packet is the same, and has no more effect
 
 
 def test_the_examples_of_the_maker_move_a_horn_without_writing_its_torque(virtual_bus):
