@@ -67,19 +67,19 @@ class Scan:
     def __post_init__(self) -> None:
         for name, low, high in _SCAN_BOUNDS:
             if not low <= (value := getattr(self, name)) <= high:
-                raise RecordingError(f"scan: {name} = {value}: {low:g} to {high:g}")
+                raise RecordingError(f"scans: {name} = {value}: {low:g} to {high:g}")
         if self.beam_bearing_rad is not None or self.beam_offset_ns is not None:
             self._check_beams(self.beam_bearing_rad, self.beam_offset_ns)
 
     def _check_beams(self, bearing_rad: Float64[ndarray, " k"] | None, offset_ns: Int64[ndarray, " t"] | None) -> None:
         if bearing_rad is None or offset_ns is None or not bearing_rad.shape == offset_ns.shape == self.range_m.shape:
-            raise RecordingError(f"scan: {self.range_m.size} ranges, and not as many bearings and times of beams")
+            raise RecordingError(f"scans: {self.range_m.size} ranges, and not as many bearings and times of beams")
         if not (np.abs(bearing_rad) <= _TURNS_RAD).all():
-            raise RecordingError(f"scan: the bearing of a beam is no number, or beyond {_TURNS_RAD:g} rad")
+            raise RecordingError(f"scans: the bearing of a beam is no number, or beyond {_TURNS_RAD:g} rad")
         if offset_ns.size and not (offset_ns[0] >= 0 and (np.diff(offset_ns) >= 0).all()):
-            raise RecordingError("scan: the time of a beam is before that of the one before it")
+            raise RecordingError("scans: the time of a beam is before that of the one before it")
         if offset_ns.size and offset_ns[-1] > _LONGEST_TURN_NS:
-            raise RecordingError(f"scan: a turn of {offset_ns[-1] / 1e9:.1f} s: at most {_LONGEST_TURN_NS / 1e9:g}")
+            raise RecordingError(f"scans: a turn of {offset_ns[-1] / 1e9:.1f} s: at most {_LONGEST_TURN_NS / 1e9:g}")
 
     @property
     def bearing_rad(self) -> Float64[ndarray, " beams"]:
@@ -195,7 +195,7 @@ class JointLog:
     def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
         """Angle [rad] at each time, straight between samples, shape (n,).
 
-        Outside the log it is NaN: where the axis was before the first and after the last sample nobody knows.
+        Outside the log it is NaN: where the axis was before the first and after the last sample is unknown.
         """
         if not time_ns.size:
             return np.empty(0)

@@ -51,13 +51,24 @@ class OneClock:
     note: str
 
 
-def one_clock(scans: Stamps, angles: Stamps) -> OneClock:
-    """Choose the times of scans and angles, each shape (n,)."""
+def one_clock(scans: Stamps, angles: Stamps, arc_ns: Int64[ndarray, " scans"]) -> OneClock:
+    """Choose the times of scans and angles, each shape (n,).
+
+    Stamps after their receipt are from another clock. If both sources share that clock, their stamps agree and stay;
+    if they differ, the receipt decides, for a scan less the time from its first to its last beam.
+
+    Args:
+        scans: times of the scans.
+        angles: times of the angles.
+        arc_ns: from the first to the last beam of each scan, shape (n,).
+    """
     ahead_s = [_ahead_s(stamps) if stamps.complete() else 0.0 for stamps in (scans, angles)]
-    if max(ahead_s) > _AHEAD_S and max(ahead_s) < 1e-9 * _SAME_CLOCK_NS and _overlap(scans.stamp_ns, angles.stamp_ns):
+    after_arc_s = ahead_s[0] + 1e-9 * float(np.median(arc_ns)) if len(arc_ns) else ahead_s[0]
+    ahead = _AHEAD_S < max(ahead_s) < 1e-9 * _SAME_CLOCK_NS
+    if ahead and abs(after_arc_s - ahead_s[1]) > _AHEAD_S and _overlap(scans.stamp_ns, angles.stamp_ns):
         subject = "scans" if ahead_s[0] >= ahead_s[1] else "angles"
         note = f"the stamps of {subject} lie {max(ahead_s):.3f} s after they were received: another clock"
-        return OneClock(scans.receive_ns, angles.receive_ns, note + _RECEIPT)
+        return OneClock(scans.receive_ns - arc_ns, angles.receive_ns, note + _RECEIPT)
     if scans.complete() and angles.complete() and _overlap(scans.stamp_ns, angles.stamp_ns):
         return OneClock(scans.stamp_ns, angles.stamp_ns, "")
     if scans.on_host_clock() and not angles.complete():

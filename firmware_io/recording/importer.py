@@ -155,7 +155,7 @@ def import_bag(
         increment_s = _time_increment_s(headers, corrections)
         stated_s = headers.time_increment_s if increment_s is None else increment_s
         arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
-        clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps), survey, arc_ns, corrections)
+        clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps, arc_ns), survey, arc_ns, corrections)
         in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
         if not in_time.any():
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"

@@ -43,7 +43,9 @@ def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
     inner = np.arange(_REACH, count - _REACH)
     near = [k for k in range(-_REACH, _REACH + 1) if k]
     apart = np.stack([_wrapped(position_rad[inner + k] - position_rad[inner]) for k in near])
-    off[inner] = np.abs(np.median(apart, axis=0))
+    # Differences of about half a turn have both signs, which cancel in a median.
+    half_turn = np.abs(apart).min(axis=0) > np.pi / 2
+    off[inner] = np.where(half_turn, np.median(np.abs(apart), axis=0), np.abs(np.median(apart, axis=0)))
     usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
     limit = max(_LEAST_RAD, _STEPS * usual, _SIGMAS * 1.4826 * float(np.median(off[inner])))
     wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)

@@ -37,6 +37,8 @@ def clock_findings(
     if not (scans.complete() and angles.complete()):
         return
     scan_s, angle_s = _delay_s(scans), _delay_s(angles)
+    if not one_message:  # both ahead of the receiver by the same: they agree
+        scan_s = scan_s - min(float(np.quantile(angle_s, 0.05)), 0.0)
     least_s, arc_s = float(np.quantile(scan_s, 0.05)), float(np.median(arc_ns)) / 1e9
     if least_s < -_JITTER_S:
         yield _warning("scan_stamps_late", "scans", -least_s, speed_rad_s, f"stamps lie {-least_s:.4g} s after receipt",

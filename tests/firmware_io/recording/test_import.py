@@ -175,7 +175,11 @@ def test_topics_that_shall_come_along_do(bag, tmp_path):
     poses = load_trajectory("/pose", recording)
     assert poses.time_ns.tolist() == [START + k * SECOND for k in range(3)]
     np.testing.assert_array_equal(poses.position_m, [[0, 2, 3], [1, 2, 3], [2, 2, 3]])
-    for also, says in (("/scan", "a topic of its own"), ("/odom", "no topic '/odom'"), ("/own", "no type that comes")):
+    for also, says in (
+        ("/scan", "already has a topic of this name"),
+        ("/odom", "no topic '/odom'"),
+        ("/own", "no type that comes"),
+    ):
         with pytest.raises(RecordingError, match=says):
             import_to(bag.path, tmp_path / "no.mcap", also=[also], scan="/scan", angle="/joint", angle_unit="rad")
 

@@ -146,3 +146,9 @@ def test_outliers_are_neither_turning_points_nor_steps_of_an_axis_that_stops():
         spiked = angle.copy()
         spiked[[50, 51, 90]] += [1.0, 1.0, -2.0]
         assert {50, 51, 90} >= set(np.flatnonzero(outliers(spiked)[0]).tolist()) >= {90}
+
+
+def test_an_outlier_of_half_a_turn_is_one():
+    angle = 0.01 * np.arange(3000)
+    angle[1500] += np.pi
+    assert np.flatnonzero(outliers(angle)[0]).tolist() == [1500]

@@ -112,7 +112,7 @@ def test_points_of_a_turn_have_no_place_in_a_frame_that_turns(tmp_path, domain):
     (tmp_path / "angles.json").write_text(ANGLES.to_json())
     words = ("ros2", tmp_path, "--recording", tmp_path / "r.mcap", "--points-per", "turn", "--points-in", "rot")
     refused = started("-m", "scanwright", *words, domain=domain, stderr=subprocess.PIPE)
-    assert "a turn has no place in a frame that turns" in refused.communicate(timeout=BOUND_S)[1]
+    assert "a frame that rotates cannot hold the points of a turn" in refused.communicate(timeout=BOUND_S)[1]
     assert refused.returncode == 2
 
 
@@ -137,7 +137,7 @@ def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_p
             node.send_signal(signal.SIGINT)
             told = node.communicate(timeout=BOUND_S)[1]
             assert node.returncode == 130, told
-            assert "stopped, as a parameter asks" in told
+            assert "stopped by a parameter" in told
         finally:
             emulators.terminate()
     found = np.load(tmp_path / "found.npz")
