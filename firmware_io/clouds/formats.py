@@ -17,7 +17,7 @@ from typing import Any, Literal
 from scanwright.design.errors import RecordingError, require, suggest
 from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.clouds.cloud import Cloud
-from scanwright.firmware_io.foreign import of_file
+from scanwright.firmware_io.foreign import foreign, of_file
 from scanwright.firmware_io.installed import with_installed
 
 GROUP = "scanwright.cloud_formats"
@@ -79,7 +79,7 @@ def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
         raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes a cloud of a recording")
     module = _module(_format(path), path)
     with of_file(path):
-        clouds: tuple[list[Cloud], list[str]] = module.read(path)
+        clouds: tuple[list[Cloud], list[str]] = foreign(f"{path}: damaged", module.read, path)
     return clouds
 
 

@@ -152,7 +152,7 @@ def _header(path: Path, data: bytes) -> PcdHeader:
         raise RecordingError(f"{path}: COUNT {max(field.count for field in fields)}: more than the bytes of the file")
     least = 2 * sum(field.count for field in fields) if header.encoding == "ascii" else header.layout.itemsize
     room = (len(data) - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)
-    if not 0 < rows == header.rows or rows * least > room + 1:
+    if not 0 < rows == header.rows or rows * least > room + (header.encoding == "ascii"):
         raise RecordingError(
             f"{path}: POINTS {rows}, HEIGHT {height}, WIDTH {width} of {header.layout.itemsize} bytes each announced, "
             f"{len(data) - header.start} bytes there"

@@ -190,9 +190,11 @@ def read_header(path: Path) -> PlyHeader:
                 pass
             case ["element", name, count] if count.isdecimal() and len(count) <= _DIGITS:
                 elements.append(PlyElement(name, int(count), {}))
-            case ["property", kind, name] if kind in _TYPES and elements and name not in elements[-1].properties:
-                elements[-1].properties[name.lower() if name in ("X", "Y", "Z") else name] = _TYPES[kind]
-            case ["property", "list", length, kind, name] if {length, kind} <= set(_TYPES) and elements:
+            case ["property", kind, name] if kind in _TYPES and elements and _key(name) not in elements[-1].properties:
+                elements[-1].properties[_key(name)] = _TYPES[kind]
+            case ["property", "list", length, kind, name] if (
+                _TYPES.get(length, "f")[0] in "iu" and kind in _TYPES and elements
+            ):
                 elements[-1].properties[name] = _TYPES[length], _TYPES[kind]
             case [] | ["comment" | "obj_info", *_]:
                 pass
@@ -211,6 +213,10 @@ def read_header(path: Path) -> PlyHeader:
         names = " ".join(header.vertex.properties)[:200]
         raise RecordingError(f"{path}: the properties of vertex are {names}; a cloud has x y z and no lists")
     return header
+
+
+def _key(name: str) -> str:
+    return name.lower() if name in ("X", "Y", "Z") else name
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
@@ -249,9 +255,12 @@ def _end_of(path: Path, element: PlyElement, start: int, order: str) -> int:
                     stream.seek(np.dtype(kind).itemsize, 1)
                     continue
                 data = stream.read(np.dtype(kind[0]).itemsize)
-                if not data:
+                if len(data) < np.dtype(kind[0]).itemsize:
                     raise RecordingError(f"{path}: cut off in row {row} of {element.name}")
-                stream.seek(int(np.frombuffer(data, order + kind[0])[0]) * np.dtype(kind[1]).itemsize, 1)
+                count = int(np.frombuffer(data, order + kind[0])[0])
+                if count < 0:
+                    raise RecordingError(f"{path}: row {row} of {element.name}: a list of {count}")
+                stream.seek(count * np.dtype(kind[1]).itemsize, 1)
         return stream.tell()
 
 

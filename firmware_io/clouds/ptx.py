@@ -9,7 +9,7 @@ import numpy as np
 
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.text_files import read_text
-from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.cloud import Cloud, as_type
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign
 
@@ -21,7 +21,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """Read all scans of a file."""
     lines = foreign(f"{path}: cannot read", read_text, path).splitlines()
     clouds, begin = [], 0
-    while begin < len(lines):
+    while any(line.strip() for line in lines[begin:]):
         sizes = [line.strip() for line in lines[begin : begin + 2]]
         if len(sizes) < 2 or not all(size.isdecimal() and len(size) < 10 for size in sizes):
             raise RecordingError(
@@ -39,7 +39,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         points_m = np.where((values[:, :3] == 0).all(axis=1)[:, None], np.nan, values[:, :3])
         further = {"intensity": values[:, 3].astype(np.float32)} if values.shape[1] > 3 else {}
         if values.shape[1] == 7:
-            further |= {name: values[:, 4 + k].astype(np.uint8) for k, name in enumerate(_COLOURS)}
+            further |= {name: as_type(values[:, 4 + k], np.dtype("u1")) for k, name in enumerate(_COLOURS)}
         clouds.append(Cloud(points_m, further, (columns, rows), np.ascontiguousarray(matrix.T)))
         begin = first + columns * rows
     return clouds, []

@@ -197,3 +197,28 @@ def test_a_package_adds_a_format(tmp_path, monkeypatch):
         formats.all_formats.cache_clear()
         sys.modules.pop("acme_clouds", None)
     assert wrote.notes == ("ACME rounds to 1 mm",)
+
+
+IMPOSSIBLE = (
+    b"ply\nformat binary_little_endian 1.0\nelement face %d\nproperty list %s uchar a\nelement vertex 1\n"
+    + b"".join(b"property float %s\n" % axis for axis in (b"x", b"y", b"z"))
+)
+
+
+@pytest.mark.parametrize(
+    ("rows", "length", "body"), [(10**20, b"char", b"\xff" * 64), (3, b"double", bytes(64)), (5, b"int", b"\0" * 6)]
+)
+def test_a_binary_ply_with_impossible_lists_is_one_line(tmp_path, rows, length, body):
+    (tmp_path / "a.ply").write_bytes(IMPOSSIBLE % (rows, length) + b"end_header\n" + body)
+    with pytest.raises(RecordingError, match=r"a\.ply: "):
+        read_clouds(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize(("cut", "count"), [(1, 1), (0, 10**12)])
+def test_a_pcd_that_is_cut_or_announces_too_much_is_one_line(tmp_path, cut, count):
+    head = (
+        f"VERSION .7\nFIELDS x y z w\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 {count}\nWIDTH 4\nHEIGHT 1\nDATA binary\n"
+    )
+    (tmp_path / "a.pcd").write_bytes(head.encode() + bytes(64 - cut))
+    with pytest.raises(RecordingError, match=r"a\.pcd: "):
+        read_clouds(tmp_path / "a.pcd")
