@@ -15,6 +15,7 @@ HOW = {
     "horn_thread_depth_mm": "measure the depth with a wire",
     "fit_clearance_mm": "print the fit coupon",
     "screw_clearance_mm": "print the fit coupon",
+    "friction_nm": "hang a weight on a lever at the free ring, and note where it turns",
     "mass_g": "weigh yours",
 }
 

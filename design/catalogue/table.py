@@ -113,9 +113,9 @@ def chosen(
     max_mass_g: float | None = None,
     max_price_usd: float | None = None,
 ) -> list[Product]:
-    """The products that keep every bound that is given; a product whose figure nobody knows keeps none on it.
+    """The products that keep every bound that is given; a product whose figure is unknown keeps none on it.
 
-    `min_range_m` is asked of the practical range, which is the stated one where nobody knows better.
+    `min_range_m` is asked of the practical range, which is the stated one if unknown better.
     """
 
     def at_most(product: Product, field: str, most: float | None) -> bool:

@@ -73,7 +73,7 @@ class ComparisonRow:
         layers: circles about the axis on which beams run: beams of the 2D lidar, lasers of a multibeam.
         points_per_s: measurements per second; as the maker states it for a multibeam.
         range_stated_m: farthest, as the maker of the lidar states it; None for a multibeam, whose catalogue has none.
-        range_practical_m: farthest that users of the lidar get, as stated where nobody knows; None likewise.
+        range_practical_m: farthest that users of the lidar get, as stated if unknown; None likewise.
         range_sigma_mm: noise of one range; None likewise.
         beams_per_ball: exp(-J) - 1, the geometric mean; None for an objective that is no logarithm.
         beams_per_ball_per_usd: None as well where a price is not known.

@@ -39,7 +39,7 @@ def table(rows: list[ComparisonRow]) -> list[str]:
 
 
 def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
-    """What the columns mean, whose J says nothing, and which numbers of all that is compared nobody has verified."""
+    """What the columns mean, whose J says nothing, and which numbers are unverified."""
     ball = loaded.task.density.ball_radius_deg
     names = {row.name for row in rows}
     blind = dict.fromkeys(row.name for row in rows if row.blind_weight == 1)
@@ -56,7 +56,7 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
         "gap: widest between neighbouring scan lines or layers, inside of what is seen",
         "beams: within the ball, exp(-J) - 1, the geometric mean; per USD: over the price; ? for another objective",
         "range, noise: of the 2D lidar as its maker states them, one standard deviation; ? for ready-made scanners",
-        "practical: the range [m] that users of the 2D lidar get; the stated one where nobody knows",
+        "practical: the range [m] that users of the 2D lidar get; the stated one if unknown",
         "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
         "ready-made scanners stand upright; one tilt (pitch or roll) and Bonn (twist) are tuned to this task",
         f"{' and '.join(SCANNERS)}: scanners of the shipped tasks of that name, their products, motion and angles",
@@ -74,7 +74,7 @@ def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
 
 
 def _doubted(product: Product) -> list[str]:
-    """Values in the table that nobody has verified."""
+    """Unverified values in the table."""
     return [field for field in product.unverified() if field in IN_THE_TABLE]
 
 

@@ -61,14 +61,23 @@ def require_counted(
             _require_log(loaded, angles_rad)
         return
     J, J_error, points = _counted(loaded, angles_rad, shadow, lever)
-    if J != result.J and abs(J - result.J) > result.J_error + J_error:
+    if not np.isfinite(J_error):  # a set of directions without beams: only the objective `log` is finite then
+        if shadow is None and lever == NO_LEVER:
+            _require_log(loaded, angles_rad)
+        return
+    if not _agree(J, result, J_error):
         again = counted_J(loaded, angles_rad, AGAIN * points, AGAIN * points, SETS, shadow=shadow, lever=lever)
         J, J_error = again.J, SURE * again.J_error
-    if J != result.J and abs(J - result.J) > result.J_error + J_error:
+    if not _agree(J, result, J_error):
         raise NumericalError(
             f"J = {result.J:.6g} +- {result.J_error:.1g}, "
             f"but a count over simulated beams gives {J:.6g} +- {J_error:.1g}"
         )
+
+
+def _agree(J: float, result: Score, J_error: float) -> bool:
+    """Return whether a count and a score agree; NaN agrees with nothing."""
+    return J == result.J or abs(J - result.J) <= result.J_error + J_error
 
 
 def _counted(
