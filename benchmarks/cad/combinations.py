@@ -33,6 +33,7 @@ from scanwright.design.scanner import scanner_of
 
 TILTED = (0.0, 31.0, 6.0, 15.0)
 SAME_MM = 2.1  # slots take a screw this far from its place
+EXACT_MM = 0.01  # rounding
 
 
 def main(angles: tuple[float, ...] = TILTED) -> None:
@@ -41,7 +42,7 @@ def main(angles: tuple[float, ...] = TILTED) -> None:
     lidars = [one.name for one in catalogue if isinstance(one, Lidar)]
     servos = [one.name for one in catalogue if isinstance(one, Servo)]
     rings = [None, *(one.name for one in catalogue if isinstance(one, SlipRing))]
-    laid_out: defaultdict[tuple[str, str | None], list[str]] = defaultdict(list)
+    fits: defaultdict[tuple[str, str | None], list[str]] = defaultdict(list)
     refused, misses = Counter[str](), Counter[str]()
     for lidar, servo, ring in itertools.product(lidars, servos, rings):
         try:
@@ -50,12 +51,12 @@ def main(angles: tuple[float, ...] = TILTED) -> None:
         except BuildError as error:
             refused[f"{servo} with {ring}: {_general(str(error), lidar)}"] += 1
         else:
-            laid_out[servo, ring].append(lidar)
-    accepted = sum(map(len, laid_out.values()))
+            fits[servo, ring].append(lidar)
+    accepted = sum(map(len, fits.values()))
     print(f"{accepted} of {accepted + refused.total()} laid out, at {angles}; {misses.total()} screws meet no hole")
-    for (servo, ring), lidars in laid_out.items():
-        named = "every lidar" if len(lidars) == len(lidars) else ", ".join(lidars)
-        print(f"  {servo} with {ring}: {len(lidars)}: {named}")
+    for (servo, ring), fit in fits.items():
+        named = "every lidar" if len(fit) == len(lidars) else ", ".join(fit)
+        print(f"  {servo} with {ring}: {len(fit)}: {named}")
     for reason, count in refused.most_common():
         print(f"  refused {count}: {reason}")
     for miss, count in misses.most_common():
@@ -91,7 +92,8 @@ def screws_without_a_hole(layout: Layout) -> Iterator[str]:
 def _misses(joint: Joint, start: Array, holes: list[Hole]) -> Iterator[str]:
     fit = [hole for hole in holes if hole.kind in USABLE and hole.size == joint.screw.name]
     for x, y, _ in start:
-        near = [hole for hole in fit if np.hypot(x - hole.at_mm[0], y - hole.at_mm[1]) < SAME_MM]
+        reach_mm = SAME_MM if joint.slot_mm else EXACT_MM
+        near = [hole for hole in fit if np.hypot(x - hole.at_mm[0], y - hole.at_mm[1]) < reach_mm]
         if not near:
             yield f"{joint.part} on {joint.onto}: no hole for {joint.screw.name} at ({x:.1f}, {y:.1f})"
         elif near[0].kind != "through" and joint.length_mm - joint.grip_mm > near[0].depth_mm:

@@ -55,7 +55,7 @@ def rotor_weight(scanner: Scanner, stack: Hub, bodies: Mapping[str, Inertial]) -
 
 
 def off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
-    """How far the rotor's centre of mass may be off across the axis, as nobody tells that of the lidar."""
+    """How far the rotor's centre of mass may be off across the axis, since that of the lidar is undocumented."""
     lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
     return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
 

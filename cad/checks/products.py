@@ -17,6 +17,7 @@ from scanwright.design.scanner import Scanner
 SHAPING = {
     "lidar.holes": "the screws of the lidar",
     "printer.screw_clearance_mm": "every screw hole",
+    "slip_ring.friction_nm": "whether there is a counterweight",
     "servo.holes": "the screws of the servo's case",
 }
 SHOWN_CHARS = 60  # of a value in a message; a longer one is cut

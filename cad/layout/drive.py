@@ -1,6 +1,6 @@
 """How the servo turns the shaft, as data: a list of stations along the axis, and what each kind of drive adds.
 
-Rotation frame at gamma = 0, mm. Only `drive_of` in `cad/layout/layout.py` knows which drives there are; each fills a
+Rotation frame at gamma = 0, mm. Only `drive_of` in `cad/layout/placement.py` knows which drives there are; each fills a
 `DriveLayout` in a separate folder (`direct/`, `belt/`), and all other code reads it.
 """
 

@@ -22,7 +22,7 @@ from scanwright.design.task.equivalent_settings import BOUNDS, advice
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
 SUB_PLATE_THICKNESS = 4.0
-SLOT_TRAVEL = 2.0  # to either side of where a screw of the lidar is said to sit, and nobody has verified it
+SLOT_TRAVEL = 2.0  # to either side of where a screw of the lidar is stated to be, unverified
 SLOT_WALL = 2.0  # that such a slot leaves at the edge of the plate, around a normal hole
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
 EAR_HALF_WIDTH = 10.0

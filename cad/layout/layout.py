@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from scanwright.cad.layout.cables.fixed import FixedCable, fixed_cables_of
 from scanwright.cad.layout.cables.leads import RotorLead, leads_of
 from scanwright.cad.layout.cables.obstacles import Shape
+from scanwright.cad.layout.direct.frame import ServoFrame
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.envelope import screw_travel_mm
 from scanwright.cad.layout.joints import Joint
@@ -110,6 +111,8 @@ def digest_of(scanner: Scanner, drive: DriveLayout) -> str:
     }
     if (travel := screw_travel_mm(scanner.lidar)) > 0:
         content["screw_travel_mm"] = travel  # slots, if the lidar's holes are not verified
+    if (frame := drive.of(ServoFrame)) is not None:
+        content["frame_window"] = frame.window_y  # from the exit of the servo's cable, which shapes no other part
     if isinstance(angles.motion, Sweep):
         content["sweep"] = angles.motion.limits_deg  # one that keeps the gears on a flank needs no counterweight
     if scanner.modules != NO_MODULES:

@@ -57,7 +57,7 @@ class Hold:
 
     Attributes:
         engaged_mm: thread that holds.
-        asked_mm: thread that carries its preload one and a half times over; 0 where a nut or an insert holds it.
+        needed_mm: thread that carries its preload one and a half times over; 0 if a nut or an insert holds it.
         preload_n: that it is tightened to.
         torque_nm: that tightens it.
         pull_n: along its axis.

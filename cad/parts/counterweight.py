@@ -41,7 +41,7 @@ def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
     words = (
         f"{first}Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
         f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
-        "heads. Nobody tells where a lidar's centre of mass is: when the scanner turns, slide the bar along its slots "
+        "heads. A lidar's centre of mass is undocumented: when the scanner turns, slide the bar along its slots "
         "to where `scanwright scan` prints the least ripple."
     )
     return PartSpec(

@@ -61,7 +61,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
             Row(
                 "consumable",
                 "retaining compound",
-                "retaining compound for metal, medium strength",
+                COMPOUND,
                 "sleeve on the shaft",
             ),
             Row("tool", "dial indicator", "dial indicator on a stand", "assembly.md", "reads 0.01 mm"),

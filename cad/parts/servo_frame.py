@@ -36,7 +36,7 @@ def frame_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(servo_frame, frame),
         step=Step("Servo into its frame", words, "the horn turns freely in the opening", (SERVO,)),
-        shaped_by=("servo.case_min_mm", *ON_CASE),
+        shaped_by=("servo.case_min_mm", "servo.cable_exit_mm", *ON_CASE),
         joints=(_on_servo(servo, frame),),
         avoid=tuple(shape_of(box_corners(leg)) for leg in frame.legs()),
     )

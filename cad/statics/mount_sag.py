@@ -1,7 +1,7 @@
 """How far a mount gives way under all that it carries: finite elements on two grids, as `sag` has them.
 
 The deck is taken for rigid, and holds the foot under the washers of its screws alone: that it lies on the deck beside
-them makes it stiffer, and nobody knows by how much. Grids lie along the deck, whose face is a face of theirs.
+them makes it stiffer, by an unknown amount. Grids lie along the deck, whose face is a face of theirs.
 """
 
 from __future__ import annotations

@@ -40,8 +40,9 @@ def material_of(assembly: Assembly, body: str) -> Material:
     """Return the material of a made part or a bought body."""
     if body not in assembly.parts:
         scanner = assembly.layout.scanner
-        kinds = {SERVO_CASE: scanner.servo.front.kind, LIDAR_BODY: scanner.lidar.base.kind}
-        return MOULDED if kinds.get(body) == "self_tapping" else BOUGHT
+        servo = scanner.servo
+        kinds = {SERVO_CASE: {servo.front.kind, servo.rear.kind}, LIDAR_BODY: {scanner.lidar.base.kind}}
+        return MOULDED if "self_tapping" in kinds.get(body, ()) else BOUGHT
     process = assembly.parts[body].process
     if process == "printed":
         return PRINTED

@@ -38,7 +38,8 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
         foot = (servo.horn_circle_mm + passing_hole(SCREWS[servo.horn_screw], scanner.printer)) / 2
         foot += scanner.printer.min_wall_mm + ROUND_HOLE
         foot_height, flange = heads_over_horn_mm(servo), diameter / 2
-        grip = _grip(servo, max(floor, foot_height + FLOOR_ON_FOOT))
+        wall = SCREWS[servo.horn_screw].head_room + scanner.printer.min_wall_mm  # around the heads in the cone
+        grip = _grip(servo, max(floor, foot_height + max(FLOOR_ON_FOOT, wall)))
         floor = max(grip, foot_height + flange - foot)  # a cone of 45 deg needs no support
     return DirectStack(
         h=hub_height(envelope, R, hub_radius, 0.0),

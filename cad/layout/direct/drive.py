@@ -10,7 +10,15 @@ import numpy as np
 from scanwright.cad.layout import names
 from scanwright.cad.layout.direct.adapter import adapter_of
 from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
-from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, frame_of, needs_frame, no_rear_holes
+from scanwright.cad.layout.direct.frame import (
+    FOOT,
+    FOOT_SCREW,
+    ServoFrame,
+    corner_holes,
+    frame_of,
+    needs_frame,
+    no_rear_holes,
+)
 from scanwright.cad.layout.direct.lead_exits import lead_exits, stator_exit
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
@@ -20,6 +28,7 @@ from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.servo import Servo
+from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
@@ -56,6 +65,11 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     mounted = _mounted(scanner.servo, stack, frame)
     adapter = adapter_of(scanner, stack)
     cage = None if ears is None else cage_of(scanner, stack, ears)
+    if frame is not None and (scanner.slip_ring is not None or stack.bearing is not None):
+        raise BuildError(
+            f"{names.SERVO_FRAME}: holes: {scanner.servo.name} has usable holes in its front only, which its frame "
+            "takes: take no slip ring, or another servo"
+        )
     leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
     cage_n_per_m = 0.0 if cage is None else stiffness_n_per_m(stack, cage.ears)
     height = stack.ring_top if stack.bearing is None else stack.cage_top
@@ -149,7 +163,7 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
     Raises:
         BuildError: it has no holes that may carry it.
     """
-    if len(servo.rear.places) < 4 and frame is None:
+    if frame is None and not corner_holes(servo.rear.places):
         raise no_rear_holes(servo)
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
@@ -175,7 +189,7 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
         rear=stack.horn + servo.case_min_mm[2],
         ears=stack.horn + servo.rear.z_mm,
         screw=SCREWS[servo.rear.screw],
-        holes=_corner_holes(servo.rear.places),
+        holes=corner_holes(servo.rear.places),
         fixing=fixing_of(servo.rear),
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
         discs=discs,
@@ -195,10 +209,3 @@ def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
         if servo.radial_load_n is None:
             why = f"{why}, by what such a horn is trusted with: its maker rates none"
         yield LeftOut(names.BEARING_CAGE, why, 1, "parts")
-
-
-def _corner_holes(holes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    """The four holes of the widest column pair that lie furthest apart along y."""
-    widest = max(x for x, _ in holes)
-    ys = sorted(y for x, y in holes if x == widest)
-    return ((widest, ys[-1]), (-widest, ys[-1]), (-widest, ys[0]), (widest, ys[0]))

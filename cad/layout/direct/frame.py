@@ -91,9 +91,19 @@ class ServoFrame:
         ]
 
 
+def corner_holes(holes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Return the four holes of the widest pair of columns that lie furthest apart along y; none if one is missing."""
+    widest = max((x for x, _ in holes), default=0.0)
+    ys = sorted(y for x, y in holes if x == widest)
+    corners = (
+        tuple((sign * widest, y) for sign, y in ((1, ys[-1]), (-1, ys[-1]), (-1, ys[0]), (1, ys[0]))) if ys else ()
+    )
+    return corners if len(set(corners)) == 4 and set(corners) <= set(holes) else ()
+
+
 def needs_frame(servo: Servo) -> bool:
     """Return whether only the servo's front has holes that may carry it."""
-    return len(servo.rear.places) < 4 and len(servo.front.places) >= 2
+    return not corner_holes(servo.rear.places) and len(servo.front.places) >= 2
 
 
 def heads_over_horn_mm(servo: Servo) -> float:
@@ -119,6 +129,10 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
             f"{printer.min_wall_mm:g}"
         )
     (x0, y0, z0), (x1, y1, _) = servo.case_min_mm, servo.case_max_mm
+    if y1 - y0 < 2 * (LEAST_LEG + WINDOW):
+        raise BuildError(
+            f"{SERVO_FRAME}: legs: case of {servo.name}: {y1 - y0:g} mm along y (needs {2 * (LEAST_LEG + WINDOW):g})"
+        )
     half_x = max(-x0, x1) + GAP
     exit_y = (y0 + y1) / 2 if servo.cable_exit_mm is None else servo.cable_exit_mm[1]
     middle = min(max(exit_y, y0 + LEAST_LEG + WINDOW), y1 - LEAST_LEG - WINDOW)

@@ -76,6 +76,6 @@ def keeps_flank(scanner: Scanner, moment: Array, error: float = 0.0) -> bool:
 
 
 def backlash_matters(scanner: Scanner) -> bool:
-    """Whether the play of the servo's gears shows in a cloud; where nobody tells it, it does."""
+    """Whether the play of the servo's gears shows in a cloud; if that is unknown, it does."""
     backlash = scanner.servo.backlash_deg
     return backlash is None or backlash > noise_deg(scanner)

@@ -165,6 +165,7 @@ def is_reachable(hole, head, piercing):
 FOOT = Modules(tripod_foot=True)
 SETTINGS = {
     "tilted, with a bearing": scanner_at(GROUND_AHEAD),
+    "as it ships": scanner_at(GROUND_AHEAD, friction_nm=(0.16, 0.2)),
     "tilted, nuts": scanner_at(TILTED, printer="fdm-0.4-nut"),
     "tilted, inserts": scanner_at(TILTED, printer="fdm-0.4-insert"),
     "hanging, inserts": scanner_at((180, 20, 30, -45), printer="fdm-0.4-insert"),
@@ -190,9 +191,7 @@ DAILY = (  # every way to hold something, and every part that takes a screw, onc
     "a sub-plate in nuts",
     "small, without a ring",
     "printed throughout, inserts",
-    "a cover on a cage, a tripod",
-    "a cover on a fork",
-    "a switch on a cage",
+    "as it ships",
     "a belt",
     "a belt on a tripod, nuts M5",
 )
