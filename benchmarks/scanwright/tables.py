@@ -58,7 +58,7 @@ def hardware_table(out: Path) -> str:
         "printed",
         "other made parts",
         "tools besides hex keys",
-        "USD",
+        "USD, with tools",
         "failed checks",
     ]
     return _markdown(head, rows)

@@ -9,6 +9,7 @@ import errno
 import os
 import re
 import sys
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -84,7 +85,8 @@ def run() -> None:
     except OSError as error:
         if error.errno not in _OF_THE_SYSTEM:
             raise
-        print_error(f"{error.filename or _unnamed(error)}: {error.strerror}")
+        place = Path(error.filename).absolute() if error.filename else _unnamed(error)
+        print_error(f"{place}: {error.strerror}")
         sys.exit(2)
 
 

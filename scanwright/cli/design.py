@@ -17,7 +17,7 @@ from scanwright.cli.help import Commands
 app = Commands("Design")
 
 
-@app.command(example="optimise ground_ahead")
+@app.command(example="optimise ground_ahead", no="J differs from a count of simulated beams")
 def optimise(
     task: TaskFile,
     picture: Annotated[Path | None, Option(metavar="FILE.png", help="Plot of the objective.")] = None,
@@ -133,7 +133,7 @@ def accuracy(
     show((report_search if search else report_precision)(loaded, folder, ConsoleProgress()))
 
 
-@app.command(example="compare ground_ahead")
+@app.command(example="compare ground_ahead", no="J differs from a count of simulated beams")
 def compare(
     task: TaskOrBuild,
     out: Annotated[Path, Option(metavar="DIR", help="Parent of the folder of the comparison.")] = Path("out/compare"),

@@ -47,7 +47,8 @@ def build(
         from scanwright.pipeline.manifest import listed_files
 
         difference = difference_when_rebuilt(task, ConsoleProgress())
-        print(f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}")
+        line = f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}"
+        show_result(lambda: [line], {"folder": str(task), "difference": difference}, as_json)
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
 

@@ -12,7 +12,8 @@ from scanwright.design.evaluation.as_built import AsBuilt
 from scanwright.design.evaluation.metres import PlaneFigures, planes_of, rounded
 from scanwright.design.findings import Finding
 from scanwright.design.motion import Motion
-from scanwright.design.objective.holes import percent
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
+from scanwright.design.search.mounts.gain import AS_GOOD
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.answer import BuildAnswer
 from scanwright.report.parts_list import PartsList
@@ -114,7 +115,8 @@ def _sees(answer: BuildAnswer, planes: Sequence[PlaneFigures]) -> Card:
     own = answer.as_built.own
     gap_mm = 1000 * GAP_M * np.radians(own.line_gap_deg)
     lines = f"Scan lines at most {own.line_gap_deg:.2f} deg apart, {rounded(gap_mm)} mm at {GAP_M:g} m."
-    headline = f"All but {percent(own.blind_weight)} of what you asked for" if own.blind else "All you asked for"
+    unseen = own.blind_weight > NO_BLIND_WEIGHT
+    headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
     text = [f"{_capital(figures.words())}." for figures in planes]
     if own.blind:
         text.append(f"{_capital(', '.join(words.partition(':')[0] for words in own.blind))}.")
@@ -127,7 +129,8 @@ def _sees(answer: BuildAnswer, planes: Sequence[PlaneFigures]) -> Card:
 def _gain(built: AsBuilt) -> Card:
     first, *others = (mount.gain for mount in built.mounts)
     unit = "" if first.factor is None else "Beams per direction. "
-    better = " It sees more than this scanner." if first.J_less < 0 else ""
+    fewer = first.factor is not None and first.factor < 2 - AS_GOOD
+    better = " It has more beams than this scanner." if fewer else ""
     flaws = f" But: {first.flaws}." if first.flaws else ""
     rest = ", ".join(f"{gain.value} {gain.mount.name}" for gain in others)
     text = f"{unit}Best of {len(built.mounts)} usual mounts.{better}{flaws} The others: {rest}."

@@ -47,7 +47,8 @@ def test_every_place_states_the_same_numbers_of_a_build(built, command):
     blocked = re.search(r"which block (\S+) of the beams", told)[1]
     assert f"Parts block {blocked}." in report
     weight, sphere = re.search(r"never seen: (\S+) of the weight, (\S+) of the unmasked", told).groups()
-    assert weight in report and sphere in report
+    assert f"{weight} of what counts, and {sphere} of the sphere, with parts" in report
+    assert f"{own['J']} +- {own['J_error']}, with parts" in report
     for words in own["blind"]:
         assert words.partition(":")[0].removeprefix("blind ") in report and f"with parts: {words}" in told
     for mount in seen["mounts"]:

@@ -50,7 +50,7 @@ def test_cards_state_the_numbers_of_the_records(built):
     )
     factor, name = min((each.factor, each.name) for each in mounts)
     assert gain.headline == f"{factor:.2f} x {name}"
-    assert "It sees more than this scanner." in gain.text
+    assert ("It has more beams than this scanner." in gain.text) == (factor < 0.98)
     assert all(f"{each.factor:.2f} x {each.name}" in gain.text for each in mounts[1:])
     assert scan.headline == "18 s, 778,320 beams"
     assert scan.text == "One turn at constant speed: 720 lines of 1,081."
@@ -62,7 +62,7 @@ def test_blind_spots_are_named_and_no_ratio_is_stated_without_one(built):
     mounts = tuple(replace(each, gain=replace(each.gain, factor=None)) for each in built.as_built.mounts)
     changed = replace(built, as_built=replace(built.as_built, blocked=0.25, own=own, mounts=mounts))
     sees, gain, scan, _ = cards(ANGLES, changed, (), None)
-    assert sees.headline == "All but 3.9% of what you asked for"
+    assert sees.headline == "3.9% of what you asked for is never seen"
     assert sees.text.startswith("Blind ahead, blind behind. Scan lines")
     assert " x " not in gain.headline + gain.text and "in J" in gain.headline
     assert scan.text.endswith("Parts block 25.0%.")
