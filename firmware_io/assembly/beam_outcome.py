@@ -31,7 +31,7 @@ def beam_verdicts(
 ) -> UInt8[ndarray, " n"]:
     """A `Verdict` for each beam from its range and axis angle, shape (n,).
 
-    `joint_rad` is NaN where nobody knows it; `gamma_rot_rad` is the axis angle at joint position 0, from where the
+    `joint_rad` is NaN if unknown; `gamma_rot_rad` is the axis angle at joint position 0, from where the
     mask of the own body counts.
     """
     range_m = scan.range_m

@@ -47,7 +47,7 @@ class ScanPoints:
     Attributes:
         scan: what was measured.
         points_m: shape (n, 3), NaN where the verdict is not POINT.
-        joint_rad: servo angle of each beam, shape (n,), NaN where nobody knows it.
+        joint_rad: servo angle of each beam, shape (n,), NaN if unknown.
         verdict: a `Verdict` for each beam, shape (n,).
         axis_error_rad: rms error of the angles; NaN where the axis goes straight between its samples.
     """

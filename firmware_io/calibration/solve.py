@@ -1,4 +1,4 @@
-"""Least squares of ranges against planes that nobody knows.
+"""Least squares of ranges against unknown planes.
 
 A beam (o, d) meets the plane q . p = 1 at the range (1 - q . o) / (q . d); what it measured instead is its residual.
 Neither the residual's derivatives nor the choice of beams depends on the noise, so the estimate is the likeliest one

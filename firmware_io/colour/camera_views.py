@@ -56,7 +56,7 @@ def load_views(
         lag_s: how late the joint log's stamps are.
 
     Raises:
-        RecordingError: no such image, or nobody knows where it was taken.
+        RecordingError: no such image, or its place is unknown.
     """
     listed = folder / camera.images
     shots = list(_listed(listed)) if listed.suffix.lower() == ".csv" else [_Shot(listed)]

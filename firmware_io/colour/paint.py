@@ -69,7 +69,7 @@ def painter(
 
     Raises:
         TaskError: the task describes no camera.
-        RecordingError: the recording is unreadable, no such image, or nobody knows where it was taken.
+        RecordingError: the recording is unreadable, no such image, or its place is unknown.
     """
     camera, source = loaded.task.camera, open_recording(recording)
     if camera is None:

@@ -98,7 +98,7 @@ def occupancy_grid(
 
     Args:
         points_m: shape (n, 3), finite, z up.
-        eyes_m: where each point was seen from, shape (n, 3); NaN where nobody knows: such a point frees nothing.
+        eyes_m: where each point was seen from, shape (n, 3); NaN if unknown: such a point frees nothing.
         heights: of what is in the way.
         resolution_m: edge of a cell.
 
@@ -140,7 +140,7 @@ def _paths_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float,
         x, y, z = eyes_m[i, 0], eyes_m[i, 1], eyes_m[i, 2]
         dx, dy, dz = points_m[i, 0] - x, points_m[i, 1] - y, points_m[i, 2] - z
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
-        if not length > short_m:  # an eye that nobody knows, too
+        if not length > short_m:  # an unknown eye, too
             continue
         begin, end = 0.0, 1.0 - short_m / length
         if dz == 0.0:

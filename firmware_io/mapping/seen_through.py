@@ -31,7 +31,7 @@ class Stand:
 
     Attributes:
         points_m: shape (n, 3), finite.
-        eye_m: where the scanner stood, shape (3,); NaN where nobody knows.
+        eye_m: where the scanner stood, shape (3,); NaN if unknown.
     """
 
     points_m: Float64[ndarray, "n 3"]

@@ -21,7 +21,7 @@ from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.poses.trajectory import Trajectory
 
-_LONG_GAP = 5.0  # this many usual gaps between two rates, and nobody knows what the platform did
+_LONG_GAP = 5.0  # this many usual gaps between two rates, and the motion between is unknown
 _NOISE_RAD = math.radians(0.2)  # what poses may be off without a word about the gyro
 _WORSE = 1.1  # times the turn without the gyro: it must not add to it, but for noise
 

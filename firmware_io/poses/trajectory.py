@@ -1,7 +1,7 @@
 """Where the platform was: poses of the `world` frame (the robot that carries the scanner) on a map, over time.
 
 Between two poses the position goes straight and the orientation about one axis at constant speed (slerp); that is off
-by what the platform accelerates meanwhile, at most a h^2 / 8 for poses h apart. Outside the poses nobody knows: NaN.
+by what the platform accelerates meanwhile, at most a h^2 / 8 for poses h apart. Outside the poses: NaN.
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ def _joints(
         raise RecordingError("the angle set states no covariance: `scanwright calibrate` makes one that does")
     if joint_rad is None:
         raise RecordingError(
-            f"{name}: no column joint_rad, without which nobody knows what an error of the calibration does to a "
+            f"{name}: no column joint_rad, without which it is unknown what an error of the calibration does to a "
             "point: assemble the cloud with it, or register without the angle set"
         )
     return joint_rad

@@ -1,4 +1,4 @@
-"""Where one stand is as seen from another when nobody knows: floor plans of the two are laid over each other.
+"""Where one stand is as seen from another, without a first guess: floor plans of the two are laid over each other.
 
 Both clouds are levelled by their floors and ceilings. Every vertical surface then becomes an arrow on a grid seen from
 above, pointing to where its scanner stood: a complex number, so that turning the plan multiplies it by a phase, and
