@@ -40,7 +40,7 @@ class Scan:
         angle_min_rad: bearing of the first beam, counter-clockwise from the laser's x.
         angle_increment_rad: from one beam to the next; negative for a lidar that turns clockwise.
         time_increment_s: from one beam to the next; 0 where the sensor does not say.
-        scan_time_s: from one scan to the next; 0 where the sensor does not say.
+        scan_time_s: of a turn of the mirror, also if turns between two scans are skipped; 0 if unknown.
         range_min_m: shortest range the sensor can mean.
         range_max_m: longest range the sensor can mean.
         range_m: shape (n,), as the sensor gave it; NaN, inf or 0 where nothing returned.

@@ -180,7 +180,7 @@ def import_bag(
         if not clock.note and corrections.stamp != "receipt":
             same = angle_source is not None and angle_source.topic == scan_source.topic
             shifted = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
-            findings += clock_findings(shifted, survey.angle_stamps, headers.arc_ns, speed_rad_s, one_message=same)
+            findings += clock_findings(shifted, survey.angle_stamps, headers.arc_ns, speed_rad_s, same_clock=same)
         findings += _scan_findings(survey)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"

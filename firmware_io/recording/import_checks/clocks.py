@@ -21,7 +21,7 @@ _LEAST_MM = 5.0  # at AT_M: smaller costs are not worth a warning
 
 
 def clock_findings(
-    scans: Stamps, angles: Stamps, arc_ns: Ints, speed_rad_s: float, *, one_message: bool
+    scans: Stamps, angles: Stamps, arc_ns: Ints, speed_rad_s: float, *, same_clock: bool
 ) -> Iterator[Finding]:
     """Check the stamps of scans and angles that are to be on one clock.
 
@@ -30,14 +30,14 @@ def clock_findings(
         angles: times of the angles, in the order of their receipt.
         arc_ns: from the first to the last beam of each scan, shape (n,).
         speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        one_message: scan and angle come in one message, so that they share a clock.
+        same_clock: they are known to share one, such as that of one message.
     """
     for name, stamps in (("scans", scans), ("angles", angles)):
         yield from _steps_back(name, stamps, speed_rad_s)
     if not (scans.complete() and angles.complete()):
         return
     scan_s, angle_s = _delay_s(scans), _delay_s(angles)
-    if not one_message:  # both ahead of the receiver by the same: they agree
+    if not same_clock:  # both ahead of the receiver by the same: they agree
         scan_s = scan_s - min(float(np.quantile(angle_s, 0.05)), 0.0)
     least_s, arc_s = float(np.quantile(scan_s, 0.05)), float(np.median(arc_ns)) / 1e9
     if least_s < -_JITTER_S:
@@ -48,7 +48,7 @@ def clock_findings(
         yield _warning("scan_stamp_not_first_beam", "scans", arc_s, speed_rad_s,
                        f"received {early_s:.4g} s before their last beam would be measured: stamps are not those of "
                        "the first beam", 'stamp = "last" if they are those of the last beam')  # fmt: skip
-    if one_message:
+    if same_clock:
         return
     angle_least_s = float(np.quantile(angle_s, 0.05))
     if angle_least_s < -_JITTER_S:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
+from scanwright.firmware_io.samples import Scan
 
 AT_M = 5.0  # range at which a finding states its cost
 _LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
@@ -50,10 +51,13 @@ class Headers:
     unequal_intensities: int
 
     @classmethod
-    def of(cls, rows: list[tuple[Any, ...]], longest: Counter[float]) -> Headers:
-        """Make the record of `header_of` each scan."""
-        stamps, beams, steps, spans, increments, scan_times, limits, unequal = map(np.array, zip(*rows, strict=True))
-        return cls(stamps, beams, steps, spans, increments, scan_times, limits, longest, int(np.sum(unequal)))
+    def of(cls, rows: Iterable[tuple[float, ...]]) -> Headers:
+        """Make the record of the row of each scan: `header_of` or `header_of_scan`."""
+        *columns, unequal, longest_m, count = map(np.array, zip(*rows, strict=True))
+        longest: Counter[float] = Counter()
+        for far_m, beams in zip(longest_m.tolist(), count.tolist(), strict=True):
+            longest[far_m] += beams
+        return cls(*columns, longest=+longest, unequal_intensities=int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
         """Return the headers as they are after corrections."""
@@ -92,16 +96,26 @@ class Headers:
         return np.rint(1e9 * increment_s * (self.beams - 1)).astype(np.int64)
 
 
-def header_of(scan: Any, stamp_ns: int, longest: Counter[float]) -> tuple[Any, ...]:
-    """Return the row of one LaserScan for `Headers.of`, and count its longest range."""
-    ranges = np.asarray(scan.ranges, np.float32)
-    finite = ranges[np.isfinite(ranges)]
-    if finite.size:
-        longest[float(finite.max())] += int(np.sum(finite == finite.max()))
-    unequal = len(scan.intensities) not in (0, ranges.size)
-    span = float(scan.angle_max) - float(scan.angle_min)
-    times = float(scan.time_increment), float(scan.scan_time)
-    return stamp_ns, ranges.size, float(scan.angle_increment), span, *times, float(scan.range_max), unequal
+def header_of(message: Any, stamp_ns: int) -> tuple[float, ...]:
+    """Return the row of a LaserScan for `Headers.of`."""
+    span = float(message.angle_max) - float(message.angle_min)
+    numbers = float(message.time_increment), float(message.scan_time), float(message.range_max)
+    return _row(stamp_ns, message.ranges, message.intensities, float(message.angle_increment), span, *numbers)
+
+
+def header_of_scan(scan: Scan) -> tuple[float, ...]:
+    """Return the row of a scan for `Headers.of`."""
+    span = scan.angle_increment_rad * (scan.range_m.size - 1)
+    numbers = scan.time_increment_s, scan.scan_time_s, scan.range_max_m
+    return _row(scan.stamp_ns, scan.range_m, scan.intensity, scan.angle_increment_rad, span, *numbers)
+
+
+def _row(stamp_ns: int, ranges: Any, intensities: Any, *numbers: float) -> tuple[float, ...]:
+    range_m = np.asarray(ranges, np.float32)
+    longest_m = range_m[np.isfinite(range_m)].max(initial=0)
+    unequal = len(intensities) not in (0, range_m.size)
+    count = int(np.sum(range_m == longest_m)) if longest_m > 0 else 0
+    return stamp_ns, range_m.size, *numbers, unequal, float(longest_m), count
 
 
 def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:

@@ -65,7 +65,6 @@ def survey_bag(
     left_out: Counter[str] = Counter()
     scans: list[tuple[int, int, bool]] = []
     rows: list[tuple[Any, ...]] = []
-    longest: Counter[float] = Counter()
     angles: list[tuple[int, int, tuple[float, ...]]] = []
     joints: set[str] = set()
     if table is not None:
@@ -80,7 +79,7 @@ def survey_bag(
                 left_out[fault] += 1
             else:
                 scans.append((scan_stamp_ns, message.receive_ns, endless(laser_scan)))
-                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns, longest))
+                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns))
         if angle_source is not None and message.topic == angle_source.topic:
             values = angles_in(message.body, angle_source, bag.path)
             if not values and isinstance(angle_source, Source):
@@ -108,7 +107,7 @@ def survey_bag(
         angle = numbers[:, 0]
     return BagSurvey(
         scan_stamps=Stamps(times(stamps), times(receives)),
-        headers=Headers.of(rows, longest),
+        headers=Headers.of(rows),
         endless=sum(without_end),
         angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
         angle=angle,
