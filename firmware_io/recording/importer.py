@@ -151,7 +151,7 @@ def import_bag(
             angle_unit, unit_rad = "rad", 1.0
         if unit_rad is None or angle_unit is None:
             raise RecordingError("angle_unit: write deg or rad, as the bag has it, or counts such as 4096/turn")
-        headers = survey.headers
+        headers = survey.headers.corrected(None, corrections)
         increment_s = _time_increment_s(headers, corrections)
         stated_s = headers.time_increment_s if increment_s is None else increment_s
         arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
@@ -161,7 +161,7 @@ def import_bag(
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{bag}: no scan falls into the time of the angles: {spans}")
         order = np.argsort(clock.angle_ns, kind="stable")
-        wrong = outliers(survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
+        wrong = outliers(clock.angle_ns[order], survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
         time_ns, first_of = np.unique(clock.angle_ns[order][~wrong], return_index=True)
         log = JointLog(time_ns, joint_positions(survey.angle[order][~wrong][first_of], unit_rad, corrections))
         doubled = order.size - int(wrong.sum()) - log.time_ns.size
@@ -180,7 +180,9 @@ def import_bag(
         if not clock.note and corrections.stamp != "receipt":
             same = angle_source is not None and angle_source.topic == scan_source.topic
             shifted = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
-            findings += clock_findings(shifted, survey.angle_stamps, headers.arc_ns, speed_rad_s, same_clock=same)
+            findings += clock_findings(
+                shifted, survey.angle_stamps, headers.judged().arc_ns, speed_rad_s, same_clock=same
+            )
         findings += _scan_findings(survey)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"

@@ -36,10 +36,12 @@ def clock_findings(
         yield from _steps_back(name, stamps, speed_rad_s)
     if not (scans.complete() and angles.complete()):
         return
-    scan_s, angle_s = _delay_s(scans), _delay_s(angles)
-    if not same_clock:  # both ahead of the receiver by the same: they agree
-        scan_s = scan_s - min(float(np.quantile(angle_s, 0.05)), 0.0)
-    least_s, arc_s = float(np.quantile(scan_s, 0.05)), float(np.median(arc_ns)) / 1e9
+    arc_s = float(np.median(arc_ns)) / 1e9
+    least_s, angle_least_s = (float(np.quantile(_delay_s(stamps), 0.05)) for stamps in (scans, angles))
+    if not same_clock and max(least_s - arc_s, angle_least_s) < -_JITTER_S:  # both are ahead of the receiver
+        ahead_s = max(least_s - arc_s, angle_least_s)
+        near = abs(least_s - arc_s - angle_least_s) < _LATE_S  # messages are delivered with such differences
+        least_s, angle_least_s = (arc_s, 0.0) if near else (least_s - ahead_s, angle_least_s - ahead_s)
     if least_s < -_JITTER_S:
         yield _warning("scan_stamps_late", "scans", -least_s, speed_rad_s, f"stamps lie {-least_s:.4g} s after receipt",
                        'the clock of the lidar is ahead: correct it, or stamp = "receipt"')  # fmt: skip
@@ -50,7 +52,6 @@ def clock_findings(
                        "the first beam", 'stamp = "last" if they are those of the last beam')  # fmt: skip
     if same_clock:
         return
-    angle_least_s = float(np.quantile(angle_s, 0.05))
     if angle_least_s < -_JITTER_S:
         yield _warning("angle_stamps_late", "angles", -angle_least_s, speed_rad_s,
                        f"stamps lie {-angle_least_s:.4g} s after receipt",

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.design.findings import Finding
@@ -71,6 +73,30 @@ class Headers:
         return changed
 
     @property
+    def bearings_disagree(self) -> Bool[ndarray, " n"]:
+        """Which scans span another angle than angle_max - angle_min, shape (n,)."""
+        step = np.where(self.step_rad == 0, np.nan, self.step_rad)
+        within = np.abs(self.span_rad / step - (self.beams - 1)) <= _SPAN_STEPS
+        return (self.beams > 1) & ~within
+
+    def judged(self) -> Headers:
+        """Return the headers by which times are judged.
+
+        If steps and limits disagree, the times between beams decide which of them is used.
+        """
+        if not self.bearings_disagree.any():
+            return self
+        by_limits = self.corrected(None, Corrections(bearings="limits"))
+        off = [abs(each.time_increment_ratio - 1) for each in (self, by_limits)]
+        return by_limits if off[1] < off[0] else self
+
+    @property
+    def time_increment_ratio(self) -> float:
+        """Stated time from beam to beam over that of an even mirror turn; NaN if either is unknown."""
+        even_s, stated_s = self.time_increment_from_turn_s, float(np.median(self.time_increment_s))
+        return stated_s / even_s if even_s and stated_s else math.nan
+
+    @property
     def mirror_turn_s(self) -> float:
         """Time of a mirror turn: scan_time if scans are whole multiples of it apart, else the usual time between scans.
 
@@ -126,7 +152,7 @@ def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
         speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
     """
     yield from _bearings(headers)
-    yield from _time_increment(headers, speed_rad_s)
+    yield from _time_increment(headers.judged(), speed_rad_s)
     yield from _longest_range(headers)
     if headers.unequal_intensities:
         yield Finding(
@@ -139,12 +165,7 @@ def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
 
 
 def _bearings(headers: Headers) -> Iterator[Finding]:
-    several = headers.beams > 1
-    if not several.any():
-        return
-    step, span, beams = headers.step_rad[several], headers.span_rad[several], headers.beams[several]
-    off_steps = np.abs(span / np.where(step == 0, np.nan, step) - (beams - 1))
-    wrong = ~(off_steps <= _SPAN_STEPS)
+    step, span, beams, wrong = headers.step_rad, headers.span_rad, headers.beams, headers.bearings_disagree
     if not wrong.any():
         return
     k = int(np.flatnonzero(wrong)[0])
@@ -174,7 +195,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
         return
     if not even_s:
         return
-    ratio = float(np.median(stated_s)) / even_s
+    ratio = headers.time_increment_ratio
     if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _LEAST_MM:
         yield Finding(
             "time_increment_off",

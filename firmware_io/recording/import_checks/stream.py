@@ -70,13 +70,14 @@ class StreamChecks:
 
     def _findings(self) -> list[Finding]:
         headers = Headers.of(self._headers)
+        arc_ns = headers.judged().arc_ns
         time_ns, position_rad = (np.array(column) for column in zip(*self._angles, strict=True))
         order = np.argsort(time_ns, kind="stable")
         unique_ns, first = np.unique(time_ns, return_index=True)
         speed_rad_s = 0.0 if self._at_rest else usual_speed_rad_s(JointLog(unique_ns, position_rad[first]))
         angles = [] if self._at_rest else angle_findings(time_ns[order], position_rad[order], dropped=False, timed=True)
         received_ns = np.array(self._received_ns, np.int64)
-        prompt_ns = headers.stamp_ns + headers.arc_ns  # tells the checks nothing
+        prompt_ns = headers.stamp_ns + arc_ns  # tells the checks nothing
         scans = Stamps(headers.stamp_ns, np.where(received_ns == _UNKNOWN, prompt_ns, received_ns))
-        clocks = clock_findings(scans, Stamps(time_ns, time_ns), headers.arc_ns, speed_rad_s, same_clock=True)
+        clocks = clock_findings(scans, Stamps(time_ns, time_ns), arc_ns, speed_rad_s, same_clock=True)
         return [*angles, *header_findings(headers, speed_rad_s), *clocks]
