@@ -1,5 +1,6 @@
 """From an angle set to a cloud, on the emulators: points lie on the room, and every exit is clean."""
 
+import json
 import math
 import random
 from itertools import islice
