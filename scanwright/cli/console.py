@@ -148,9 +148,8 @@ def _print_aside(kind: str, line: str) -> None:
     if line.lstrip().startswith("hint: "):
         line = _SETTING.sub(_as_typed, line)
     text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
-    text = wrapped(f"{kind}: {text}" if kind else text, sys.stderr)
-    if kind:
-        text = styled(f"{kind}:", kind, sys.stderr) + text.removeprefix(f"{kind}:")
+    if kind:  # never wrapped: one line of input that is wrong is one line, and its path can be copied
+        text = styled(f"{kind}:", kind, sys.stderr) + f" {text}"
     print(text, file=sys.stderr, flush=True)
 
 
