@@ -98,7 +98,7 @@ def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float |
     if not residual.size:
         return whole
     wrong = _isolated(residual, _encoder_step(log.position_rad))
-    if isinstance(whole, str) and (far := outliers(log.position_rad)[0]).any():
+    if isinstance(whole, str) and (far := outliers(log.time_ns, log.position_rad)[0]).any():
         wrong = far  # large ones may have bent all of the curve, or cost a turn
     fitted: SmoothAxis | str = whole
     for _ in range(_PASSES):

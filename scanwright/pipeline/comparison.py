@@ -7,9 +7,9 @@ from pathlib import Path
 
 from scanwright.design.evaluation.comparison import ComparisonRow, compare
 from scanwright.design.evaluation.comparison_picture import compare_picture
-from scanwright.design.evaluation.comparison_table import notes, table, write_csv
+from scanwright.design.evaluation.comparison_table import notes, short_table, table, write_csv
 from scanwright.design.progress import Progress
-from scanwright.design.search.mounts.gain import gain_lines
+from scanwright.design.search.mounts.gain import gain_lines, verdict
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.built_scanner import BuiltScanner
@@ -24,8 +24,15 @@ class Comparison:
     rows: list[ComparisonRow]
     folder: Path
 
-    def lines(self) -> list[str]:
-        """Return the comparison as lines."""
+    def lines(self, in_full: bool = False) -> list[str]:
+        """Return the comparison as lines; all columns and their meaning only `in_full`."""
+        if not in_full:
+            return [
+                *short_table(self.rows),
+                "time of the measurement; beams: geometric mean within the ball; blind: share of the region never seen",
+                *verdict(self.optimum.gains),
+                f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
+            ]
         return [
             *table(self.rows),
             *(f"optimum: {line}" for line in self.optimum.hole_lines(tabled=False)),

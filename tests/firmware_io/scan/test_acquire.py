@@ -1,5 +1,6 @@
 """From an angle set to a cloud, on the emulators: points lie on the room, and every exit is clean."""
 
+import json
 import math
 import random
 from itertools import islice
@@ -207,6 +208,8 @@ def test_a_dry_run_says_what_it_would_do_and_does_nothing(out, command):
     assert code == 0
     assert "lidar UTM-30LX at L" in said
     assert "3 x spin of 2 s: 6 s of recording" in said
+    _, as_json, _ = command("scan", out, "--lidar", "L", "--servo", "S", "--turns", 3, "--dry-run", "--json")
+    assert (json.loads(as_json)["duration_s"], json.loads(as_json)["recording"]) == (6, None)
     assert [path.name for path in out.iterdir()] == ["angles.json"]
 
 
