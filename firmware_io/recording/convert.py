@@ -5,11 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
+from scanwright.firmware_io.clouds.streams.stream import stream
 from scanwright.firmware_io.recording.bag_export import export_bag
 
 
 def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]:
-    """Turn a cloud into another format, or a recording into a bag; what came of it, in words.
+    """Turn a cloud into another format, or a recording into a bag; return what was done, in words.
+
+    Large clouds without rows and columns are converted in parts, in bounded memory.
 
     Args:
         source: a cloud, or a recording (`.mcap`).
@@ -26,7 +29,10 @@ def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]
         written = ", ".join(f"{count:,} of {topic}" for topic, count in exported.written.items())
         return [*unknown, f"wrote {written} to {target}"]
     check_target(target)
-    clouds, unread = read_clouds(source)
-    wrote = write_clouds(target, clouds, organised=organised)
+    unread: list[str] = []
+    wrote = None if organised else stream(source, target)
+    if wrote is None:
+        clouds, unread = read_clouds(source)
+        wrote = write_clouds(target, clouds, organised=organised)
     notes = [f"note: {line}" for line in (*unread, *wrote.notes)]
     return [*notes, f"wrote {wrote.rows:,} rows to {', '.join(str(path) for path in wrote.paths)}"]
