@@ -54,6 +54,7 @@ _BAR_CHARACTERS = 24  # leaves 50 of a terminal's 80 for the step and the time t
 _SPEED_S = 3600.0  # over which the time that is left is estimated: stages of a build are minutes apart
 _NUMBER = re.compile(r"[\d.,]+")
 _FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
+_SETTING = re.compile(r'\b(\w+) = (true|"?([\w.+-]+)"?)')
 _options: dict[str, str] = {}
 
 
@@ -146,11 +147,18 @@ def _print_aside(kind: str, line: str) -> None:
     """Print a line on standard error, after all that went to standard output; its fields are spelt as options."""
     _end_bar()
     sys.stdout.flush()
+    if line.lstrip().startswith("hint: "):
+        line = _SETTING.sub(_as_typed, line)
     text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
-    text = wrapped(f"{kind}: {text}" if kind else text, sys.stderr)
-    if kind:
-        text = styled(f"{kind}:", kind, sys.stderr) + text.removeprefix(f"{kind}:")
+    if kind:  # never wrapped: one line of input that is wrong is one line, and its path can be copied
+        text = styled(f"{kind}:", kind, sys.stderr) + f" {text}"
     print(text, file=sys.stderr, flush=True)
+
+
+def _as_typed(setting: re.Match[str]) -> str:
+    """Spell `name = value` as the option that sets it."""
+    option = _options.get(setting[1])
+    return setting[0] if option is None else option if setting[2] == "true" else f"{option} {setting[3]}"
 
 
 def exit_code(error: ScanwrightError) -> int:
