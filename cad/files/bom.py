@@ -26,11 +26,11 @@ from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
-from scanwright.design.electrics.wiring import network_of
+from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of
 from scanwright.design.scanner import Scanner
 
 JOINTS = "joints of the layout"
-STEPS, WIRING_TEXT = "assembly.md", "wiring.md"
+STEPS, WIRING_TEXT, CATALOGUE_CABLES = "assembly.md", "wiring.md", "cables of the catalogue"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 PAPER_V = 12.0  # of its supply
 WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports and failed prints
@@ -78,27 +78,6 @@ class BomItem:
 
 
 COLUMNS = [field.name for field in fields(BomItem)][:-1]
-# What a lidar needs besides itself. For one that is not here, its data sheet must be read.
-WIRING: dict[str, tuple[BomItem, ...]] = {
-    "UTM-30LX": (
-        BomItem("wiring", "USB 2.0 cable of the lidar, type A", source=PAPER, estimate="USB cable"),
-        BomItem(
-            "wiring",
-            "power lead of the lidar, 12 V, 1 A (brown +, blue 0 V)",
-            source="data sheet figures: 12 V, 0.7 A, 1.0 A at most",
-            estimate="power cable",
-        ),
-    ),
-    "URG-04LX": (
-        BomItem("wiring", "USB 2.0 cable of the lidar, type A", source=PAPER, estimate="USB cable"),
-        BomItem(
-            "wiring",
-            "power lead of the lidar, 5 V",
-            source="not in the sources of the catalogue: read its data sheet",
-            estimate="power cable",
-        ),
-    ),
-}
 
 
 def items_of(
@@ -200,14 +179,26 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
 
 
 def _wiring(scanner: Scanner) -> Iterator[BomItem]:
+    lidar, ring = scanner.lidar, scanner.slip_ring
     supply = f"power supply, {PAPER_V:g} V, {network_of(scanner).supply_a:g} A"
     yield BomItem("wiring", supply, source=PAPER, estimate="power supply")
     yield from _servo_wiring(scanner.servo)
-    yield from WIRING.get(scanner.lidar.name) or [_unknown_wiring(scanner.lidar)]
-    if scanner.slip_ring is not None:
-        part, source = "plug, socket, crimps and heat shrink for the leads of the slip ring", scanner.slip_ring.circuits
-        note = "no plug passes a ring"
-        yield BomItem("wiring", part, source=f"circuits: {source}", note=note, estimate="plug and socket")
+    if lidar.cables is None:
+        yield _unknown_wiring(lidar)
+    for cable, connector in connectors_of(lidar):
+        if not cable.fixed:
+            to = "bare ends" if cable.end == "bare" else f"a plug {cable.end}"
+            lead, source = f"lead for the plug of the lidar, to {to}, {cable.length_mm:g} mm", CATALOGUE_CABLES
+            yield BomItem("wiring", lead, source=source, note=lidar.connector or "", estimate="power cable")
+        if ring is not None:
+            note = "on the rotor, on leads of the slip ring"
+            yield BomItem("wiring", connector.words, source=WIRING_TEXT, note=note, estimate="plug and socket")
+    if ring is not None:
+        yield BomItem(
+            "wiring", f"{plug_of(lidar)} plug with bare leads", source=WIRING_TEXT, estimate="plug and socket"
+        )
+        part, source = "crimps and heat shrink for the leads of the slip ring", f"circuits: {ring.circuits}"
+        yield BomItem("wiring", part, source=source, estimate="crimps")
 
 
 def _ties(assembly: Assembly) -> Iterator[BomItem]:

@@ -95,7 +95,7 @@ def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float |
     fitted = _smooth(log, longest_knot_s, per_knot)
     if isinstance(fitted, SmoothAxis):
         return fitted
-    wrong = outliers(log.position_rad)[0]
+    wrong = outliers(log.time_ns, log.position_rad)[0]
     if not 0 < np.mean(wrong) <= _MOST_REJECTED:
         return fitted
     position_rad = np.unwrap(log.position_rad[~wrong])  # an outlier may have cost a turn

@@ -21,11 +21,13 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError
+from scanwright.design.findings import sentence
 from scanwright.design.motion import Motion, Spin, StopAndGo
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lidar import LidarDriver
 from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.import_checks.stream import StreamChecks
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread, turning_servo
 from scanwright.firmware_io.scan.lidar_scans import LidarScans, settle_clock
@@ -170,6 +172,7 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
     turned = deque([axis.turning()], maxlen=_MOST_SPEEDS)
     waiting: deque[Scan] = deque()
     recorded, angles, first_ns, last_ns = 0, 0, 0, 0
+    checks = StreamChecks(at_rest=isinstance(plan.motion, StopAndGo))
     note = {"source": "scanwright scan", "hold": "true" if isinstance(plan.motion, StopAndGo) else "false"}
     with recorder_of(None if plan.endless else plan.recording, note, plan.attached) as recorder:
 
@@ -177,6 +180,7 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
             nonlocal angles
             recorder.joint(state.time_ns, state.position_rad)
             watch.joint(state.time_ns, state.position_rad)
+            checks.joint(state.time_ns, state.position_rad)
             angles += 1
 
         for state in axis.window:
@@ -189,6 +193,8 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
                 earlier, away = math.floor(done), scans.away
                 begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
                 continue
+            for finding in checks.scan(scan, time.monotonic_ns()):
+                reporter.warn(sentence(finding))
             if done < wanted:
                 waiting.append(scan)
             for state in axis.hear():
@@ -219,6 +225,8 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
                     f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else ""),
                     done % 1 if plan.endless else min(done / plan.turns, 1),
                 )
+    for finding in checks.check():
+        reporter.warn(sentence(finding))
     if not recorded:
         raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
     dropped_why = "scans that the sensor lost, or that waited because this computer was busy"

@@ -101,17 +101,18 @@ class Build:
         return errors_in(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
-        """Return the result as lines; warnings with the same remedy are one, unless `in_full`."""
+        """Return the result as lines; the table of mounts and each unverified value only `in_full`."""
         if self.made is None:
             return [f"{self.folder} is up to date ({len(self.files)} files)"]
+        optimum = self.made.optimum
         return [
-            *self.made.optimum.table(),
+            f"wrote {len(self.files)} files to {self.folder}",
+            *(optimum.table() if in_full else [*optimum.hole_lines(tabled=False), *optimum.preferred_lines()]),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
             *(f"warning: {warning}" for warning in self.warnings),
             *finding_lines(self.made.findings, self.checks, in_full),
-            f"wrote {len(self.files)} files to {self.folder}",
         ]
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from scanwright.design.evaluation.comparison import ComparisonRow, compare
 from scanwright.design.evaluation.comparison_picture import compare_picture
-from scanwright.design.evaluation.comparison_table import notes, table, write_csv
+from scanwright.design.evaluation.comparison_table import notes, short_table, table, write_csv
 from scanwright.design.findings import Finding, sentence
 from scanwright.design.progress import Progress
-from scanwright.design.search.mounts.gain import gain_lines
+from scanwright.design.search.mounts.gain import gain_lines, verdict
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.built_scanner import BuiltScanner
@@ -36,17 +36,28 @@ class Comparison:
     folder: Path
     vibration: Finding | None = None
 
-    def lines(self) -> list[str]:
-        """Return the comparison as lines."""
+    def lines(self, in_full: bool = False) -> list[str]:
+        """Return the comparison as lines; all columns and their meaning only `in_full`."""
+        if not in_full:
+            return [
+                *short_table(self.rows),
+                "time of the measurement; beams: geometric mean within the ball; blind: share of the region never seen",
+                *verdict(self.optimum.gains),
+                *self._vibration_lines(),
+                f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
+            ]
         return [
             *table(self.rows),
             *(f"optimum: {line}" for line in self.optimum.hole_lines(tabled=False)),
             *(f"optimum: {line}" for line in gain_lines(self.optimum.gains)),
             *(f"optimum: {line}" for line in self.optimum.preferred_lines()),
             *notes(self.optimum.loaded, self.rows),
-            *([] if self.vibration is None else [f"with parts: {sentence(self.vibration)}"]),
+            *self._vibration_lines(),
             f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
         ]
+
+    def _vibration_lines(self) -> list[str]:
+        return [] if self.vibration is None else [f"with parts: {sentence(self.vibration)}"]
 
 
 def write_comparison(

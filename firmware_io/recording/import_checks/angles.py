@@ -31,10 +31,11 @@ def usual_speed_rad_s(log: JointLog) -> float:
     return float(np.median(speed[moving])) if moving.any() else 0.0
 
 
-def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
+def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
     """Return which positions lie far off their neighbours, and by how much [rad], shape (n,) each.
 
-    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near.
+    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near; and it
+    lies on the line through the two before or the two after it, as it does where the axis turns back or stops.
     """
     count = position_rad.size
     wrong, off = np.zeros(count, bool), np.zeros(count)
@@ -49,7 +50,24 @@ def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
     usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
     limit = max(_LEAST_RAD, _STEPS * usual, _SIGMAS * 1.4826 * float(np.median(off[inner])))
     wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)
-    return wrong, off
+    lone_rad = _off_both_lines(time_ns, position_rad)
+    lone = lone_rad > max(_LEAST_RAD, _SIGMAS * 1.4826 * float(np.median(lone_rad)))
+    return wrong | lone, np.where(lone, np.maximum(off, lone_rad), off)
+
+
+def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
+    """Return how far positions lie off the nearer of the lines through two before and two after them, shape (n,)."""
+    seconds, off = (time_ns - time_ns[0]) / 1e9, np.zeros(time_ns.size)
+    here = np.arange(2, time_ns.size - 2)
+    sides = []
+    for side in (-1, 1):
+        near, far = here + side, here + 2 * side
+        apart_s = seconds[near] - seconds[far]
+        rate = _wrapped(position_rad[near] - position_rad[far]) / np.where(apart_s == 0, np.inf, apart_s)
+        line = position_rad[near] + rate * (seconds[here] - seconds[near])
+        sides.append(np.abs(_wrapped(position_rad[here] - line)))
+    off[here] = np.minimum(*sides)
+    return off
 
 
 def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed: bool) -> Iterator[Finding]:
@@ -61,7 +79,7 @@ def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed
         dropped: outliers are dropped.
         timed: the times are exact enough to judge speeds by.
     """
-    wrong, off = outliers(position_rad)
+    wrong, off = outliers(time_ns, position_rad)
     if wrong.any():
         cost_mm = 1000 * AT_M * float(np.sin(min(off[wrong].max(), math.pi / 2)))
         share = np.mean(wrong)

@@ -357,13 +357,13 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     (tmp_path / "task.toml").write_text(TASK)
     scanner = scanner_for(0, 0, 25.5, -21.4, "URG-04LX")
     (tmp_path / "angles.json").write_text(scanner.angles.to_json())
-    code, out, _ = command("check", tmp_path)
+    code, out, _ = command("check", tmp_path, "-v")
     assert code == 0, out
     lines = out.splitlines()
-    found = Counter(line.split()[0] for line in lines[:-1])
+    found = Counter(line.split()[0] for line in lines[1:])
     assert found["ok"] > 20 and found["note"] > 5  # the report counts them apart as well
     warned = f"{found['warning']} warning{'' if found['warning'] == 1 else 's'}"
-    assert lines[-1] == f"0 errors, {warned}, {found['note']} notes, {found['ok']} passed"
+    assert lines[0] == f"0 errors, {warned}, {found['note']} notes, {found['ok']} passed"
     assert any("sub_plate" in line for line in lines)
     assert sum(" mm at 10 m)" in line and "bend" in line and "±" in line for line in lines) == 2
 

@@ -257,6 +257,8 @@ def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):
     before = bytes(emulator.memory.data)
     code, said, _ = command("servo-setup", emulator.port, "--dry-run")
     assert code == 0 and "return_delay_time (register 5) is 200" in said
+    _, as_json, _ = command("servo-setup", emulator.port, "--dry-run", "--json")
+    assert json.loads(as_json) == {"changes": said.splitlines(), "undo": None}
     assert bytes(emulator.memory.data[:36]) == before[:36] and not list(tmp_path.glob("servo-*"))
 
 
@@ -299,6 +301,8 @@ def test_scan_stops_where_nobody_can_be_asked(command, tmp_path):
         assert f"`scanwright servo-setup {emulators.ports.servo} --scanner {tmp_path}`" in complaints[2]
         assert len(complaints) == 3
         assert bytes(emulators.servo.memory.data[:24]) == before and not list(tmp_path.glob("servo-*"))
+        code, as_json, _ = command("doctor", tmp_path, "--json")
+        assert code == 0 and {finding["severity"] for finding in json.loads(as_json)["findings"]} >= {"ok", "warning"}
         code, said, _ = command("servo-setup", emulators.ports.servo, "--scanner", tmp_path)
         assert code == 0 and "ccw_angle_limit (register 8): 4095 -> 0" in said
         assert open_servo(emulators.ports.servo, spins=True).warnings() == ()
