@@ -52,10 +52,12 @@ def test_each_screw_of_a_joint_is_looked_at_from_its_own_head():
     assert found.screw == 2
 
 
-def test_every_screw_of_a_scanner_is_reached_and_a_key_that_is_too_long_is_an_error_with_its_step(made, monkeypatch):
+def test_every_screw_of_a_scanner_is_reached_and_a_roof_over_it_is_an_error_with_its_step(made, monkeypatch):
     assembly = made.result.assembly
     (check,) = access_checks(assembly)
     assert (check.severity, check.value) == ("ok", 0.0)
+    stiff = access._bodies(assembly) | {"servo_case": body((-300, -300, 120), (300, 300, 130))}
+    monkeypatch.setattr(access, "_bodies", lambda _: stiff)
     monkeypatch.setattr(access, "KEYS_MM", {name: (radius, 2000.0) for name, (radius, _) in access.KEYS_MM.items()})
     failed = access_checks(assembly)
     assert failed and {check.severity for check in failed} == {"error"}
