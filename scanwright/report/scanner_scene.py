@@ -1,13 +1,11 @@
 """The scanner in 3D for the report: bodies of `assembly.glb`, their places in `exploded.glb`, axis, field of view.
 
-The page draws this and reads no files: matrices are column by column, arrays little-endian in
-base64, all in the world frame in metres.
+The page draws this and reads no files: matrices are column by column, arrays little-endian in base64, all in the world
+frame in metres. Corners are in 65,535 steps of the body's box, and its matrices start from there.
 """
 
 from __future__ import annotations
 
-from base64 import b64encode
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from scanwright.design.arrays import Array
 from scanwright.design.frames import apply
 from scanwright.design.motion import Sweep
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
+from scanwright.report.build_files import numbers
 from scanwright.report.check_pictures import PlacedBody
 
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
@@ -28,6 +27,7 @@ SQUARE_M = 0.05  # of the grid below the scanner
 FAN_REACH = 0.9  # of the radius of the scanner: how far the fan and the axis are drawn
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # glTF has y up
 FRAMES = ("rot", "laser")
+STEPS = 2**16 - 1
 
 
 def load_glb(path: Path) -> Any:
@@ -63,16 +63,19 @@ def scanner_scene(
         together.append(apply(T_world_body, mesh.vertices))
         spread.append(apply(T_apart, mesh.vertices))
         vertices, number = np.unique(mesh.vertices, axis=0, return_inverse=True)  # they differ in their normals
-        wide = len(vertices) > 2**16 - 1
+        wide = len(vertices) > STEPS
+        low, span = vertices.min(axis=0), np.maximum(np.ptp(vertices, axis=0), 1e-9)
+        T_body_box = np.diag([*span, 1.0])
+        T_body_box[:3, 3] = low
         bodies.append(
             {
                 "name": node,
                 "turns": node in turning,
                 "colour": _srgb(mesh.visual.material.baseColorFactor),
-                "matrix": _column_by_column(T_world_body),
-                "apart": _column_by_column(T_apart),
-                "vertices": _packed(vertices, "<f4"),
-                "faces": _packed(number.reshape(-1)[mesh.faces], "<u4" if wide else "<u2"),
+                "matrix": _column_by_column(T_world_body @ T_body_box),
+                "apart": _column_by_column(T_apart @ T_body_box),
+                "vertices": numbers(np.round((vertices - low) / span * STEPS), "<u2"),
+                "faces": numbers(number.reshape(-1)[mesh.faces], "<u4" if wide else "<u2"),
                 "wide": wide,
             }
         )
@@ -109,12 +112,6 @@ def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
     return bodies
 
 
-def about_centre(assembly: Any, angles: AngleSet) -> list[PlacedBody]:
-    """Return the same bodies, from the optical centre."""
-    centre_m = angles.T_world_rot(0.0)[:3, 3]
-    return [replace(body, triangles_m=body.triangles_m - centre_m) for body in placed_bodies(assembly).values()]
-
-
 def _pose(scene: Any, node: str) -> Array:
     """Return T_world_node, z up [m]."""
     return Y_TO_Z @ scene.graph.get(node)[0]
@@ -124,8 +121,8 @@ def _fan(shadow: SelfOcclusion, bearings_rad: Array) -> dict[str, Any]:
     """Return bearings, and for every beam that is ever hidden one bit an axis step, 1 if it is."""
     stator = np.zeros((len(bearings_rad), AXIS_STEPS), bool) if shadow.stator is None else shadow.stator
     hidden = stator | shadow.beams[:, None]
-    rows = {str(beam): _packed(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
-    return {"bearings": _packed(bearings_rad, "<f4"), "steps": hidden.shape[1], "hidden": rows}
+    rows = {str(beam): numbers(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
+    return {"bearings": numbers(bearings_rad, "<f4"), "steps": hidden.shape[1], "hidden": rows}
 
 
 def _grid(points: Array) -> dict[str, Any]:
@@ -154,7 +151,3 @@ def _srgb(linear: ArrayLike) -> list[float]:
 
 def _column_by_column(matrix: Array) -> list[float]:
     return (np.round(matrix, 9).T.ravel() + 0.0).tolist()
-
-
-def _packed(values: ArrayLike, kind: str) -> str:
-    return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
