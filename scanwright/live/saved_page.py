@@ -13,7 +13,7 @@ from numpy import ndarray
 from scanwright.design.arrays import Vector
 from scanwright.report.build_files import packed
 from scanwright.report.colours import COLOUR_STOPS
-from scanwright.report.one_scan import cloud_scene
+from scanwright.report.room import cloud_scene
 
 MOST_POINTS = 600_000  # of a page: some 5 MB
 LOOK = {"yaw": np.radians(-140.0), "pitch": np.radians(35.0)}  # behind and above

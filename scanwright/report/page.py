@@ -34,10 +34,9 @@ from scanwright.report.colours import COLOUR_STOPS
 from scanwright.report.density_sphere import DensitySphere, density_sphere
 from scanwright.report.first_screen import cards, count, motion_in_words, title, to_do
 from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
-from scanwright.report.one_scan import cloud_scene, one_scan
 from scanwright.report.parts_list import price, read_parts
-from scanwright.report.room import room_about, room_scene
-from scanwright.report.scanner_scene import LARGEST_BYTES, load_glb, placed_bodies, scanner_scene
+from scanwright.report.room import cloud_scene, one_scan, room_about, room_scene
+from scanwright.report.scanner_scene import LARGEST_BYTES, load_glb, placed_bodies, robot_bodies, scanner_scene
 
 REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
@@ -161,6 +160,7 @@ def _task_scene(
     points = points[points[:, 2] < CEILING_M]
     low, high = np.percentile(points[:, 2], SPREAD_PERCENT)
     return room_scene(room, centre_m, np.array(sphere.middle), sphere.below) | {
+        "robot": robot_bodies(loaded.task, loaded.source.parent, centre_m),
         "maps": [{"low": view.low, "high": view.high} for view in sphere.maps],
         "cloud": cloud_scene(points + centre_m, (points[:, 2] - low) / (high - low)),
         "shown": len(points),

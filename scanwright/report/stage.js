@@ -125,11 +125,13 @@ const inflated = async (text) => {
     if (indices) filled(gl.ELEMENT_ARRAY_BUFFER, indices);
     return array;
   };
-  const bodies = (scene.bodies ?? []).map((body) => {
+  const shaped = (body) => {
     const indices = new (body.wide ? Uint32Array : Uint16Array)(bytes(body.faces));
     const array = shape(new Uint16Array(bytes(body.vertices)), indices, 3, gl.UNSIGNED_SHORT);
     return { ...body, array, count: indices.length, type: body.wide ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT };
-  });
+  };
+  const bodies = (scene.bodies ?? []).map(shaped);
+  const robot = (scene.robot ?? []).map(shaped);
   const lines = shape(new Float32Array([0, 0, -1, 0, 0, 1]));
   const arrow = shape(new Float32Array([1, 0, 0, 0.75, 0.08, 0, 0.75, -0.08, 0, 0.75, 0.02, 0, 0, 0.02, 0, 0, -0.02, 0, 0.75, 0.02, 0, 0, -0.02, 0, 0.75, -0.02, 0]));
   const grid = scene.grid && (() => {
@@ -312,6 +314,7 @@ const inflated = async (text) => {
     } else {
       gl.uniform3fv(uniform.centre, scene.centre);
       for (const body of bodies) drawBody(body, turn, [...body.colour, 1]);
+      if (view === "room") for (const body of robot) drawBody(body, turn, [...body.colour, 1]);
       if (view === "room" && ready) drawRoom(eye);
       if (view === "scan") {
         use(POINTS, scaled(cloud.low, cloud.span));

@@ -18,7 +18,7 @@ from scanwright.design.errors import ScanwrightError
 from scanwright.design.objective.problem import Problem
 from scanwright.design.scanner import Scanner
 from scanwright.design.task.task import LoadedTask
-from scanwright.report.one_scan import one_scan
+from scanwright.report.room import one_scan
 from scanwright.studio.state import Setting
 from scanwright.studio.view.latest_only import LatestOnly
 from scanwright.studio.view.scanner_bodies import make_bodies

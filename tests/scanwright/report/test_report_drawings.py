@@ -68,7 +68,7 @@ def test_a_sweep_stays_within_its_limits(folder):
 def test_a_scanner_too_large_for_a_page_is_left_out(folder, monkeypatch):
     monkeypatch.setattr("scanwright.report.page.LARGEST_BYTES", 100)
     page = Page(report_html(folder))
-    assert "too much for one page" in page.text["result"] and "canvas" not in page.ids
+    assert "too much for one page" in page.text["result"] and "spin" not in page.ids
 
 
 def test_the_pictures_of_the_sphere_show_what_is_where():

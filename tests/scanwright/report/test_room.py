@@ -1,13 +1,17 @@
 """The room of the stage: its size, and where its camera stands."""
 
+from base64 import b64decode
+
 import numpy as np
 import pytest
+import trimesh
 
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.task.task import load_task
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.room import room_about, room_scene
+from scanwright.report.scanner_scene import robot_bodies
 
 GROUND = {"shape": "ground", "from_m": 0.5, "to_m": 3.0, "width_m": 2.0, "height_m": 0.4}
 
@@ -46,3 +50,16 @@ def test_the_camera_stands_behind_the_scanner():
     scene = room_scene(room_about(task().task), np.zeros(3), np.array([0.0, 0.8, -0.6]), 1.0)
     eye = np.array([np.cos(scene["look"]["yaw"]), np.sin(scene["look"]["yaw"])])
     assert eye @ [0, 1] == pytest.approx(-np.cos(np.radians(35)), abs=1e-3)
+
+
+def test_a_robot_stands_where_its_mesh_is(tmp_path):
+    mesh = trimesh.creation.box((0.6, 0.4, 0.2))
+    mesh.apply_translation([0, 0, 0.1])
+    mesh.export(tmp_path / "robot.stl")
+    mask = {"shape": "mesh", "file": str(tmp_path / "robot.stl"), "sensor_m": [0.2, 0.0, 0.4]}
+    centre_m = np.array([0.1, 0.0, 0.5])
+    (robot,) = robot_bodies(task(mask=[mask]).task, tmp_path, centre_m)
+    T = np.reshape(robot["matrix"], (4, 4)).T
+    box = [T[:3, 3], T[:3, 3] + np.diag(T)[:3]]
+    np.testing.assert_allclose(box - centre_m, [[-0.5, -0.2, -0.4], [0.1, 0.2, -0.2]], atol=1e-6)
+    assert len(np.frombuffer(b64decode(robot["faces"]), "<u2")) == 36

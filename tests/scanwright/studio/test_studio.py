@@ -20,7 +20,7 @@ from scanwright.design.objective.score import score
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import Limits, load_task
 from scanwright.firmware_io.emulators.world import furnished_room
-from scanwright.report.one_scan import MOST_RAYS, one_scan
+from scanwright.report.room import MOST_RAYS, one_scan
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
