@@ -183,20 +183,9 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
             checks.joint(state.time_ns, state.position_rad)
             angles += 1
 
-        for state in axis.window:
-            keep(state)
-        while done < wanted or waiting:
-            scan = scans.next()
-            if scans.away > away:
-                resting = 1 + _wait_until_steady(scans, axis, plan.motion, reporter, keep)
-                axis.left_out["scans until the servo turned again"] += resting
-                earlier, away = math.floor(done), scans.away
-                begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
-                continue
-            for finding in checks.scan(scan, time.monotonic_ns()):
-                reporter.warn(sentence(finding))
-            if done < wanted:
-                waiting.append(scan)
+        def write_complete() -> None:
+            """Write the scans after whose last beam an angle is known."""
+            nonlocal recorded, first_ns, last_ns
             for state in axis.hear():
                 keep(state)
             while waiting and waiting[0].time_ns[-1] <= axis.window[-1].time_ns:
@@ -209,6 +198,26 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
                 first_ns = first_ns or ready.stamp_ns
                 recorded += 1
                 last_ns = int(ready.time_ns[-1])
+
+        for state in axis.window:
+            keep(state)
+        while done < wanted or waiting:
+            try:
+                scan = scans.next()
+            except DeviceError:
+                write_complete()
+                raise
+            if scans.away > away:
+                resting = 1 + _wait_until_steady(scans, axis, plan.motion, reporter, keep)
+                axis.left_out["scans until the servo turned again"] += resting
+                earlier, away = math.floor(done), scans.away
+                begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
+                continue
+            for finding in checks.scan(scan, time.monotonic_ns()):
+                reporter.warn(sentence(finding))
+            if done < wanted:
+                waiting.append(scan)
+            write_complete()
             if isinstance(plan.motion, Spin):
                 turns = abs(axis.window[-1].position_rad - from_rad) / (2 * math.pi)
                 done = earlier + max(turns - scan.scan_time_s / plan.motion.period_s, 0.0)

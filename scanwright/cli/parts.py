@@ -62,7 +62,7 @@ def build(
     _print_failed_checks(built.checks)
     record = Built(built.folder, built.files, built.warnings, built.misfits, entries_of(built.checks))
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
-    warn(built.misfits)
+    _warn_of_misfits(built.misfits)
     report = built.folder / "report.html"
     if built.failed:
         hint(f"next: read the failed checks in {report}, and change the task")
@@ -87,18 +87,23 @@ def report(out: BuildFolder, as_json: AsJson = False) -> None:
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
     """Check the parts of a build (fit, loads, printing).
 
-    Prints the checks that did not pass; with -v, all of them.
+    Prints the failed checks and the warnings; with -v, all checks.
     """
     from scanwright import api
     from scanwright.cli.results.of_commands import Checked
+    from scanwright.pipeline.build import finding_lines
 
     checks = api.check(out, progress=ConsoleProgress())
     loaded = api.load_task(out / "task.toml")
     _print_failed_checks(checks)
-    warn(loaded.misfits())
-    shown = [check for check in checks if check.severity != "ok" or verbosity() is Verbosity.VERBOSE]
+    _warn_of_misfits(loaded.misfits())
     lines = [_tally(Counter(each.severity for each in checks))]
-    lines += [f"{each.severity:7} {sentence(each)}" for each in shown if each.severity != "error"]
+    if verbosity() is Verbosity.VERBOSE:
+        lines += [f"{each.severity:7} {sentence(each)}" for each in checks if each.severity != "error"]
+    else:
+        named = ("unverified", "known_error")  # a line sums them up
+        warnings = [each for each in checks if each.severity == "warning" and each.code not in named]
+        lines += finding_lines(warnings, checks, in_full=False)
     show_result(lambda: lines, Checked(loaded.task.name, entries_of(checks)), as_json)
     raise typer.Exit(1 if errors_in(checks) else 0)
 
@@ -139,6 +144,14 @@ def study(
     except KeyboardInterrupt:
         print_note("stopped; run the same command to continue")
         raise typer.Exit(130) from None
+
+
+def _warn_of_misfits(misfits: Sequence[str]) -> None:
+    """Print which products the printed parts do not fit; the reasons, which are indented, only with -v."""
+    if verbosity() is Verbosity.VERBOSE:
+        warn(misfits)
+    else:
+        warn(f"{line.rstrip(':')} (-v lists why)" for line in misfits if not line.startswith(" "))
 
 
 def _print_failed_checks(checks: Sequence[Finding]) -> None:

@@ -130,9 +130,10 @@ def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_ful
     """Return one line for each finding and each unverified value; unless `in_full`, only a count of these."""
     unverified = [check for check in checks if check.code == "unverified"]
     lines = [f"{each.severity}: {sentence(each)}" for each in (*findings, *(unverified if in_full else ()))]
-    counts = Counter(check.subject for check in unverified) if not in_full else {}
-    todo = "measure yours before you print, report.html lists them"
-    return lines + [f"warning: {name}: unverified values that shape parts: {n}: {todo}" for name, n in counts.items()]
+    if in_full or not unverified:
+        return lines
+    counts = ", ".join(f"{name}: {n}" for name, n in Counter(check.subject for check in unverified).items())
+    return [*lines, f"warning: unverified values shape parts ({counts}): measure yours first, report.html lists them"]
 
 
 def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:

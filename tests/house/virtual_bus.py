@@ -28,7 +28,7 @@ class VirtualBus(OnClock):
             self.servos.append(other)
         self.memory = self.servo.memory
         self.plugged, self.cut = True, False  # the adapter; the cable to the servo
-        self.bit_error_rate = 0.0
+        self.bit_error_rate, self.shorted = 0.0, False
         self.heard, self.writes = bytearray(), []
         self._random = random.Random(seed)
         self._coming = deque()  # when, and which byte
@@ -61,6 +61,8 @@ class VirtualBus(OnClock):
         byte_ns = round(10e9 / self.baudrate)
         self.now_ns += len(data) * byte_ns
         at_ns = self.now_ns
+        if self.shorted:
+            self._coming.extend((at_ns + (k + 1) * byte_ns, 0) for k in range(len(data)))
         for delay_ns, answer in self.serve(data, self.now_ns):
             at_ns += delay_ns
             for byte in answer:
@@ -70,7 +72,7 @@ class VirtualBus(OnClock):
 
     def hears(self):
         """Whether anything that is sent reaches the servo."""
-        return self.plugged and not self.cut and self.servo.listens(self.now_ns)
+        return self.plugged and not (self.cut or self.shorted) and self.servo.listens(self.now_ns)
 
     def serve(self, data, now_ns):
         """What the servos answer to bytes that were whole at a time, and how long each waits with it."""
@@ -78,7 +80,7 @@ class VirtualBus(OnClock):
             servo.protect(now_ns)
         hearing = [s for s in self.servos if s.listens(now_ns) and abs(self.baudrate / s.baud - 1) < 0.03]
         buffer, given = bytearray(data), []
-        while hearing and not self.cut and (request := hearing[0].take(buffer)):
+        while hearing and not (self.cut or self.shorted) and (request := hearing[0].take(buffer)):
             given += [(hearing[0].return_delay_ns, answer) for answer in answers(hearing, request, now_ns)]
         return given
 

@@ -131,6 +131,23 @@ def test_a_scan_with_a_servo_that_is_set_up_writes_nothing_that_outlasts_the_pow
     assert kept_writes(emulator) == set() and kept(emulator) == before
 
 
+CURRENT_MODES = {0: "current control", 5: "current-based position control", 16: "PWM control"}
+
+
+@pytest.mark.parametrize("model", ["XL330-M288", "XM430-W350"])
+@pytest.mark.parametrize("spins", [True, False])
+@pytest.mark.parametrize("mode", CURRENT_MODES)
+def test_a_mode_of_current_is_refused_by_its_name(model, spins, mode, virtual_bus):
+    emulator = virtual_bus(model, "2.0")
+    emulator.set_up(spins=spins)
+    emulator.memory[11] = mode
+    with pytest.raises(ServoSetupError) as refused:
+        open_servo(emulator.port, model, spins=spins)
+    does = "turn continuously" if spins else "go to every angle"
+    expected = f"operating_mode (register 11) is {mode}, {CURRENT_MODES[mode]}, so that it does not {does}; "
+    assert f"{expected}{1 if spins else 3} is right" in str(refused.value)
+
+
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_a_driver_that_may_not_write_does_not_change_the_mode(model, protocol, virtual_bus):
     emulator = virtual_bus(model, protocol)

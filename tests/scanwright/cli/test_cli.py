@@ -249,7 +249,7 @@ def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(com
     code, out, complaints = command("build", "low_cost", "--quiet")
     assert code == 0 and "will not fit" not in out
     heads = [line for line in complaints if line.startswith("warning: ")]
-    assert heads == ["warning: UH1256-02-0610-06S: parts printed for it will not fit the real device:"]
+    assert heads == ["warning: UH1256-02-0610-06S: parts printed for it will not fit the real device (-v lists why)"]
     _, out, _ = command("build", "low_cost", "--json")
     assert json.loads(out)["folder"] == str(tmp_path) and json.loads(out)["misfits"]
 
