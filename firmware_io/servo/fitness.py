@@ -137,8 +137,13 @@ def slow_adapter(port: str) -> str | None:
 
 
 def _differing(unit: ServoUnit, needed: list[tuple[Setting, str]]) -> list[SettingChange]:
-    known = [SettingChange(register, unit.count(register), count, why) for (register, count), why in needed]
-    return [change for change in known if change.now != change.needed]
+    table = unit.table
+    changes = []
+    for (register, count), why in needed:
+        now = unit.count(register)
+        named = f"{table.modes[now]}, " if register == table.wheel[0][0] and now in table.modes else ""
+        changes.append(SettingChange(register, now, count, named + why))
+    return [change for change in changes if change.now != change.needed]
 
 
 def _reading_s(table: ControlTable, baud: int) -> float:

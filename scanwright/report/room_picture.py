@@ -185,7 +185,7 @@ def _robot(task: Task, folder: Path) -> list[PlacedBody]:
             T_world_mesh = np.eye(4)
             T_world_mesh[:3, :3] = (Rz(yaw) @ Ry(pitch) @ Rx(roll)).T
             T_world_mesh[:3, 3] = -T_world_mesh[:3, :3] @ region.sensor_m
-            triangles = ray_caster.load_triangles(folder / region.file, region.unit_m, T_world_mesh)
+            triangles = ray_caster.load_triangles(folder / region.file, region.unit_m, T_world_mesh, region.posture)
             robots.append(PlacedBody(triangles, False, tuple(ROBOT / 255)))
     return robots
 

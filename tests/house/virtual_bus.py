@@ -1,60 +1,91 @@
 """Servos on a bus whose clock goes forward only where somebody waits."""
 
+import random
 from collections import deque
+
+from virtual_time import OnClock
 
 from scanwright.firmware_io.emulators.servo.machine import answers
 from scanwright.firmware_io.emulators.servo.models import machine_of
 from scanwright.firmware_io.emulators.servo_plant import Load
+from scanwright.firmware_io.servo.fitness import set_up_counts
 
 
-class VirtualBus:
+class VirtualBus(OnClock):
     """The machines of `ServoEmulator` behind a port of pyserial's shape, the clock of both, and all that was sent."""
 
     port = "virtual"
     is_open = True
 
-    def __init__(self, model, protocol=None, others=()):
-        self.now_ns = 1_000_000_000
+    def __init__(self, model, protocol=None, others=(), clock=None, seed=0, angle_rad=0.0):
+        super().__init__(clock)
         self.baudrate, self.timeout = 57_600, 0.0
-        self.servo = machine_of(model, protocol, Load(), self.now_ns, 0.0)
+        self.servo = machine_of(model, protocol, Load(), self.now_ns, angle_rad)
         self.servos = [self.servo]
         for other_model, number in others:
             other = machine_of(other_model, self.servo.table.protocol, Load(), self.now_ns, 0.0)
             other.memory[other.table.id.address] = number
             self.servos.append(other)
         self.memory = self.servo.memory
+        self.plugged, self.cut = True, False  # the adapter; the cable to the servo
+        self.bit_error_rate, self.shorted = 0.0, False
         self.heard, self.writes = bytearray(), []
+        self._random = random.Random(seed)
         self._coming = deque()  # when, and which byte
 
-    def monotonic(self):
-        return self.now_ns / 1e9
+    def set_up(self, *, spins):
+        """Give the servo the settings of one that is ready for a scan."""
+        for register, count in set_up_counts(self.servo.table, round(self.servo.baud), spins=spins).items():
+            self.memory[register.address] = count
 
-    def monotonic_ns(self):
-        return self.now_ns
+    def open(self, port, baud, timeout):
+        self._here()
+        self.port, self.baudrate, self.timeout, self.is_open = port, baud, timeout, True
+        return self
 
-    def sleep(self, seconds):
-        self.now_ns += round(seconds * 1e9)
+    def fileno(self):
+        return -1
+
+    def unplug(self):
+        self.plugged = False
+        self._coming.clear()
 
     def brown_out(self):
         self.servo.restart(self.now_ns)
         self.sleep(10.0)
 
     def write(self, data):
+        self._here()
         self.heard += data
         self.writes.append(bytes(data))
-        hearing = [s for s in self.servos if s.listens(self.now_ns) and abs(self.baudrate / s.baud - 1) < 0.03]
-        buffer, byte_ns = bytearray(data), round(10e9 / self.baudrate)
+        byte_ns = round(10e9 / self.baudrate)
         self.now_ns += len(data) * byte_ns
         at_ns = self.now_ns
-        while hearing and (request := hearing[0].take(buffer)):
-            delay_ns = hearing[0].return_delay_ns
-            for answer in answers(hearing, request, self.now_ns):
-                at_ns += delay_ns
-                for byte in answer:
-                    at_ns += byte_ns
-                    self._coming.append((at_ns, byte))
+        if self.shorted:
+            self._coming.extend((at_ns + (k + 1) * byte_ns, 0) for k in range(len(data)))
+        for delay_ns, answer in self.serve(data, self.now_ns):
+            at_ns += delay_ns
+            for byte in answer:
+                at_ns += byte_ns
+                flip = 1 << self._random.randrange(8) if self._random.random() < self.bit_error_rate else 0
+                self._coming.append((at_ns, byte ^ flip))
+
+    def hears(self):
+        """Whether anything that is sent reaches the servo."""
+        return self.plugged and not (self.cut or self.shorted) and self.servo.listens(self.now_ns)
+
+    def serve(self, data, now_ns):
+        """What the servos answer to bytes that were whole at a time, and how long each waits with it."""
+        for servo in self.servos:
+            servo.protect(now_ns)
+        hearing = [s for s in self.servos if s.listens(now_ns) and abs(self.baudrate / s.baud - 1) < 0.03]
+        buffer, given = bytearray(data), []
+        while hearing and not (self.cut or self.shorted) and (request := hearing[0].take(buffer)):
+            given += [(hearing[0].return_delay_ns, answer) for answer in answers(hearing, request, now_ns)]
+        return given
 
     def read(self, length):
+        self._here()
         end_ns = self.now_ns + round(self.timeout * 1e9)
         data = bytearray()
         while len(data) < length and self._coming and self._coming[0][0] <= end_ns:
@@ -71,3 +102,8 @@ class VirtualBus:
 
     def close(self):
         self._coming.clear()
+        self.is_open = False
+
+    def _here(self):
+        if not self.plugged:
+            raise OSError("unplugged")

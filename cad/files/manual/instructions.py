@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import print_words
+from scanwright.cad.assembly.scenes import StepScene, scenes_of
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.checks.products import products_of
 from scanwright.cad.files.manual.pictures import StepPictures
-from scanwright.cad.files.manual.scenes import StepScene, scenes_of
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import DECK_MM, Joint
 from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TEST_PLATE
@@ -131,7 +131,7 @@ def picture_name(number: int) -> str:
 
 def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     """Return one joint as a sentence, with the torque of its screws."""
-    what = f"{joint.count} x {joint.number}"
+    what = f"{joint.count} x {joint.number}{'' if joint.washer_mm is None else ' with washers'}"
     nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
     where = {
         "thread": f"from {joint.part} into {joint.onto}",

@@ -8,9 +8,9 @@ from lib3mf import get_wrapper
 from PIL import Image
 from scipy.spatial import ConvexHull
 
+from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.files.manual.instructions import picture_name, step_files
 from scanwright.cad.files.manual.pictures import SIZE_PX, WORDS_PX, StepPictures
-from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.plates import EDGE_MM, GAP_MM, plates_of
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import on_bed

@@ -180,6 +180,7 @@ def test_servos_add_their_parts_to_one_fast_status_each_with_the_sum_so_far():
     [
         (132, b"\0\0\0\0", 7),  # read only
         (11, b"\1", 0),
+        (11, b"\x09", 4),  # no such mode
         (104, b"\xff\xff\xff\x7f", 4),
         (104, b"\0\0", 5),
         (9000, b"\0", 7),

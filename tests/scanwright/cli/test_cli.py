@@ -230,7 +230,7 @@ def test_measure_proposes_a_product_file(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, _ = command("measure", "plate.stl", "--json")
     assert code == 0
-    assert json.loads(out)["holes"][0]["at_mm"] == [0, 0, 0]
+    assert json.loads(out)["values"]["holes"][0]["at_mm"] == [0, 0, 0]
     assert "verified = false" in (tmp_path / "plate.toml").read_text()
     assert (tmp_path / "plate.svg").exists()
     code, _, err = command("measure", "plate.stl", "--kind", "servo")
@@ -270,7 +270,9 @@ def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(com
     code, out, complaints = command("build", "low_cost", "--quiet")
     assert code == 0 and "will not fit" not in out
     heads = [line for line in complaints if line.startswith("warning: ")]
-    assert heads == ["warning: UH1256-02-0610-06S: parts printed for it will not fit the real device:"]
+    assert heads == ["warning: UH1256-02-0610-06S: parts printed for it will not fit the real device (-v lists why)"]
+    _, out, _ = command("build", "low_cost", "--json")
+    assert json.loads(out)["folder"] == str(tmp_path) and json.loads(out)["misfits"]
 
 
 def test_a_bug_shows_its_traceback(command, monkeypatch):

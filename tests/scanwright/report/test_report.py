@@ -55,6 +55,8 @@ def test_the_command_writes_what_the_build_wrote(folder, command):
     assert command("report", folder) == (0, f"wrote {folder / 'report.html'}\n", [])
     assert {name: (folder / name).read_bytes() for name in before} == before
     assert is_current(folder, load_task(folder / "task.toml"))
+    _, out, _ = command("report", folder, "--json")
+    assert json.loads(out)["files"] == ["report.html"]
 
 
 def test_the_manifest_is_in_the_order_of_a_manifest_written_last(folder, tmp_path):
@@ -221,7 +223,8 @@ def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
     assert (broken.angles_deg, broken.breaks) == ((0, -55, -80, 75), "blind to 0.019% of the weight")
     assert broken.J < kept.J == score(problem, np.radians(kept.angles_deg)).J
     assert (
-        "would take (0, -55, -80, 75) with J = -6.1284, which is blind ahead and 35 deg down: 0.58 deg" in found.alone
+        "(0, -55, -80, 75) with J = -6.1284 would be best, which is blind ahead and 35 deg down: 0.58 deg"
+        in found.alone
     )
     assert found.alone.endswith("What keeps all that the task asks costs 0.086% of the beams per ball against it.")
     allowed = loaded.task.model_copy(update={"angles": loaded.task.angles.model_copy(update={"holes": "allow"})})
