@@ -56,7 +56,7 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
         progress: progress callback.
 
     Returns:
-        The assembly: cadquery solids by name, such as `made["alignment_linkage"]`; `bought` are the purchased products.
+        The assembly: cadquery solids by name, such as `assembly.made["alignment_linkage"]`; `bought` are the purchased products.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -64,8 +64,8 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
 
     Example:
         >>> import scanwright as sw
-        >>> made = sw.make_parts("tilted.toml", "out/tilted/angles.json")
-        >>> made["alignment_linkage"].isValid()
+        >>> assembly = sw.make_parts("tilted.toml", "out/tilted/angles.json")
+        >>> assembly.made["alignment_linkage"].isValid()
         True
     """
     require_kernel("the making of parts")

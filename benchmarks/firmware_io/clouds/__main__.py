@@ -1,4 +1,4 @@
-"""How fast recordings become clouds, against what robotics uses: `python benchmarks/firmware_io/clouds.py [MINUTES]`.
+"""How fast recordings become clouds, against what robotics uses: `python -m benchmarks.firmware_io.clouds [MINUTES]`.
 
 Four tables, each a ratio of two things measured in turns in one run, with the spread over the rounds. Times are those
 of the wall, and of the processor where other programs may run beside:

@@ -1,0 +1,1 @@
+"""Conversion of clouds: speed and memory."""
