@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """One skipped item, the reason, and the count that it saved (not seconds, since builds are reproducible)."""
+    """Work that was skipped; what it saved is a count, not seconds, since builds are reproducible.
+
+    Attributes:
+        what: what was skipped.
+        why: reason.
+        saved: count that it saved.
+        unit: unit of the count.
+    """
 
     what: str
     why: str

@@ -1,4 +1,4 @@
-"""Reference pages of the task file and of product files, written from their schemas when the pages are built."""
+"""Reference pages of task files, product files and JSON output, written from schemas when the pages are built."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _TYPES = {"number": "number", "integer": "integer", "string": "text", "boolean":
 
 
 def write_schema_pages(folder: Path) -> None:
-    """Write task-file.md and catalogue.md into a folder."""
+    """Write task-file.md, catalogue.md, devices.md and json.md into a folder."""
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.products import Bearing, Belt, Printer
     from scanwright.design.catalogue.servo import Servo
@@ -40,6 +40,60 @@ def write_schema_pages(folder: Path) -> None:
     for kind in kinds:
         catalogue += _sections(kind.model_json_schema(), kind.__name__, shown)
     (folder / "catalogue.md").write_text("\n".join(catalogue), encoding="utf-8")
+    _write_sketches(folder)
+    (folder / "json.md").write_text("\n".join(_json_page()), encoding="utf-8")
+
+
+def _write_sketches(folder: Path) -> None:
+    """Write devices.md with a sketch of every product that has dimensions."""
+    from scanwright.cad.drawings.devices.sketch import sketch_svg
+    from scanwright.design.catalogue.catalogue import load_catalogue
+    from scanwright.design.catalogue.products import Belt, Multibeam
+
+    page = [
+        "# Sketches of the products",
+        "",
+        "Drawn from the records of the catalogue, in the frame of each device. `scanwright catalogue NAME --sketch "
+        "FILE.svg` draws the same. A `?` marks values that no source verifies.",
+    ]
+    (folder / "sketches").mkdir(exist_ok=True)
+    for product in load_catalogue():
+        if not isinstance(product, Belt | Multibeam):
+            file = f"sketches/{product.name.lower().replace(' ', '-')}.svg"
+            (folder / file).write_bytes(sketch_svg(product))
+            page += ["", f"## {product.name}", "", f"![{product.name} with its dimensions]({file})"]
+    (folder / "devices.md").write_text("\n".join([*page, ""]), encoding="utf-8")
+
+
+def _json_page() -> Iterator[str]:
+    """Yield the lines of the page on `--json`: a table for each record, where it is used first."""
+    from scanwright.cli.results.of_commands import RESULTS, result_schema
+
+    yield from ("# JSON output", "")
+    yield (
+        "With `--json` a command prints one object on standard output, also with exit code 1; errors and warnings are "
+        "on standard error. `scanwright schema COMMAND` prints its JSON schema. Infinite numbers are null."
+    )
+    shown: set[str] = set()
+    for name in RESULTS:
+        schema = result_schema(name)
+        yield from ("", f"## {name}", "")
+        tops = [schema["title"]] if "properties" in schema else [_named(one) for one in schema["anyOf"]]
+        yield from (f"Prints {' or '.join(f'[{top}](#{top.lower()})' for top in tops)}.", "")
+        records = {schema["title"]: schema} if "properties" in schema else {}
+        for title, record in (records | schema.get("$defs", {})).items():
+            if title not in shown and "properties" in record:
+                shown.add(title)
+                yield from _record(title, record)
+
+
+def _record(title: str, record: Schema) -> Iterator[str]:
+    """Yield a heading and a table for a record of the JSON output."""
+    yield from (f"### {title}", "", record["description"], "", "| key | value | meaning |", "| --- | --- | --- |")
+    for key, field in record["properties"].items():
+        cells = (f"`{key}`", _type(field).replace("table", "object"), field["description"])
+        yield f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+    yield ""
 
 
 def _sections(schema: Schema, title: str, shown: set[str] | None = None) -> Iterator[str]:

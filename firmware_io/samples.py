@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 from numpy import ndarray
 
+from scanwright.design.arrays import Float32s, Ints
 from scanwright.design.errors import RecordingError
 
 _TURNS_RAD = 1000.0
@@ -40,7 +42,7 @@ class Scan:
         angle_min_rad: bearing of the first beam, counter-clockwise from the laser's x.
         angle_increment_rad: from one beam to the next; negative for a lidar that turns clockwise.
         time_increment_s: from one beam to the next; 0 where the sensor does not say.
-        scan_time_s: from one scan to the next; 0 where the sensor does not say.
+        scan_time_s: of a turn of the mirror, also if turns between two scans are skipped; 0 if unknown.
         range_min_m: shortest range the sensor can mean.
         range_max_m: longest range the sensor can mean.
         range_m: shape (n,), as the sensor gave it; NaN, inf or 0 where nothing returned.
@@ -95,6 +97,62 @@ class Scan:
             return self.stamp_ns + self.beam_offset_ns
         offset_ns = np.rint(np.arange(self.range_m.size) * (self.time_increment_s * 1e9))
         return self.stamp_ns + offset_ns.astype(np.int64)
+
+
+Echo = Literal["first", "last", "strongest", "all"]
+
+
+def chosen_echo(range_m: Float32s, intensity: Float32s, echo: str) -> Ints:
+    """Return the index of an echo of each ray, shape (...); of "all" the first, of equal intensities the nearest.
+
+    Args:
+        range_m: shape (..., echoes), NaN, inf or 0 if there is none.
+        intensity: shape (..., echoes), or without echoes (..., 0).
+        echo: first, last, strongest or all.
+    """
+    returned = np.isfinite(range_m) & (range_m > 0)
+    near_m = np.where(returned, range_m, np.inf)
+    if echo == "last":
+        return np.argmax(np.where(returned, range_m, -np.inf), axis=-1)
+    if echo == "strongest" and intensity.shape == range_m.shape:
+        lit = np.where(returned, intensity, -np.inf)
+        near_m = np.where(lit == lit.max(axis=-1, keepdims=True), near_m, np.inf)
+    return np.argmin(near_m, axis=-1)
+
+
+def with_all_echoes(scan: Scan, range_m: Float32s, intensity: Float32s, echoes: int) -> Scan:
+    """Return a scan with every echo of its rays as a beam of its own.
+
+    Beams of one ray have its bearing and time, by which `echo_count` recognises them.
+
+    Args:
+        scan: of one echo.
+        range_m: shape (rays, m).
+        intensity: shape (rays, m).
+        echoes: of each ray, at least m; those that are missing are inf.
+    """
+    rays = len(range_m)
+    missing = ((0, 0), (0, echoes - range_m.shape[1]))
+    range_m, intensity = np.pad(range_m, missing, constant_values=np.inf), np.pad(intensity, missing)
+    last = max(rays * echoes - 1, 1)
+    return replace(
+        scan,
+        angle_increment_rad=scan.angle_increment_rad * (rays - 1) / last,
+        time_increment_s=scan.time_increment_s * (rays - 1) / last,
+        range_m=range_m.ravel(),
+        intensity=intensity.ravel() if scan.intensity.size else scan.intensity,
+        beam_bearing_rad=np.repeat(scan.bearing_rad, echoes),
+        beam_offset_ns=np.repeat(scan.time_ns - scan.stamp_ns, echoes),
+    )
+
+
+def echo_count(scan: Scan) -> int:
+    """Return how many beams in a row have one bearing and time: the echoes of a ray."""
+    if scan.beam_bearing_rad is None or scan.beam_offset_ns is None:
+        return 1
+    changes = np.flatnonzero(np.diff(scan.beam_bearing_rad) != 0) + 1
+    echoes = int(changes[0]) if changes.size else 1
+    return echoes if np.array_equal(changes, np.arange(echoes, scan.range_m.size, echoes)) else 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,7 @@
 """What several test files share."""
 
 import gc
+import json
 import os
 import shutil
 import signal
@@ -8,6 +9,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import jsonschema
 import pytest
 from hypothesis import settings
 
@@ -16,6 +18,7 @@ if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and 
     sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "pycache")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ.pop("COLUMNS", None)  # results would be wrapped, also in files
 
 sys.path.insert(0, str(Path(__file__).parent / "house"))
 import checked_arrays
@@ -127,6 +130,17 @@ def cheapest_task() -> str:
     return CHEAPEST
 
 
+def require_documented(command, text):
+    """Raise if a text is no JSON object as the schema of the command describes it, further keys excluded."""
+    from scanwright.cli.results.of_commands import result_schema
+
+    schema = result_schema(command)
+    for record in (schema, *schema.get("$defs", {}).values()):
+        if "properties" in record:
+            record["additionalProperties"] = False
+    jsonschema.validate(json.loads(text), schema, jsonschema.Draft202012Validator)
+
+
 @pytest.fixture
 def command(monkeypatch, capsys):
     """Run a command as its user would: exit code, what it printed, and the lines of complaint (progress left out)."""
@@ -141,6 +155,8 @@ def command(monkeypatch, capsys):
         except SystemExit as stop:
             code = stop.code or 0
         printed = capsys.readouterr()
+        if "--json" in words and code in (0, 1):
+            require_documented(words[0], printed.out)
         return code, printed.out, [line for line in printed.err.splitlines() if not line.startswith("  ..")]
 
     return run

@@ -26,11 +26,11 @@ from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
-from scanwright.design.electrics.wiring import network_of
+from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of
 from scanwright.design.scanner import Scanner
 
 JOINTS = "joints of the layout"
-STEPS, WIRING_TEXT = "assembly.md", "wiring.md"
+STEPS, WIRING_TEXT, CATALOGUE_CABLES = "assembly.md", "wiring.md", "cables of the catalogue"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 PAPER_V = 12.0  # of its supply
 WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports and failed prints
@@ -41,7 +41,7 @@ class BomItem:
     """One row; the fields but `estimate` are the columns. Empty texts and None are unknown.
 
     Attributes:
-        kind: printed, turned, sawn, material, bought, screw, nut, insert, wiring, consumable, tool or total.
+        kind: printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total.
         part: what it is.
         number: drawing number of a made part, designation of a standard part.
         quantity: pieces.
@@ -78,27 +78,6 @@ class BomItem:
 
 
 COLUMNS = [field.name for field in fields(BomItem)][:-1]
-# What a lidar needs besides itself. For one that is not here, its data sheet must be read.
-WIRING: dict[str, tuple[BomItem, ...]] = {
-    "UTM-30LX": (
-        BomItem("wiring", "USB 2.0 cable of the lidar, type A", source=PAPER, estimate="USB cable"),
-        BomItem(
-            "wiring",
-            "power lead of the lidar, 12 V, 1 A (brown +, blue 0 V)",
-            source="data sheet figures: 12 V, 0.7 A, 1.0 A at most",
-            estimate="power cable",
-        ),
-    ),
-    "URG-04LX": (
-        BomItem("wiring", "USB 2.0 cable of the lidar, type A", source=PAPER, estimate="USB cable"),
-        BomItem(
-            "wiring",
-            "power lead of the lidar, 5 V",
-            source="not in the sources of the catalogue: read its data sheet",
-            estimate="power cable",
-        ),
-    ),
-}
 
 
 def items_of(
@@ -175,11 +154,14 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
     nuts: Counter[tuple[str, str]] = Counter()
     inserts: Counter[str] = Counter()
+    washers: Counter[str] = Counter()
     for joint in joints:
         if joint.protrudes_mm is None:
             screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
             nuts[joint.screw.name, joint.screw.nut_standard] += joint.count
+        if joint.washer_mm is not None:
+            washers[f"ISO 7093 {joint.screw.name}"] += joint.count
         if joint.inserts:
             inserts[joint.screw.name] += joint.count
     for number, used in sorted(screws.items()):
@@ -189,20 +171,34 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
         yield BomItem("screw", kind, number, total, source=JOINTS, note=places, estimate="screw")
     for (name, standard), count in sorted(nuts.items()):
         yield BomItem("nut", "hexagon nut", f"{standard} {name}", count, source=JOINTS, estimate="nut")
+    for number, count in sorted(washers.items()):
+        yield BomItem("washer", "plain washer", number, count, source=JOINTS, estimate="washer")
     for name, count in sorted(inserts.items()):
         note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm"
         yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note, estimate="insert")
 
 
 def _wiring(scanner: Scanner) -> Iterator[BomItem]:
+    lidar, ring = scanner.lidar, scanner.slip_ring
     supply = f"power supply, {PAPER_V:g} V, {network_of(scanner).supply_a:g} A"
     yield BomItem("wiring", supply, source=PAPER, estimate="power supply")
     yield from _servo_wiring(scanner.servo)
-    yield from WIRING.get(scanner.lidar.name) or [_unknown_wiring(scanner.lidar)]
-    if scanner.slip_ring is not None:
-        part, source = "plug, socket, crimps and heat shrink for the leads of the slip ring", scanner.slip_ring.circuits
-        note = "no plug passes a ring"
-        yield BomItem("wiring", part, source=f"circuits: {source}", note=note, estimate="plug and socket")
+    if lidar.cables is None:
+        yield _unknown_wiring(lidar)
+    for cable, connector in connectors_of(lidar):
+        if not cable.fixed:
+            to = "bare ends" if cable.end == "bare" else f"a plug {cable.end}"
+            lead, source = f"lead for the plug of the lidar, to {to}, {cable.length_mm:g} mm", CATALOGUE_CABLES
+            yield BomItem("wiring", lead, source=source, note=lidar.connector or "", estimate="power cable")
+        if ring is not None:
+            note = "on the rotor, on leads of the slip ring"
+            yield BomItem("wiring", connector.words, source=WIRING_TEXT, note=note, estimate="plug and socket")
+    if ring is not None:
+        yield BomItem(
+            "wiring", f"{plug_of(lidar)} plug with bare leads", source=WIRING_TEXT, estimate="plug and socket"
+        )
+        part, source = "crimps and heat shrink for the leads of the slip ring", f"circuits: {ring.circuits}"
+        yield BomItem("wiring", part, source=source, estimate="crimps")
 
 
 def _ties(assembly: Assembly) -> Iterator[BomItem]:

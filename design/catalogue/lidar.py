@@ -11,6 +11,7 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
+from scanwright.design.catalogue.cable import Cable
 from scanwright.design.catalogue.holes import Hole, HolePattern, mounting_holes
 from scanwright.design.catalogue.product_base import (
     Box,
@@ -77,6 +78,12 @@ class Lidar(Product):
         default=None, exclude=True, description="its serial line has no RX pin; shapes no part"
     )
     connector: str | None = Field(default=None, exclude=True, description="shapes no part")
+    cables: tuple[Cable, ...] | None = Field(
+        default=None, min_length=1, exclude_if=absent, description="between the lidar and what it is joined to"
+    )
+    mass_with_cables: bool | None = Field(
+        default=None, exclude_if=absent, description="whether mass_g counts its cables"
+    )
     tied_pins: tuple[TiedPin, ...] | None = Field(
         default=None, exclude=True, description="pins to join if nothing drives them; shapes no part"
     )
@@ -100,6 +107,11 @@ class Lidar(Product):
         if not self.leads or origin is None or not origin.verified:
             return {}
         return {net: tuple(lead.colour for lead in self.leads if lead.net == net) for net in ("+", "-")}
+
+    @property
+    def body_g(self) -> float:
+        """Mass without its cables."""
+        return self.mass_g - (sum(cable.mass_g for cable in self.cables or ()) if self.mass_with_cables else 0.0)
 
     @property
     def base(self) -> HolePattern:

@@ -20,9 +20,9 @@ RISKS = {
     "usb": (
         "USB through a ring: full speed (12 Mbit/s) passes good contacts, high speed (480 Mbit/s) only rings made for "
         "it. Keep D- and D+ on neighbouring circuits, twisted on both sides, the shield on its own circuit, the "
-        "cable between the plugs under 2 m; power the lidar by its own lead, not by VBUS. A contact that bounces for "
-        "microseconds loses the device: `scan` takes the turn again; a powered hub at the lidar or a ring with gold "
-        "contacts ends it."
+        "cables of lidar and computer together under 5 m; power the lidar by its own lead, not by VBUS. A contact that "
+        "bounces for microseconds loses the device: `scan` takes the turn again; a powered hub at the lidar or a ring "
+        "with gold contacts ends it."
     ),
     "ethernet": (
         "Ethernet through a ring: 100BASE-TX needs two pairs, each twisted up to the ring on neighbouring circuits, "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
+from scanwright.design.catalogue.cable import Cable, Connector, connector_for
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Circuits
 from scanwright.design.catalogue.slip_ring import SlipRing
@@ -38,12 +39,12 @@ OWN = {"+": "red", "-": "black"}  # wires that the user cuts between the boxes o
 OWN_SOURCE = "your own wires: red is +, black is -"
 USB = {"VBUS": "red", "D-": "white", "D+": "green", "GND": "black"}
 ETHERNET = {"TX+": "white-orange", "TX-": "orange", "RX+": "white-green", "RX-": "green"}
-CUT_CABLES = {
-    "usb": (USB, "USB 2.0 specification, chapter 6: cut cable of the computer"),
-    "usb-powered": (USB, "USB 2.0 specification, chapter 6: cut cable of the computer"),
-    "ethernet": (ETHERNET, "TIA-568-B: cut cable of the computer"),
+LEADS = {  # of plugs and sockets that are bought with bare leads
+    "usb": (USB, "USB 2.0 specification, chapter 6"),
+    "usb-powered": (USB, "USB 2.0 specification, chapter 6"),
+    "ethernet": (ETHERNET, "TIA-568-B"),
 }
-CUT, UNCUT = "a cut cable", "its cable"
+BARE_PLUG, OWN_CABLE = "a plug with bare leads", "its cable"
 CROSSED = {"TX": "RX", "RX": "TX"}  # one side sends what the other receives
 
 
@@ -69,6 +70,11 @@ def network_of(scanner: Scanner) -> Network:
         cautions=tuple(cautions_of(scanner, loads, wires)),
         unknown=tuple(_unknown(scanner)),
     )
+
+
+def plug_of(lidar: Lidar) -> str:
+    """Return what a lidar's data go into at the computer."""
+    return "data port" if lidar.link is None else PLUG[lidar.link]
 
 
 def _data(lidar: Lidar) -> tuple[str, ...]:
@@ -135,7 +141,7 @@ def _boxes(
             sides = ("in +", "in -"), ("out +", "out -")
             boxes.append(Box(f"{load.name} converter", title, size, *sides, 3, bought=True))
     signals = SIGNALS[servo.bus or "ttl"]
-    plug = "data port" if lidar.link is None else PLUG[lidar.link]
+    plug = plug_of(lidar)
     boxes += [
         Box("computer", "computer", ("its USB ports",), ("5 V", "0 V"), ("USB servo", plug), 4),
         Box("adapter", "servo adapter", ("such as U2D2: data only",), ("USB",), (*signals, "GND"), 5),
@@ -154,21 +160,52 @@ def _boxes(
     pins = (*power, *data, *(_shield(lidar) if shielded else ()))
     level = () if lidar.signal_v is None else (f"levels of {lidar.signal_v:g} V, not RS-232",)
     ends = (*(CROSSED.get(net, net) for net in data), "shield")
-    boxes.append(
-        Box("plug", f"{plug} of the computer", (_cable(lidar, circuits), *level), (plug,), ends, 5, ("shield",))
-    )
+    bare = bool(circuits) or lidar.link in (None, "serial")
+    words = BARE_PLUG if bare else OWN_CABLE
+    boxes.append(Box("plug", f"{plug} of the computer", (words, *level), (plug,), ends, 5, ("shield",)))
     if circuits:
         ring = scanner.slip_ring
         assert ring is not None
         still = tuple(f"{circuit.number} {circuit.net or 'spare'}" for circuit in circuits)
         spare = tuple(pin for pin, circuit in zip(still, circuits, strict=True) if not circuit.net)
         boxes.append(Box("ring", ring.name, ("left: stator, right: rotor",), still, still, 6, spare))
+        for name, connector, nets in _sockets(lidar, circuits):
+            boxes.append(
+                Box(
+                    name,
+                    connector.words,
+                    ("on the rotor: takes the lidar's", "cable, which stays whole"),
+                    nets,
+                    nets,
+                    7,
+                )
+            )
     ties = lidar.tied_pins or ()
-    words = tuple(f"join {tie.pin} to {tie.to} at its plug" for tie in ties)
+    ends_bare = any(cable.end == "bare" for cable in lidar.cables or ())
+    tied_words = tuple(f"join {tie.pin} to {tie.to} at its {'bare end' if ends_bare else 'plug'}" for tie in ties)
     tied = tuple(dict.fromkeys(pin for tie in ties for pin in (tie.pin, tie.to)))
     plug_words = textwrap.wrap(lidar.connector or "connector unknown", LINE_CHARS)
-    boxes.append(Box("lidar", lidar.name, (*plug_words, *words), pins, tied, 7))
+    boxes.append(Box("lidar", lidar.name, (*plug_words, *tied_words), pins, tied, 8))
     return boxes
+
+
+def connectors_of(lidar: Lidar) -> list[tuple[Cable, Connector]]:
+    """Return each cable of a lidar and what takes its far end on the rotor; none if the catalogue has no cables."""
+    nets = [net for net, _ in _nets(lidar)]
+    tied = len({tie.pin for tie in lidar.tied_pins or ()})
+    return [
+        (cable, connector_for(cable.end, sum(map(cable.takes, nets)) + (tied if cable.carries != "power" else 0)))
+        for cable in lidar.cables or ()
+    ]
+
+
+def _sockets(lidar: Lidar, circuits: tuple[Circuit, ...]) -> list[tuple[str, Connector, tuple[str, ...]]]:
+    """Return name, connector and nets of each box between ring and lidar."""
+    used = [circuit.net for circuit in circuits if circuit.net]
+    return [
+        (f"socket {number}", connector, tuple(net for net in used if cable.takes(net)))
+        for number, (cable, connector) in enumerate(connectors_of(lidar), start=1)
+    ]
 
 
 def _wires(
@@ -202,11 +239,11 @@ def _wires(
             lead = _lead(lidar, sign) if target == "lidar" else {}
             wires.append(Wire(feed, (target, pin), net, amps, mm2, **lead))
             if target == "ring" and pin != end:
-                wires.append(Wire(("ring", pin), ("lidar", end), net, load.peak_a, 0.0, **_lead(lidar, sign)))
-    plug = "data port" if lidar.link is None else PLUG[lidar.link]
+                wires += _on_rotor(lidar, ("ring", pin), end, net, load.peak_a, circuits)
+    plug = plug_of(lidar)
     wires += [
-        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=UNCUT),
-        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=UNCUT),
+        Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=OWN_CABLE),
+        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=OWN_CABLE),
     ]
     signals = SIGNALS[servo.bus or "ttl"]
     joined = {**{pin: pin for pin in signals}, "GND": "GND data"}
@@ -215,11 +252,11 @@ def _wires(
     for net in (*_data(lidar), *_shield(lidar)):
         start = ("plug", CROSSED.get(net, net))
         if not circuits:
-            note = _data_note(net) if _cable(lidar, circuits) == CUT else UNCUT
+            note = _data_note(net) if lidar.link in (None, "serial") else OWN_CABLE
             wires.append(Wire(start, ("lidar", net), net, peaks[net], 0.0, note=note))
         elif net in inside:
-            wires.append(Wire(start, ("ring", inside[net]), net, peaks[net], 0.0, **_cut(lidar, net)))
-            wires.append(Wire(("ring", inside[net]), ("lidar", net), net, peaks[net], 0.0, note=_data_note(net)))
+            wires.append(Wire(start, ("ring", inside[net]), net, peaks[net], 0.0, **_bought(lidar, net)))
+            wires += _on_rotor(lidar, ("ring", inside[net]), net, net, peaks[net], circuits)
     wires += [
         Wire(("lidar", tie.pin), ("lidar", tie.to), "GND", 0.0, 0.0, note="join these two")
         for tie in lidar.tied_pins or ()
@@ -241,15 +278,27 @@ def _lead(lidar: Lidar, sign: str) -> dict[str, str]:
     return {"colour": colours[0], "source": lidar.provenance()["leads"].source}
 
 
-def _cut(lidar: Lidar, net: str) -> dict[str, str]:
-    """Return colour and source of a wire in the computer's cut cable."""
-    colours, source = CUT_CABLES.get(lidar.link or "", ({}, ""))
-    return {"colour": colours[net], "source": source} if net in colours else {"note": _data_note(net)}
+def _on_rotor(
+    lidar: Lidar, ring: Pin, pin: str, net: str, amps: float, circuits: tuple[Circuit, ...]
+) -> Iterator[Wire]:
+    """Yield the wires from a circuit of the ring to a pin of the lidar: by its socket or terminal, if it has one."""
+    cable = next((cable for cable in lidar.cables or () if cable.takes(pin)), None)
+    socket = next((name for name, _, nets in _sockets(lidar, circuits) if pin in nets), "")
+    own = _lead(lidar, pin) if pin in ("+", "-") else {"note": _data_note(pin)}
+    if cable is None or not socket:
+        yield Wire(ring, ("lidar", pin), net, amps, 0.0, **own)
+        return
+    bought = {} if cable.end == "bare" else _bought(lidar, pin)
+    yield Wire(ring, (socket, pin), net, amps, 0.0, **bought)
+    yield Wire((socket, pin), ("lidar", pin), net, amps, 0.0, **(own if cable.end == "bare" else {"note": OWN_CABLE}))
 
 
-def _cable(lidar: Lidar, circuits: tuple[Circuit, ...]) -> str:
-    """Return the cable at the computer: a plug fits neither a ring nor a bare serial port."""
-    return CUT if circuits or lidar.link in (None, "serial") else UNCUT
+def _bought(lidar: Lidar, net: str) -> dict[str, str]:
+    """Return colour and source of a lead that a plug or socket is bought with."""
+    colours, source = LEADS.get(lidar.link or "", ({}, ""))
+    if net in colours:
+        return {"colour": colours[net], "source": source}
+    return {"note": MEASURE if net in ("+", "-") else _data_note(net)}
 
 
 def _data_note(net: str) -> str:
@@ -271,7 +320,7 @@ def _unknown(scanner: Scanner) -> Iterator[Finding]:
     if lidar.link != "usb-powered":
         values.append((lidar.name, "leads (the colours of its power cable)", lidar.leads))
     if ring is not None:
-        values.append((ring.name, "ways", ring.ways))
+        values += [(ring.name, "ways", ring.ways), (lidar.name, "cables", lidar.cables)]
     for product, field, value in values:
         if value is None:
             message = f"{product}: {field} is not in the catalogue"

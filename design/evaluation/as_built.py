@@ -17,7 +17,7 @@ from scanwright.design.objective.holes import NO_BLIND_WEIGHT, holes, percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.stated_error import rounded_to_error
-from scanwright.design.search.mounts.gain import Gain, gains, verdict
+from scanwright.design.search.mounts.gain import Gain, gain_lines, gains, verdict
 from scanwright.design.search.mounts.reference import TunedMount, reference_mounts
 from scanwright.design.search.with_parts import score_with
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -26,12 +26,12 @@ from scanwright.design.task.task import Task
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What one setting sees.
+    """View of one mount.
 
     Attributes:
         J: the objective, rounded to its error.
         J_error: its error.
-        blind: where the weighted region is blind, in words.
+        blind: blind spots of the region, in words.
         blind_weight: share of the weight of the task that is never seen.
         blind_fraction: share of the sphere outside the masks that is never seen.
         least: lowest number of beams per ball in the weighted region, at any start phase.
@@ -84,10 +84,6 @@ class AsBuilt:
         """Whether the numbers are with the parts, in two words."""
         return "without parts" if self.blocked is None else "with parts"
 
-    def gain(self) -> str:
-        """What the scanner is worth against the reference mounts, the best of them first, in a line."""
-        return "; ".join(mount.gain.words() for mount in self.mounts)
-
     def verdict(self) -> list[str]:
         """A sentence about a reference mount that is as good, if there is one."""
         return verdict(tuple(mount.gain for mount in self.mounts))
@@ -95,15 +91,13 @@ class AsBuilt:
     def lines(self) -> list[str]:
         """The same, a line for each number."""
         own = self.own
-        what = "J" if self.mounts[0].factor is None else "beams per ball"
         blocked = "" if self.blocked is None else f", which block {percent(self.blocked)} of the beams"
         return [
             f"{self.parts}{blocked}: J = {own.J:g} +- {own.J_error:g}",
             *(f"{self.parts}: {words}" for words in own.blind),
             f"{self.parts}: never seen: {percent(own.blind_weight)} of the weight, "
             f"{percent(own.blind_fraction)} of the unmasked sphere",
-            f"{self.parts}: {what}, against reference mounts without parts, the best first: {self.gain()}",
-            *(f"{self.parts}: {sentence}" for sentence in self.verdict()),
+            *(f"{self.parts}: {line.strip()}" for line in gain_lines(tuple(mount.gain for mount in self.mounts))),
         ]
 
     def facts(self) -> dict[str, Any]:

@@ -66,7 +66,8 @@ class ComparisonRow:
         setting: its mounting angles, or how it stands.
         time_s: what it measures for; all numbers but points_per_s are of this time.
         turns: of the axis in that time.
-        J: the objective of the task, and in J_error a bound on its error.
+        J: the objective of the task.
+        J_error: a bound on its error.
         blind_fraction: of the unmasked sphere, never seen.
         blind_weight: share of the weight of the task, never seen.
         gap_deg: widest distance between neighbouring scan lines or layers, across them.

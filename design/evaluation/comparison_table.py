@@ -15,11 +15,26 @@ from scanwright.design.objective.holes import percent
 from scanwright.design.objective.stated_error import error_words
 from scanwright.design.task.task import LoadedTask, load_task
 
+_NAME = 34  # columns of a name in the short table
 IN_THE_TABLE = ("scan_rate_hz", "range_max_mm", "range_practical_mm", "range_sigma_mm", "price_usd")
 
 
+def short_table(rows: list[ComparisonRow]) -> list[str]:
+    """Return the columns that a person chooses by, in at most 100 columns of text."""
+    width = min(max(len(row.name) for row in rows), _NAME)
+    return [
+        f"{'':{width}} time [s] {'J':>8} {'beams':>7} {'blind':>7} gap [deg] noise [mm] {'USD':>7}",
+        *(
+            f"{row.name[:width]:{width}} {row.time_s:8.2f} {row.J:8.4f} {_known(row.beams_per_ball, '.4g'):>7}"
+            f" {percent(row.blind_weight):>7} {row.gap_deg:9.3f} {_known(row.range_sigma_mm, 'g'):>10}"
+            f" {_known(row.cost_usd, ',.0f'):>7}"
+            for row in rows
+        ),
+    ]
+
+
 def table(rows: list[ComparisonRow]) -> list[str]:
-    """Lines of text for a person, the heading first."""
+    """Return all columns as lines of text, the heading first."""
     width = max(len(row.name) for row in rows)
     lines = [
         f"{'':{width}}  {'setting [deg]':26} {'time [s]':>8} {'turns':>5} {'J':>8} {'+-':>6} {'blind':>7}"
@@ -49,16 +64,16 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
     doubts += [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam)]
     without = f"all rows but {AS_BUILT!r} are" if AS_BUILT in names else "every row is"
     return [
-        f"parts: {without} without parts in the way",
-        "time: what a row measures for; a ready-made scanner for one turn, and for the turns in one period of the task",
-        f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- holds turns that interlace or repeat",
-        "blind: of the sphere outside the masks; of weight: what of the task's weight is blind",
-        "gap: widest between neighbouring scan lines or layers, inside of what is seen",
+        f"parts: {without} without parts",
+        "time: of the measurement; ready-made scanners: of one turn, and of the turns in one period of the task",
+        f"J: mean of -ln(1 + beams within {ball:g} deg) over the weight; +- covers turns that interlace or repeat",
+        "blind: share of the sphere outside the masks that is never seen; of weight: share of the weight",
+        "gap: widest between neighbouring scan lines or layers",
         "beams: within the ball, exp(-J) - 1, the geometric mean; per USD: over the price; ? for another objective",
         "range, noise: of the 2D lidar as its maker states them, one standard deviation; ? for ready-made scanners",
         "practical: the range [m] that users of the 2D lidar get; the stated one if unknown",
-        "USD: lidar, servo and slip ring without printed parts, or the scanner; ? where a price is not known",
-        "ready-made scanners stand upright; one tilt (pitch or roll) and Bonn (twist) are tuned to this task",
+        "USD: lidar, servo and slip ring without printed parts, or the scanner; ? if a price is unknown",
+        "ready-made scanners are upright; one tilt (pitch or roll) and Bonn (twist) are tuned to this task",
         f"{' and '.join(SCANNERS)}: scanners of the shipped tasks of that name, their products, motion and angles",
         *(f"{name} sees nothing of the weight: its J is that of no beam, and has no error" for name in blind),
         *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts if fields),

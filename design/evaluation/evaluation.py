@@ -35,6 +35,11 @@ from scanwright.design.task.task import LoadedTask
 class Lever:
     """Lever arm: offset (x, y) of the optical centre from the rotation axis, as seen at a range.
 
+    Attributes:
+        x_mm: offset along x of the rotation frame.
+        y_mm: offset along y of the rotation frame.
+        range_m: range that it is seen at.
+
     Raises:
         TaskError: the range is not at least twice the offset.
     """
@@ -108,9 +113,7 @@ class Evaluation:
         if self.agree:
             return []
         off = abs(self.score.J - self.ball.J) / (self.score.J_error + self.ball.J_error)
-        return [
-            f"J and J_ball differ by {off:.1f} times what both state: do not trust this J, and please report the task"
-        ]
+        return [f"J and J_ball differ by {off:.1f} times their errors: do not trust this J, and please report the task"]
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
@@ -139,31 +142,31 @@ class Evaluation:
         }
 
     def lines(self) -> list[str]:
-        """The same, a line for each figure."""
+        """Return the same, one line for each figure."""
         J, ball, seen, gap = self.score, self.ball, self.coverage, self.gaps
         ball_deg = np.degrees(self.problem.ball_rad)
         lines = [
             *self._doubts(),
             *([] if self.as_built is None else self.as_built.lines()),
-            "without parts, as if nothing of the scanner were in the way:",
+            "without parts:",
             *([] if self.lever is None else [f"lever          {self.lever.words()}"]),
             *(
-                [f"hole           {hole.words()}" for hole in self.holes]
-                or [f"holes          none: every direction that matters has beams within {ball_deg:g} deg"]
+                [f"blind spot     {hole.words().removeprefix('blind ')}" for hole in self.holes]
+                or [f"blind spots    none: every direction of the region has beams within {ball_deg:g} deg"]
             ),
-            f"J              {J.J:.5f} +- {error_words(J.J, J.J_error)}   mean of g(true count) over the start phase",
-            f"J_lower        {J.J_lower:.5f}           g of the mean count: a lower bound",
-            f"J_ball         {ball.J:.5f} +- {error_words(ball.J, ball.J_error)}   ball search over 8 simulated scans",
-            f"blind          {percent(seen.blind_fraction)} of the unmasked sphere, {percent(J.blind_weight)} of the "
+            f"J              {J.J:.5f} +- {error_words(J.J, J.J_error)}   mean over the start phase",
+            f"J_lower        {J.J_lower:.5f}           lower bound, from the mean count",
+            f"J_ball         {ball.J:.5f} +- {error_words(ball.J, ball.J_error)}   count in 8 simulated scans",
+            f"never seen     {percent(seen.blind_fraction)} of the unmasked sphere, {percent(J.blind_weight)} of the "
             "weight",
             f"masked         {seen.masked_fraction:.2%} of the sphere",
-            f"min_density    {J.least} beams per ball, lowest in the weighted region at any start phase",
+            f"min_density    {J.least} beams within {ball_deg:g} deg, lowest in the region at any start phase",
         ]
         lines += [f"blind cone     {_cap(cone)}" for cone in gap.blind_cones]
         if self.cap is not None:
             lines.append(f"empty cap      {_cap(self.cap)}, the largest without a beam")
         lines.append(f"line gap       {gap.line_gap_deg:.3f} deg at the widest, {gap.line_gap_mm(10):.0f} mm at 10 m")
-        crossing = "" if gap.crossing_deg is None else f", lines crossing at {gap.crossing_deg:.0f} deg on average"
+        crossing = "" if gap.crossing_deg is None else f"; scan lines cross at {gap.crossing_deg:.0f} deg (mean)"
         lines.append(f"seen twice     {gap.seen_twice:.1%} of the weight{crossing}")
         if gap.half_turn_misses is not None:
             lines.append(f"half a turn    misses {gap.half_turn_misses:.1%} of the weight that a full turn sees")
@@ -181,8 +184,7 @@ class Evaluation:
         lines += [f"in metres      {plane.words()}" for plane in self.planes]
         if self.interlaced_s is not None:
             lines.append(
-                f"interlaced     {self.interlaced_s:g} s a turn: the next one's lines come halfway between those of "
-                "this one"
+                f"interlaced     with {self.interlaced_s:g} s a turn: the next turn's lines fall between these"
             )
         return [*lines, f"1 deg off      {rise_words(self.rises, J.J_error)}"]
 

@@ -26,7 +26,12 @@ SWEPT_DIRECTIONS = 20_000
 
 @dataclass(frozen=True, slots=True)
 class BlindCone:
-    """A cone about the axis that no beam enters: the largest empty caps of a dense scan."""
+    """A cone about the axis that no beam enters: the largest empty caps of a dense scan.
+
+    Attributes:
+        axis_world: unit vector of its middle in the world.
+        half_angle_deg: from its middle to its edge.
+    """
 
     axis_world: tuple[float, float, float]
     half_angle_deg: float

@@ -60,8 +60,8 @@ class Chance:
     """That a pole gets at least `beams` beams in one full scan, over its azimuth and the start phase.
 
     Attributes:
-        beams: asked for.
-        chance: 0 to 1.
+        beams: required number of beams.
+        chance: probability, 0 to 1.
         error: four standard errors of the mean over start phases, and the width of a cell of azimuth.
     """
 
@@ -72,12 +72,12 @@ class Chance:
 
 @dataclass(frozen=True, slots=True)
 class PoleChances:
-    """What one setting makes of a pole.
+    """Probability of hitting a pole with one mount.
 
     Attributes:
         chances: for each of `BEAMS`.
-        stands: "weighted" where poles stand in proportion to the weight of the task along them; "unmasked" where the
-            region does not reach them, and they stand anywhere that the robot does not hide.
+        stands: places of the poles: "weighted" by the weight of the task along them; "unmasked" if the region does not
+            reach them, then everywhere outside the masks.
     """
 
     chances: tuple[Chance, ...]

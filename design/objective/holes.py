@@ -32,12 +32,12 @@ UPRIGHT_DEG = 80.0  # beyond it a heading has no meaning
 
 @dataclass(frozen=True, slots=True)
 class BlindSpot:
-    """Directions that no start phase brings a beam to, as a cone, or a ring where `inner_deg` is above 0.
+    """Directions that get no beam at any start phase: a cone, or a ring if `inner_deg` is above 0.
 
     Attributes:
         centre: unit vector in the world.
-        half_angle_deg: of the cone that holds it.
-        inner_deg: of the cone in its middle that is seen.
+        half_angle_deg: from the centre to the outer edge.
+        inner_deg: from the centre to the inner edge of a ring.
         weight: share of the weight of the task.
     """
 
@@ -47,7 +47,7 @@ class BlindSpot:
     weight: float
 
     def words(self) -> str:
-        """What is blind, where, and how wide it is."""
+        """Return where it is, and how wide."""
         x, y, z = self.centre
         angle = (
             f"{self.half_angle_deg:.2f} deg"
@@ -56,7 +56,7 @@ class BlindSpot:
         )
         wide = ""
         if self.inner_deg == 0 and self.half_angle_deg < 20:
-            wide = f", {200 * np.tan(np.radians(self.half_angle_deg)):.2g} cm across for each metre away"
+            wide = f", {200 * np.tan(np.radians(self.half_angle_deg)):.2g} cm wide per metre of range"
         return (
             f"blind {heading(np.array(self.centre))}: {angle} about ({x:z.3f}, {y:z.3f}, {z:z.3f}){wide}, "
             f"{percent(self.weight)} of the weight"

@@ -22,6 +22,7 @@ from scanwright.design import frames
 from scanwright.design.arrays import Array, Vector
 from scanwright.design.errors import SceneError
 from scanwright.design.scene.nearest import Nearest, nearest_search
+from scanwright.design.scene.urdf import AS_IT_IS, SUFFIX, Posture, urdf_triangles
 
 SUFFIXES = (".stl", ".ply", ".obj", ".dae", ".glb")
 
@@ -66,34 +67,50 @@ def load_scene(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT
     return build_scene(load_triangles(path, unit_m, T_world_mesh), str(path))
 
 
-def load_triangles(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Float[ndarray, "t 3 3"]:
+def load_triangles(
+    path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS, posture: Posture = AS_IT_IS
+) -> Float[ndarray, "t 3 3"]:
     """Return the corners of a mesh in the world [m], shape (t, 3, 3), with the axes of the file.
 
     Args:
-        path: STL, PLY, OBJ, DAE or GLB.
+        path: STL, PLY, OBJ, DAE or GLB; or a URDF, which is in metres.
         unit_m: length of one unit of the file.
         T_world_mesh: pose of the mesh [m].
+        posture: of the robot of a URDF.
 
     Raises:
         SceneError: the file is missing, is not a mesh, has no triangle, or states another unit.
+    """
+    if not 0 < unit_m < np.inf:
+        raise SceneError(f"{path}: unit_m = {unit_m}: the length of one unit of the file, such as 0.001 for mm")
+    stated_m: float | None
+    if path.suffix.lower() == SUFFIX:
+        triangles, stated_m = urdf_triangles(path, posture), 1.0
+    else:
+        triangles, stated_m = mesh_file(path)
+    if stated_m and not np.isclose(stated_m, unit_m):
+        raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file states that one unit is {stated_m:g} m")
+    return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)
+
+
+def mesh_file(path: Path) -> tuple[Float[ndarray, "t 3 3"], float | None]:
+    """Return the corners of a mesh in units of its file, shape (t, 3, 3), and the unit that it states [m], if any.
+
+    Raises:
+        SceneError: the file is missing or is not a mesh.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise SceneError(f"{path}: not a mesh by its name; a mesh is one of {', '.join(SUFFIXES)}")
     if not path.is_file():
         raise SceneError(f"{path}: {'this is a folder, not a mesh' if path.is_dir() else 'no such file'}")
-    if not 0 < unit_m < np.inf:
-        raise SceneError(f"{path}: unit_m = {unit_m}: the length of one unit of the file, such as 0.001 for mm")
     import trimesh
 
     try:
         loaded = trimesh.load_scene(path, process=False)
         triangles = np.asarray(loaded.to_mesh().triangles, dtype=float).reshape(-1, 3, 3)
-        stated_m = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else unit_m
+        return triangles, trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else None
     except Exception as error:  # readers of a dozen formats fail with as many types
         raise SceneError(f"{path}: not a readable {path.suffix[1:].upper()} mesh: {type(error).__name__}") from error
-    if not np.isclose(stated_m, unit_m):
-        raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file states that one unit is {stated_m:g} m")
-    return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)
 
 
 def build_scene(triangles_m: Float[ndarray, "t 3 3"], name: str = "scene") -> Scene:

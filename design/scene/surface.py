@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,12 @@ from numpy import ndarray
 
 from scanwright.design.errors import TaskError
 from scanwright.design.frames import Rx, Ry, Rz
-from scanwright.design.scene.ray_caster import cast, load_scene
+from scanwright.design.scene.ray_caster import build_scene, cast, load_triangles
+from scanwright.design.scene.urdf import AS_IT_IS, Posture
+
+_LEAST_M = 0.02  # no robot and no room is smaller
+_UNITS_M = (0.001, 0.01, 0.0254, 0.3048, 1.0, 1000.0)
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +62,8 @@ def cast_surface(
     sensor_m: tuple[float, float, float],
     rpy_deg: tuple[float, float, float],
     step_deg: float,
+    posture: Posture = AS_IT_IS,
+    most_m: float | None = None,
 ) -> Surface:
     """Cast a ray at every cell.
 
@@ -65,15 +73,27 @@ def cast_surface(
         sensor_m: the optical centre in the mesh.
         rpy_deg: the axes of the world in the mesh: roll, pitch, yaw, the last about z.
         step_deg: between the rays.
+        posture: of the robot of a URDF.
+        most_m: largest plausible extent, if the unit is only assumed; None if it is known.
 
     Raises:
-        TaskError: the mesh cannot be read, or no ray hits it.
+        TaskError: the mesh cannot be read, its size is implausible, or no ray hits it.
     """
     directions = cell_directions(step_deg)
     roll, pitch, yaw = np.radians(rpy_deg)
     R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)
     rays = directions.reshape(-1, 3) @ R_mesh_world.T
-    hits = cast(load_scene(path, unit_m), np.array(sensor_m), rays)
+    triangles = load_triangles(path, unit_m, posture=posture)
+    hits = cast(build_scene(triangles, str(path)), np.array(sensor_m), rays)
+    across_m = float(np.ptp(triangles, axis=(0, 1)).max())
+    _log.info("%s: %.3g m across at unit_m = %g", path.name, across_m, unit_m)
+    if most_m is not None and not _LEAST_M <= across_m <= most_m:
+        unit = next((each for each in _UNITS_M if _LEAST_M * 10 < across_m / unit_m * each <= most_m / 2), 1.0)
+        hidden = " and hides every direction" if np.isfinite(hits.range_m).all() else ""
+        raise TaskError(
+            f"{path}: the mesh is {across_m:.4g} m across{hidden}: write unit_m; {unit:g} makes it "
+            f"{across_m / unit_m * unit:.3g} m, {unit_m:g} keeps this size"
+        )
     if not np.isfinite(hits.range_m).any():
         raise TaskError(f"{path}: sensor_m = {list(sensor_m)}: no ray from there hits the mesh; unit_m right?")
     shape = directions.shape[:2]

@@ -123,47 +123,48 @@ class Optimum:
             "holes": [asdict(hole) for hole in holes(self.problem, plain.angles_rad)],
         }
 
-    def lines(self) -> list[str]:
-        """The whole answer in words."""
+    def lines(self, in_full: bool = False) -> list[str]:
+        """Return the result as lines; `in_full` with the skipped work."""
         result = self.search
+        skipped = self.left_out if in_full else ()
         return [
             *self.table(),
             *gain_lines(self.gains),
             self.long_title,
-            f"covered {result.covered:,} settings, computed {result.evaluated:,} J in {result.seconds:.1f} s",
-            *(f"left out {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in self.left_out),
+            f"searched {result.covered:,} mounts in {result.seconds:.1f} s ({result.evaluated:,} values of J computed)",
+            *(f"skipped {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in skipped),
         ]
 
     def hole_lines(self, tabled: bool = True) -> list[str]:
-        """Where the answer is blind, or what it costs that it is not; `tabled`: they stand below `table`."""
+        """Return the blind spots of the optimum, or the cost of having none; `tabled`: they follow `table`."""
         best, plain, least = self.search.best[0], self.search.plain, self.search.least_blind
         lowest = best if self.search.lowest is None else self.search.lowest
         found = [hole.words() for hole in holes(self.problem, best.angles_rad)]
         if least is not None:
             found.insert(
-                0, f"no setting of the grid sees all of the region: at least {percent(least)} of the weight is blind"
+                0, f"no mount of the grid sees all of the region: at least {percent(least)} of the weight is blind"
             )
-        seen = f"without parts every direction that matters has beams within {np.degrees(self.problem.ball_rad):g} deg"
         if found or plain is None:
-            return found or [seen]
-        taken = "the last row of the table" if tabled else _told(plain)
+            return found or ["blind spots: none, without parts"]
+        named = "the last row" if tabled else _told(plain)
+        spots = "; ".join(hole.words() for hole in holes(self.problem, plain.angles_rad))
         return [
-            f"{seen}; J alone, not asked for that, would take {taken}",
-            *(f"that one is {hole.words()}" for hole in holes(self.problem, plain.angles_rad)),
-            f"what has no hole costs {price(self.problem, lowest.score.J, plain.score.J)} against it",
+            "blind spots: none, without parts",
+            f"if blind spots were allowed, {named} would be best; it is {spots}",
+            f"cost of no blind spot: {price(self.problem, lowest.score.J, plain.score.J)}",
         ]
 
     def table(self) -> list[str]:
-        """The best families without parts, a line each, and where the best one is blind."""
+        """Return the best mounts without parts, one line each, and the blind spots of the best one."""
         lines = [
-            "search, without parts in the way:",
+            "best mounts, without parts:",
             "  alpha_rot  beta_rot  alpha_laser  beta_laser         J   +-       settings",
         ]
         lines += [_row(family) for family in self.search.best]
         if self.search.lowest is not None:
             lines[2] = f"{lines[2].rstrip()} [preferred]"
         if self.search.plain is not None:
-            lines.append(f"{_row(self.search.plain).rstrip()} [J alone, blind]")
+            lines.append(f"{_row(self.search.plain).rstrip()} [blind spot]")
         return [*lines, *self.hole_lines(), *self.preferred_lines()]
 
     def preferred_lines(self) -> list[str]:
@@ -174,7 +175,7 @@ class Optimum:
         loss = self.loaded.task.angles.prefer_loss
         accepted = f"at most {percent(loss)} {'of the beams per ball' if self._logarithmic else 'of J'}"
         if answer.angles_deg == optimum.angles_deg:
-            return [f"no simpler mount costs {accepted}: the answer is the lowest J"]
+            return [f"no simpler mount costs {accepted}: the result has the lowest J"]
         used = angles_used(answer.angles_deg)
         return [
             f"preferred as the simplest mount that costs {accepted}: {_shown(answer)}, {used} "
@@ -215,7 +216,7 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
         TaskError: no direction has a weight, or no setting keeps the limits.
         NumericalError: the best J differs from a count over simulated beams.
     """
-    progress("reading the task (the first run compiles the numerics: some 5 s)")
+    progress("reading the task (first run: compiling, about 5 s)")
     found = loaded
     if isinstance(loaded.task.motion, Shortest):
         found, problem, result = fastest(loaded, progress)

@@ -7,7 +7,9 @@ the work ends when no bound is below the best J found: what is left cannot win.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -80,15 +82,15 @@ class Chosen:
     open: int
 
     def lines(self) -> list[str]:
-        """What was chosen, and what was not and why."""
+        """Return the chosen mount, and the rejected ones with reasons."""
         setting = ", ".join(f"{angle:g}" for angle in self.family.angles_deg)
         lines = [
-            f"built ({setting}): J = {self.bare.J:.4f} without parts; of {self.bounded} settings bounded, {self.built} "
-            f"made, {len(self.refused)} refused",
-            *(f"refused {reason}" for reason in self.refused),
+            f"built ({setting}): J = {self.bare.J:.4f} without parts; considered {self.bounded} mounts, "
+            f"built {self.built}, rejected {len(self.refused)}",
+            *(f"rejected {reason}" for reason in self.refused),
         ]
         if self.open:
-            lines.append(f"{self.open} more families might be better with their parts: not made")
+            lines.append(f"{self.open} more mounts can be better with their parts, but were not built")
         return lines
 
 
@@ -99,8 +101,18 @@ def choose_with_parts(
     limits: Limits,
     workshop: Workshop,
     progress: Progress,
+    failed: Mapping[tuple[float, ...], str] = MappingProxyType({}),
 ) -> Chosen:
-    """The family that is best with its parts; with `prefer = "simple"` the first one that can be built.
+    """Return the family that is best with its parts; with `prefer = "simple"` the first one that can be built.
+
+    Args:
+        problem: of the task.
+        families: candidates.
+        ranges: of the angles.
+        limits: of the task.
+        workshop: makes the parts.
+        progress: progress callback.
+        failed: settings [deg] whose parts failed their checks, and which one: they are not chosen.
 
     Raises:
         BuildError: none can be built within the limits of the task.
@@ -121,6 +133,9 @@ def choose_with_parts(
             break
         bounds = []
         for angles_deg in equivalents(problem, family.angles_deg, ranges):
+            if angles_deg in failed:
+                refused.append(f"{_shown(angles_deg)}: its parts fail a check: {failed[angles_deg]}")
+                continue
             bound = workshop.bound(np.radians(angles_deg))
             bounded += 1
             if isinstance(bound, Refused):
@@ -133,7 +148,7 @@ def choose_with_parts(
         for blind, _, J, angles_deg in sorted(bounds, key=lambda bound: (*bound[:2], round(bound[2], 3)))[:1]:
             if lowest is not None and lowest <= (blind, first, J):
                 continue
-            progress(f"parts of {_shown(angles_deg)}: what they hide")
+            progress(f"beams blocked by the parts of {_shown(angles_deg)}")
             built += 1
             shadow = workshop.shadow(np.radians(angles_deg))
             if isinstance(shadow, Refused):
@@ -141,7 +156,7 @@ def choose_with_parts(
                 continue
             hidden = shadow.share()
             if limits.max_blocked is not None and hidden > limits.max_blocked:
-                refused.append(f"{_shown(angles_deg)}: the parts hide {hidden:.1%} of the beams (limits.max_blocked)")
+                refused.append(f"{_shown(angles_deg)}: the parts block {hidden:.1%} of the beams (limits.max_blocked)")
                 continue
             result = score_with(problem, np.radians(angles_deg), shadow)
             rank = _blind(result, avoid), first, result.J

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
 from scanwright.design.files.record import Record
+from scanwright.design.scene.urdf import AS_IT_IS, Posture
 
 Number = Annotated[float, Strict()]
 """An int or a float of the file; text and booleans are not accepted."""
@@ -108,6 +109,7 @@ class MapRegion(Record):
 class Placed(Record):
     """A mesh, and the scanner's optical centre and the world's axes in it (roll, pitch, yaw; z last)."""
 
+    most_m: ClassVar[float] = 5000.0  # larger meshes need an explicit unit_m
     file: str = Field(description=".stl, .ply, .obj, .dae or .glb, next to the task")
     unit_m: Number = Field(default=1.0, gt=0, description="length of one unit of the file")
     sensor_m: Triple = Field(default=(0.0, 0.0, 0.0), description="the optical centre in the mesh: x, y, z")
@@ -116,12 +118,27 @@ class Placed(Record):
     )
     step_deg: GridStep = Field(default=2.0, description="between the rays")
 
+    @property
+    def posture(self) -> Posture:
+        """How the robot of a URDF stands."""
+        return AS_IT_IS
+
 
 class MeshRegion(Placed):
     """Every direction in which a mesh, such as the robot, is hit."""
 
-    shape: Literal["mesh"] = Field(description="directions of a mesh, such as the robot itself")
+    most_m: ClassVar[float] = 50.0
+    shape: Literal["mesh"] = Field(description="directions of a mesh, such as the robot itself; also a .urdf")
     value: Value = 1.0
+    joint_deg: dict[str, Number] = Field(default={}, description="of a URDF: joint = angle, 0 for the others")
+    joint_mm: dict[str, Number] = Field(default={}, description="of a URDF: sliding joint = length, 0 for the others")
+    frame: str = Field(default="", description="of a URDF: link that sensor_m and rpy_deg are about, else the root")
+    omit: tuple[str, ...] = Field(default=(), description="of a URDF: links without geometry, such as the scanner's")
+
+    @property
+    def posture(self) -> Posture:
+        """How the robot of a URDF stands."""
+        return Posture(self.joint_deg, self.joint_mm, self.frame, self.omit)
 
 
 class BoxRegion(Record):

@@ -237,7 +237,8 @@ class LoadedTask:
         """Return the digest of all inputs of the result: the task, its maps, and the records of its products."""
         task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # no part of the result
         for region in [*task["weight"], *task["mask"]]:
-            region.pop("file", None)  # its contents count, not its name
+            for key in ("file", "joint_deg", "joint_mm", "frame", "omit"):  # what they make of it counts
+                region.pop(key, None)
         if task["scene"]:
             task["scene"].pop("file")
         parts = [json.dumps(task, sort_keys=True)]
@@ -261,6 +262,11 @@ def load_task(source: Path | str | Mapping[str, Any], folder: Path = Path()) -> 
     Raises:
         TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
             cannot do the motion.
+
+    Example:
+        >>> import scanwright as sw
+        >>> sw.load_task("ground_ahead").task.sensor
+        'UTM-30LX'
     """
     if isinstance(source, Mapping):
         return _load(dict(source), folder / "task")
@@ -323,7 +329,9 @@ def shipped_tasks() -> list[str]:
 
 
 def _surface(placed: Placed, folder: Path) -> Surface:
-    return cast_surface(folder / placed.file, placed.unit_m, placed.sensor_m, placed.rpy_deg, placed.step_deg)
+    most_m = None if "unit_m" in placed.model_fields_set else placed.most_m
+    view = placed.sensor_m, placed.rpy_deg, placed.step_deg
+    return cast_surface(folder / placed.file, placed.unit_m, *view, placed.posture, most_m)
 
 
 def _table(region: MapRegion | MeshRegion, folder: Path) -> Array:

@@ -25,7 +25,7 @@ from scanwright.design.concurrency.ahead import ahead
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.design.files.atomic_file import check_place
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
-from scanwright.firmware_io.assembly.beam_outcome import Verdict, between_surfaces
+from scanwright.firmware_io.assembly.beam_outcome import Verdict, between_surfaces, other_echoes
 from scanwright.firmware_io.assembly.cloud_rows import cloud_fields, cloud_rows
 from scanwright.firmware_io.assembly.deskew_kernel import PlacedBlock, place_block
 from scanwright.firmware_io.assembly.options import COLUMNS, DEFAULT, AssembleOptions, Per
@@ -35,7 +35,7 @@ from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
 from scanwright.firmware_io.clouds.ply import PlyWriter
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
-from scanwright.firmware_io.samples import Block, straight
+from scanwright.firmware_io.samples import Block, Echo, straight
 
 _PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0  # an hour: two clocks of the same day
@@ -53,6 +53,7 @@ class BeamLimits:
         min_range_m: shorter ranges are dropped, even if the sensor allows them.
         max_range_m: longer ranges are dropped.
         edges_deg: drop points between two surfaces, see `between_surfaces`; None keeps them.
+        echo: of each ray of a multi-echo scan.
 
     Raises:
         RecordingError: a limit is out of bounds.
@@ -61,6 +62,7 @@ class BeamLimits:
     min_range_m: float = 0.0
     max_range_m: float = math.inf
     edges_deg: float | None = None
+    echo: Echo = "all"
 
     def __post_init__(self) -> None:
         if not 0 <= self.min_range_m < self.max_range_m:
@@ -76,11 +78,11 @@ class BeamLimits:
         return replace(block, first=replace(block.first, range_min_m=near_m, range_max_m=far_m))
 
     def leave_out(self, block: Block, placed: PlacedBlock) -> None:
-        """Take what hangs between two surfaces out of a placed block."""
+        """Take other echoes, and what hangs between two surfaces, out of a placed block."""
+        if self.echo != "all":
+            _drop(placed, other_echoes(block, self.echo), Verdict.OTHER_ECHO)
         if self.edges_deg is not None:
-            dropped = (placed.verdict == Verdict.POINT) & between_surfaces(block, self.edges_deg)
-            placed.verdict[dropped] = Verdict.BETWEEN_SURFACES
-            placed.points_m[dropped] = np.nan
+            _drop(placed, between_surfaces(block, self.edges_deg), Verdict.BETWEEN_SURFACES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +151,7 @@ def assemble_recording(
         RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
     """
     columns, organised, lag_s, per = options.columns, options.organised, options.lag_s, options.per
-    beams = BeamLimits(options.min_range_m, options.max_range_m, options.edges_deg)
+    beams = BeamLimits(options.min_range_m, options.max_range_m, options.edges_deg, options.echo)
     _check(out, lag_s, columns)
     source = open_recording(recording)
     if options.smooth:
@@ -208,6 +210,12 @@ def assemble_recording(
             *_about_slivers(clouds, per),
         ),
     )
+
+
+def _drop(placed: PlacedBlock, which: NDArray[np.bool_], why: Verdict) -> None:
+    dropped = (placed.verdict == Verdict.POINT) & which
+    placed.verdict[dropped] = why
+    placed.points_m[dropped] = np.nan
 
 
 def _check(out: Path, lag_s: float, columns: Iterable[str]) -> None:

@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 from numpy import ndarray
 from scipy.linalg import solveh_banded
 
@@ -26,6 +26,10 @@ from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 _LEAST = 32  # samples; with fewer there is nothing to average
 _FINEST = 4  # samples to a knot
 _MOST_REJECTED = 0.1  # share of the samples; beyond it the right ones cannot be told apart
+_PASSES = 4  # of fits without the samples that are off; each may show smaller ones
+_BESIDE = 3  # neighbours on each side; as many wrong samples in a row can be told from a slip
+_OFF_SIGMAS = 6.0  # robust standard deviations off the curve that is no noise
+_OFF_STEPS = 1.5  # of the encoder: rounding and the curve's own error are less
 _LISTED = 5  # times of rejected samples in a message
 _SWING = 6.0  # residuals beyond this many times their rms are jumps (a stop, a slip), not noise
 _MISSED = 2 / np.sqrt(12)  # of a step; twice what rounding to steps does is motion that the curve misses
@@ -83,55 +87,80 @@ def _rejected(rejected_ns: Times, log: JointLog) -> str:
 
 
 def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float | None = None) -> SmoothAxis | str:
-    """Fit a spline to the log, or say why straight lines between its samples are better.
-
-    If a few samples lie far off their neighbours, the spline is fitted without them.
+    """Fit a spline to the log without the samples that lie off it alone, or say why straight lines are better.
 
     Args:
         log: at least 32 samples, or nothing can be averaged.
         longest_knot_s: no knots farther apart, whatever cross-validation says.
         per_knot: samples to a knot, where that has been chosen already; else cross-validation chooses.
     """
-    fitted = _smooth(log, longest_knot_s, per_knot)
-    if isinstance(fitted, SmoothAxis):
-        return fitted
-    wrong = outliers(log.position_rad)[0]
-    if not 0 < np.mean(wrong) <= _MOST_REJECTED:
-        return fitted
-    position_rad = np.unwrap(log.position_rad[~wrong])  # an outlier may have cost a turn
-    again = _smooth(JointLog(log.time_ns[~wrong], position_rad), longest_knot_s, per_knot)
-    return replace(again, rejected_ns=log.time_ns[wrong]) if isinstance(again, SmoothAxis) else fitted
+    whole, residual = _smooth(log, longest_knot_s, per_knot)
+    if not residual.size:
+        return whole
+    wrong = _isolated(residual, _encoder_step(log.position_rad))
+    if isinstance(whole, str) and (far := outliers(log.time_ns, log.position_rad)[0]).any():
+        wrong = far  # large ones may have bent all of the curve, or cost a turn
+    fitted: SmoothAxis | str = whole
+    for _ in range(_PASSES):
+        if not 0 < np.mean(wrong) <= _MOST_REJECTED:
+            break
+        position_rad = np.unwrap(log.position_rad[~wrong])
+        fitted, residual = _smooth(JointLog(log.time_ns[~wrong], position_rad), longest_knot_s, per_knot)
+        more = _isolated(residual, _encoder_step(position_rad))
+        if not more.any():
+            break
+        wrong[np.flatnonzero(~wrong)[more]] = True
+    if isinstance(fitted, str):
+        return whole
+    off = np.abs(np.angle(np.exp(1j * (log.position_rad - fitted.curve.angle_at(log.time_ns)))))
+    wrong &= ~(off <= max(_OFF_SIGMAS * fitted.residual_rad, _OFF_STEPS * fitted.step_rad))  # a good one among bad ones
+    in_a_row = np.lib.stride_tricks.sliding_window_view(wrong, _BESIDE + 1).all(axis=1)
+    # an axis that slips leaves that many beside each other
+    return whole if in_a_row.any() else replace(fitted, rejected_ns=log.time_ns[wrong])
 
 
-def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> SmoothAxis | str:
-    count = log.time_ns.size
+def _isolated(residual: Float64[ndarray, " n"], step_rad: float) -> Bool[ndarray, " n"]:
+    """Return which samples lie off a curve while most of their neighbours do not; none at the ends."""
+    wrong = np.zeros(residual.size, bool)
+    if residual.size > 2 * _BESIDE:
+        near = np.delete(np.lib.stride_tricks.sliding_window_view(residual, 2 * _BESIDE + 1), _BESIDE, axis=1)
+        apart = np.abs(residual[_BESIDE:-_BESIDE] - np.median(near, axis=1))
+        limit = max(_OFF_SIGMAS * 1.4826 * float(np.median(apart)), _OFF_STEPS * step_rad)
+        wrong[_BESIDE:-_BESIDE] = apart > limit
+    return wrong
+
+
+def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> tuple[SmoothAxis | str, Floats]:
+    """The fit to all samples or the reason for none, and how far each sample lies off it (empty before a fit)."""
+    count, nothing = log.time_ns.size, np.empty(0)
     if count < _LEAST:
-        return f"{count} samples are too few to smooth"
+        return f"{count} samples are too few to smooth", nothing
     seconds = (log.time_ns - log.time_ns[0]) / 1e9
     position = log.position_rad
     step_rad = _encoder_step(position)
     per_step = _samples_per_step(position, step_rad)
-    if per_step * np.median(np.diff(seconds)) > _REST_S:
-        return f"the angle rests {per_step * np.median(np.diff(seconds)):.2g} s on each value: does the axis stop?"
+    usual_s = float(np.median(np.diff(seconds)))
+    if per_step * usual_s > _REST_S:
+        return f"the angle rests {per_step * usual_s:.2g} s on each value: does the axis stop?", nothing
     least = float(max(_FINEST, per_step * _STEPS_PER_KNOT))
-    most = longest_knot_s / float(np.median(np.diff(seconds)))
+    most = longest_knot_s / usual_s
     if least > most:
-        return f"{least:.0f} samples to a knot would be more than {longest_knot_s:.3g} s apart"
+        return f"{least:.0f} samples to a knot would be more than {longest_knot_s:.3g} s apart", nothing
     best = _best(seconds, position, least, most) if per_knot is None else _fit(seconds, position, per_knot)
-    if best.score >= _straight_score(seconds, position, step_rad):
-        return "a smooth curve predicts them no better"
     residual = best.residual
+    if best.score >= _straight_score(seconds, position, step_rad):
+        return "a smooth curve predicts them no better", residual
     rms = float(np.sqrt(np.mean(residual**2)))
     if step_rad and rms > _MISSED * step_rad:
-        return f"they lie {np.degrees(rms):.2g} deg rms off a smooth curve, more than their steps explain"
+        return f"they lie {np.degrees(rms):.2g} deg rms off a smooth curve, more than their steps explain", residual
     if np.abs(residual).max() > _SWING * rms + step_rad:
-        return f"they jump: one lies {np.degrees(np.abs(residual).max()):.2g} deg off a smooth curve"
+        return f"they jump: one lies {np.degrees(np.abs(residual).max()):.2g} deg off a smooth curve", residual
     knots = best.knots[3:-3]
     curve = AxisCurve(
         knot_ns=log.time_ns[0] + np.rint(knots * 1e9).astype(np.int64),
         coefficient=_polynomials(best.knots, best.weight),
     )
-    return SmoothAxis(
+    smoothed = SmoothAxis(
         curve=curve,
         knot_s=float(np.median(np.diff(knots))),
         per_knot=best.per_knot,
@@ -140,6 +169,7 @@ def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> Smo
         error_rad=_error(seconds, position, best, rms, per_step),
         rejected_ns=np.empty(0, np.int64),
     )
+    return smoothed, residual
 
 
 @dataclass(frozen=True, slots=True, eq=False)

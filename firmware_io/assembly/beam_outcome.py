@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Floats
 from scanwright.firmware_io.assembly.own_body import OwnBody
-from scanwright.firmware_io.samples import Block, Scan
+from scanwright.firmware_io.samples import Block, Echo, Scan, chosen_echo, echo_count
 
 
 class Verdict(IntEnum):
@@ -24,6 +24,7 @@ class Verdict(IntEnum):
     OWN_BODY = 5
     OUTSIDE_POSES = 6
     BETWEEN_SURFACES = 7  # half on a near surface, half on a far one; only where it is asked for
+    OTHER_ECHO = 8  # of a ray whose echo another one is; only where one is asked for
 
 
 def beam_verdicts(
@@ -51,15 +52,28 @@ def beam_verdicts(
     return verdict
 
 
+def other_echoes(block: Block, echo: Echo) -> Bool[ndarray, "scans beams"]:
+    """Beams that are not the chosen echo of their ray; none if rays have one echo, or all are wanted."""
+    echoes = echo_count(block.first)
+    other = np.zeros(block.range_m.shape, bool)
+    if echo != "all" and echoes > 1:
+        rays = (len(other), -1, echoes)
+        lit = block.intensity.reshape(rays) if block.intensity.size else np.empty((*rays[:2], 0))
+        chosen = chosen_echo(block.range_m.reshape(rays), lit, echo)
+        other.reshape(rays)[:] = np.arange(echoes) != chosen[..., np.newaxis]
+    return other
+
+
 def between_surfaces(block: Block, grazing_deg: float) -> Bool[ndarray, "scans beams"]:
     """Beams whose spot lay on the edge of a near surface and on a far one behind it: their range is of neither.
 
     Such a beam has a nearer neighbour on one side and a farther one on the other, and the lines to both lie within
     `grazing_deg` of the beam itself. So does a surface that is seen that grazing: it goes, too.
     """
-    step_rad = abs(block.first.angle_increment_rad)
+    echoes, bearing_rad = echo_count(block.first), block.first.bearing_rad  # neighbours are the same echoes
+    step_rad = abs(bearing_rad[echoes] - bearing_rad[0]) if echoes > 1 else abs(block.first.angle_increment_rad)
     r = np.where(np.isfinite(block.range_m) & (block.range_m > 0), block.range_m, np.nan).astype(np.float64)
-    here, left, right = r[:, 1:-1], r[:, :-2], r[:, 2:]
+    here, left, right = r[:, echoes:-echoes], r[:, : -2 * echoes], r[:, 2 * echoes :]
     grazing_rad = np.radians(grazing_deg)
 
     def slant_rad(neighbour_m: Floats) -> Floats:  # between the beam back to the sensor and the line to a neighbour
@@ -68,5 +82,5 @@ def between_surfaces(block: Block, grazing_deg: float) -> Bool[ndarray, "scans b
     nearer = [slant_rad(side) < grazing_rad for side in (left, right)]
     farther = [slant_rad(side) > np.pi - grazing_rad for side in (left, right)]
     between = np.zeros(r.shape, bool)
-    between[:, 1:-1] = (nearer[0] & farther[1]) | (nearer[1] & farther[0])
+    between[:, echoes:-echoes] = (nearer[0] & farther[1]) | (nearer[1] & farther[0])
     return between

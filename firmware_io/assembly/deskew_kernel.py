@@ -136,7 +136,7 @@ def _fan(scan: Scan, angles: AngleSet, own_body: OwnBody | None) -> _Fan:
     )
 
 
-_POINT, _NO_RETURN, _TOO_NEAR, _TOO_FAR, _NO_ANGLE, _OWN_BODY, _NO_POSE, _ = map(np.uint8, Verdict)
+_POINT, _NO_RETURN, _TOO_NEAR, _TOO_FAR, _NO_ANGLE, _OWN_BODY, _NO_POSE, *_ = map(np.uint8, Verdict)
 _TURN = 2 * math.pi
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding and taking it away rounds to a whole number
 _CONTRACT = {"contract"}  # a * b + c in one instruction; keeps NaN and the order of sums

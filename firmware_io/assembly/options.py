@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from scanwright.firmware_io.samples import Echo
+
 if TYPE_CHECKING:
     from scanwright.design.task.task import LoadedTask
 
@@ -30,6 +32,7 @@ class AssembleOptions:
         camera: colour points with the images of this task's [camera].
         min_range_m: drop shorter beams.
         max_range_m: drop longer beams.
+        echo: of each ray of a multi-echo scan: first, last, strongest or all that the recording has.
         edges_deg: drop mixed pixels whose neighbours lie within this grazing angle; 8 is usual.
         outliers: drop isolated points beyond this many standard deviations; 2 is usual.
         voxel_m: keep one point per voxel of this edge.
@@ -47,6 +50,7 @@ class AssembleOptions:
     camera: LoadedTask | Path | str | None = None
     min_range_m: float = 0.0
     max_range_m: float = math.inf
+    echo: Echo = "all"
     edges_deg: float | None = None
     outliers: float | None = None
     voxel_m: float | None = None

@@ -193,7 +193,7 @@ def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
 
 
 def laser_scan_at(body: Any, source: Source, bag: Path, echo: str = "first") -> tuple[Any, int]:
-    """Return the LaserScan that `source` names, and its stamp [ns] (0: none); of several echoes the one asked for.
+    """Return the LaserScan that `source` names, and its stamp [ns] (0: none); of several echoes one, of all the first.
 
     Raises:
         RecordingError: it is something else; the line says what, and where LaserScans are.

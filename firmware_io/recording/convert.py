@@ -2,18 +2,48 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
+from scanwright.firmware_io.clouds.streams.stream import stream
 from scanwright.firmware_io.recording.bag_export import export_bag
 
 
-def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]:
-    """Turn a cloud into another format, or a recording into a bag; what came of it, in words.
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """A converted cloud or recording.
+
+    Attributes:
+        files: files or folder that were written.
+        rows: rows of the clouds; None for a recording.
+        messages: topic -> messages that were written; None for a cloud.
+        notes: data that the format cannot store, one sentence each.
+    """
+
+    files: tuple[Path, ...]
+    rows: int | None
+    messages: dict[str, int] | None
+    notes: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Return the same as lines."""
+        rows = f"{self.rows:,} rows" if self.rows is not None else ""
+        messages = ", ".join(f"{count:,} of {topic}" for topic, count in (self.messages or {}).items())
+        return [
+            *(f"note: {note}" for note in self.notes),
+            f"wrote {rows or messages} to {', '.join(map(str, self.files))}",
+        ]
+
+
+def convert(source: Path, target: Path, *, organised: bool = False) -> Converted:
+    """Convert a cloud to another format, or a recording to a bag.
+
+    Large clouds without rows and columns are converted in parts, in bounded memory.
 
     Args:
         source: a cloud, or a recording (`.mcap`).
-        target: a cloud; or a bag, `.bag` for ROS 1, else a new folder for ROS 2.
+        target: a cloud; or a bag, `.bag` for ROS 1, otherwise a new folder for ROS 2.
         organised: keep the rows without a point of an organised cloud, in formats that do not define them too.
 
     Raises:
@@ -22,11 +52,12 @@ def convert(source: Path, target: Path, *, organised: bool = False) -> list[str]
     """
     if source.suffix == ".mcap":
         exported = export_bag(source, target)
-        unknown = [f"note: left out {topic}: this ROS has no {kind}" for topic, kind in exported.unknown.items()]
-        written = ", ".join(f"{count:,} of {topic}" for topic, count in exported.written.items())
-        return [*unknown, f"wrote {written} to {target}"]
+        unknown = tuple(f"dropped {topic}: this ROS has no {kind}" for topic, kind in exported.unknown.items())
+        return Converted((target,), None, exported.written, unknown)
     check_target(target)
-    clouds, unread = read_clouds(source)
-    wrote = write_clouds(target, clouds, organised=organised)
-    notes = [f"note: {line}" for line in (*unread, *wrote.notes)]
-    return [*notes, f"wrote {wrote.rows:,} rows to {', '.join(str(path) for path in wrote.paths)}"]
+    unread: list[str] = []
+    wrote = None if organised else stream(source, target)
+    if wrote is None:
+        clouds, unread = read_clouds(source)
+        wrote = write_clouds(target, clouds, organised=organised)
+    return Converted(wrote.paths, wrote.rows, None, (*unread, *wrote.notes))

@@ -35,7 +35,7 @@ from scanwright.firmware_io.recording.bag_clocks import (
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
 from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
-from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, joint_positions
+from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, joint_positions, without_far
 from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
 from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings
@@ -48,7 +48,7 @@ from scanwright.firmware_io.recording.recording import (
     MessageWriter,
     RecordingWriter,
 )
-from scanwright.firmware_io.samples import JointLog
+from scanwright.firmware_io.samples import JointLog, with_all_echoes
 
 _AS_IT_IS = Corrections()
 
@@ -151,7 +151,7 @@ def import_bag(
             angle_unit, unit_rad = "rad", 1.0
         if unit_rad is None or angle_unit is None:
             raise RecordingError("angle_unit: write deg or rad, as the bag has it, or counts such as 4096/turn")
-        headers = survey.headers
+        headers = survey.headers.corrected(None, corrections)
         increment_s = _time_increment_s(headers, corrections)
         stated_s = headers.time_increment_s if increment_s is None else increment_s
         arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
@@ -161,7 +161,7 @@ def import_bag(
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{bag}: no scan falls into the time of the angles: {spans}")
         order = np.argsort(clock.angle_ns, kind="stable")
-        wrong = outliers(survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
+        wrong = outliers(clock.angle_ns[order], survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
         time_ns, first_of = np.unique(clock.angle_ns[order][~wrong], return_index=True)
         log = JointLog(time_ns, joint_positions(survey.angle[order][~wrong][first_of], unit_rad, corrections))
         doubled = order.size - int(wrong.sum()) - log.time_ns.size
@@ -180,7 +180,9 @@ def import_bag(
         if not clock.note and corrections.stamp != "receipt":
             same = angle_source is not None and angle_source.topic == scan_source.topic
             shifted = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
-            findings += clock_findings(shifted, survey.angle_stamps, headers.arc_ns, speed_rad_s, one_message=same)
+            findings += clock_findings(
+                shifted, survey.angle_stamps, headers.judged().arc_ns, speed_rad_s, same_clock=same
+            )
         findings += _scan_findings(survey)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"
@@ -205,11 +207,11 @@ def import_bag(
             "warnings": "\n".join(finding.message for finding in findings if finding.severity == "warning"),
         }
         with RecordingWriter(out, note) as writer:
-            _write(opened, scan_source, clock, log, writer, also, corrections, increment_s)
+            _write(opened, scan_source, clock, log, writer, also, corrections, increment_s, survey.echoes)
     return ImportSummary(
         out=out,
         scans=clock.scan_ns.size,
-        beams=int(headers.beams.sum()),
+        beams=int(headers.beams.sum()) * survey.echoes,
         joint_samples=log.time_ns.size,
         duration_s=float(np.ptp(clock.scan_ns)) / 1e9,
         angle_deg=(math.degrees(log.position_rad.min()), math.degrees(log.position_rad.max())),
@@ -260,6 +262,7 @@ def _write(
     also: Collection[str],
     corrections: Corrections,
     time_increment_s: float | None,
+    echoes: int,
 ) -> None:
     """Second pass: copy the scans, with the joint samples between them by time, and what comes along as received."""
     samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
@@ -271,6 +274,10 @@ def _write(
         limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
         raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
         scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
+        if hasattr(laser_scan, "echoes"):
+            range_m, intensity = laser_scan.echoes
+            scan = with_all_echoes(scan, range_m, intensity, echoes)
+        scan = without_far(scan, corrections)
         if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:

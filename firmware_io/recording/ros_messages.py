@@ -15,12 +15,14 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
 from scanwright.design.arrays import Float32s, Floats, Pose, Times
 from scanwright.firmware_io.clouds.cloud import pose_numbers
-from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.samples import Scan, chosen_echo
 
 LASER_SCAN = "sensor_msgs/msg/LaserScan"
 MULTI_ECHO = "sensor_msgs/msg/MultiEchoLaserScan"
@@ -137,23 +139,31 @@ def scan_from_message(message: Any, first_beam_ns: int) -> Scan:
     )
 
 
-def single_echo(message: Any, echo: str) -> Any:
-    """Return a MultiEchoLaserScan as a LaserScan of its first, last or strongest echoes."""
-
-    def chosen(k: int, echoes: Any) -> int:
-        if echo != "strongest" or k >= len(message.intensities) or len(message.intensities[k].echoes) != len(echoes):
-            return -1 if echo == "last" else 0
-        return int(np.argmax(message.intensities[k].echoes))
-
-    ranges, intensities = [], []
+def echo_arrays(message: Any) -> tuple[Float[ndarray, "rays echoes"], Float[ndarray, "rays echoes"]]:
+    """Return ranges [m] and intensities of a MultiEchoLaserScan; rays with fewer echoes end with inf and 0."""
+    most = max((len(ray.echoes) for ray in message.ranges), default=0)
+    range_m = np.full((len(message.ranges), max(most, 1)), np.inf, np.float32)
+    intensity = np.zeros(range_m.shape, np.float32)
     for k, ray in enumerate(message.ranges):
-        which = chosen(k, ray.echoes) if len(ray.echoes) else 0
-        ranges.append(ray.echoes[which] if len(ray.echoes) else math.inf)
-        if k < len(message.intensities):
-            lit = message.intensities[k].echoes
-            intensities.append(lit[which] if len(lit) == len(ray.echoes) and len(lit) else 0.0)
+        range_m[k, : len(ray.echoes)] = ray.echoes
+        if k < len(message.intensities) and len(message.intensities[k].echoes) == len(ray.echoes):
+            intensity[k, : len(ray.echoes)] = message.intensities[k].echoes
+    return range_m, intensity
+
+
+def single_echo(message: Any, echo: str) -> Any:
+    """Return a MultiEchoLaserScan as a LaserScan of its first, last or strongest echoes.
+
+    Of all it has the first, and `echo_arrays` as a further field `echoes`.
+    """
+    range_m, intensity = echo_arrays(message)
+    which = chosen_echo(range_m, intensity, echo)[:, np.newaxis]
     fields = {name: getattr(message, name) for name in message.__dataclass_fields__ if name != "__msgtype__"}
-    fields |= {"ranges": np.array(ranges, np.float32), "intensities": np.array(intensities, np.float32)}
+    fields["ranges"] = np.take_along_axis(range_m, which, 1)[:, 0]
+    lit = np.take_along_axis(intensity, which, 1)[:, 0]
+    fields["intensities"] = lit if len(message.intensities) else lit[:0]
+    if echo == "all":
+        fields["echoes"] = range_m, intensity
     return SimpleNamespace(**fields)
 
 

@@ -10,19 +10,22 @@ from heapq import merge
 from pathlib import Path
 
 from scanwright.design.errors import RecordingError
-from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.design.findings import sentence
+from scanwright.firmware_io.recording.import_checks.stream import StreamChecks
+from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import JointSample, Scan
 from scanwright.firmware_io.scan.live_feed import Watch
+from scanwright.firmware_io.scan.reporter import Reporter
 
 
 def replay(
     path: Path, watch: Watch, *, rate: float = 1.0, wait_until: Callable[[float], None] | None = None
 ) -> tuple[int, int]:
-    """Tell a recording as `acquire` tells a scan: a scan when the angle after its last beam is known.
+    """Play a recording as `acquire` does a scan: a scan when the angle after its last beam is known, and its checks.
 
     Args:
         path: the recording.
-        watch: who is told; its `close` is not called.
+        watch: gets scans, angles, and warnings of the checks; its `close` is not called.
         rate: how many times as fast as it was recorded.
         wait_until: waits until so many seconds after the start; None for the clock of this computer.
 
@@ -38,26 +41,36 @@ def replay(
     waiting: deque[Scan] = deque()
     scans = angles = 0
     begin_ns: int | None = None
-    for thing in _in_order(path):
+    source = open_recording(path)
+    checks, reporter = StreamChecks(at_rest=source.at_rest), Reporter(watch=watch)
+
+    def hand_over(scan: Scan) -> None:
+        watch.scan(scan)
+        for finding in checks.scan(scan):
+            reporter.warn(sentence(finding))
+
+    for thing in _in_order(source):
         if isinstance(thing, Scan):
             waiting.append(thing)
             continue
         begin_ns = thing.time_ns if begin_ns is None else begin_ns
         wait((thing.time_ns - begin_ns) / 1e9 / rate)
         watch.joint(thing.time_ns, thing.position_rad)
+        checks.joint(thing.time_ns, thing.position_rad)
         angles += 1
         while waiting and waiting[0].time_ns[-1] <= thing.time_ns:
-            watch.scan(waiting.popleft())
+            hand_over(waiting.popleft())
             scans += 1
     for scan in waiting:  # the servo was silent before the lidar was
-        watch.scan(scan)
+        hand_over(scan)
         scans += 1
+    for finding in checks.check():
+        reporter.warn(sentence(finding))
     return scans, angles
 
 
-def _in_order(path: Path) -> Iterator[Scan | JointSample]:
+def _in_order(source: Recording) -> Iterator[Scan | JointSample]:
     """Scans by their stamps and angles by their times, one after the other."""
-    source = open_recording(path)
     log = source.joint_log
     angles = (JointSample(*pair) for pair in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
     return merge(angles, source.scans(), key=lambda one: one.stamp_ns if isinstance(one, Scan) else one.time_ns)

@@ -21,11 +21,13 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError
+from scanwright.design.findings import sentence
 from scanwright.design.motion import Motion, Spin, StopAndGo
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lidar import LidarDriver
 from scanwright.firmware_io.recording import ros_messages
+from scanwright.firmware_io.recording.import_checks.stream import StreamChecks
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread, turning_servo
 from scanwright.firmware_io.scan.lidar_scans import LidarScans, settle_clock
@@ -170,6 +172,7 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
     turned = deque([axis.turning()], maxlen=_MOST_SPEEDS)
     waiting: deque[Scan] = deque()
     recorded, angles, first_ns, last_ns = 0, 0, 0, 0
+    checks = StreamChecks(at_rest=isinstance(plan.motion, StopAndGo))
     note = {"source": "scanwright scan", "hold": "true" if isinstance(plan.motion, StopAndGo) else "false"}
     with recorder_of(None if plan.endless else plan.recording, note, plan.attached) as recorder:
 
@@ -177,20 +180,12 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
             nonlocal angles
             recorder.joint(state.time_ns, state.position_rad)
             watch.joint(state.time_ns, state.position_rad)
+            checks.joint(state.time_ns, state.position_rad)
             angles += 1
 
-        for state in axis.window:
-            keep(state)
-        while done < wanted or waiting:
-            scan = scans.next()
-            if scans.away > away:
-                resting = 1 + _wait_until_steady(scans, axis, plan.motion, reporter, keep)
-                axis.left_out["scans until the servo turned again"] += resting
-                earlier, away = math.floor(done), scans.away
-                begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
-                continue
-            if done < wanted:
-                waiting.append(scan)
+        def write_complete() -> None:
+            """Write the scans after whose last beam an angle is known."""
+            nonlocal recorded, first_ns, last_ns
             for state in axis.hear():
                 keep(state)
             while waiting and waiting[0].time_ns[-1] <= axis.window[-1].time_ns:
@@ -203,6 +198,26 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
                 first_ns = first_ns or ready.stamp_ns
                 recorded += 1
                 last_ns = int(ready.time_ns[-1])
+
+        for state in axis.window:
+            keep(state)
+        while done < wanted or waiting:
+            try:
+                scan = scans.next()
+            except DeviceError:
+                write_complete()
+                raise
+            if scans.away > away:
+                resting = 1 + _wait_until_steady(scans, axis, plan.motion, reporter, keep)
+                axis.left_out["scans until the servo turned again"] += resting
+                earlier, away = math.floor(done), scans.away
+                begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
+                continue
+            for finding in checks.scan(scan, time.monotonic_ns()):
+                reporter.warn(sentence(finding))
+            if done < wanted:
+                waiting.append(scan)
+            write_complete()
             if isinstance(plan.motion, Spin):
                 turns = abs(axis.window[-1].position_rad - from_rad) / (2 * math.pi)
                 done = earlier + max(turns - scan.scan_time_s / plan.motion.period_s, 0.0)
@@ -219,6 +234,8 @@ def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Repor
                     f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else ""),
                     done % 1 if plan.endless else min(done / plan.turns, 1),
                 )
+    for finding in checks.check():
+        reporter.warn(sentence(finding))
     if not recorded:
         raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
     dropped_why = "scans that the sensor lost, or that waited because this computer was busy"

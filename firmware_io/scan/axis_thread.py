@@ -57,6 +57,7 @@ class AxisThread:
         self.longest_gap_ns = 0
         self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
         self._unread: list[ServoState] = []  # heard by `go`, for the next who hears
+        self._failure: Exception | None = None
         self._motion = motion
         self._uncertain_rad = _UNCERTAIN_STEPS * step_rad
         self.stop_answers: SimpleQueue[bool] = SimpleQueue()
@@ -85,16 +86,17 @@ class AxisThread:
         self.orders.put(moves)
 
     def hear(self) -> list[ServoState]:
-        """What is new and fit to be recorded.
+        """Return what is new and fit to be recorded.
 
         Raises:
-            DeviceError: the servo failed.
+            DeviceError: the servo failed, and all that came before has been returned.
         """
         good, self._unread = self._unread, []
-        while not self.received.empty():
+        while not self.received.empty() and self._failure is None:
             state = self.received.get()
             if isinstance(state, Exception):
-                raise state
+                self._failure = state
+                break
             self._bounds_ns.append(state.time_bound_ns)
             if math.isnan(state.position_rad):
                 self.left_out["servo angles in the dead sector"] += 1
@@ -110,6 +112,8 @@ class AxisThread:
                     self.longest_gap_ns = max(self.longest_gap_ns, state.time_ns - self.window[-1].time_ns)
                 self.window.append(state)
                 good.append(state)
+        if self._failure is not None and not good:
+            raise self._failure
         return good
 
     def moved(self, scan: Scan) -> bool:

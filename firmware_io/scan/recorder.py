@@ -20,7 +20,7 @@ from types import TracebackType
 
 from mcap.writer import Writer
 
-from scanwright.design.errors import RecordingError
+from scanwright.design.errors import DeviceError, RecordingError
 from scanwright.firmware_io.recording.mcap_chunks import CHUNK_S
 from scanwright.firmware_io.recording.recording import MessageWriter
 from scanwright.firmware_io.samples import Scan
@@ -33,7 +33,8 @@ class Recorder:
     for the disk, so that `scan` and `joint` return at once.
 
     Raises:
-        RecordingError: the file exists or cannot be written; what was written before stays and can be repaired.
+        RecordingError: the file exists or cannot be created.
+        DeviceError: the disk refuses; what was written before stays and can be repaired.
     """
 
     def __init__(self, path: Path, note: Mapping[str, str], attached: Mapping[str, str]) -> None:
@@ -50,7 +51,7 @@ class Recorder:
         try:
             self._file = _AtomicWrites(self._path)
         except OSError as error:
-            raise self._error(error, "") from error
+            raise RecordingError(f"{self._path}: cannot write: {error.strerror or error}") from error
         self._messages = MessageWriter(self._file, self._path, self._note, self._attached, Writer)
         self._thread = threading.Thread(target=self._keep, name="recorder", daemon=True)
         self._thread.start()
@@ -98,13 +99,9 @@ class Recorder:
         if self._failure is not None:
             raise self._failure
 
-    def _lost(self, error: OSError) -> RecordingError:
-        return self._error(
-            error, f"; what came before is on the disk: free space, then `scanwright repair {self._path}`"
-        )
-
-    def _error(self, error: OSError, advice: str) -> RecordingError:
-        return RecordingError(f"{self._path}: cannot write: {error.strerror or error}{advice}")
+    def _lost(self, error: OSError) -> DeviceError:
+        kept = f"what came before is on the disk: free space, then `scanwright repair {self._path}`"
+        return DeviceError(f"{self._path}: cannot write: {error.strerror or error}; {kept}")
 
 
 class _Nowhere:

@@ -10,20 +10,20 @@ BETWEEN_STOPS = "scans between two stops"  # between two stops: left out by desi
 
 @dataclass(frozen=True, slots=True)
 class ScanSummary:
-    """What was recorded, and what was not.
+    """Data of a scan.
 
     Attributes:
         recording: the file.
-        scans: in it.
-        joint_samples: in it.
+        scans: number of scans in it.
+        joint_samples: number of servo angles in it.
         duration_s: from the first to the last scan.
-        speed_deg_s: mean speed of the servo while it was recorded, 0 for motions to and fro.
-        ripple_deg: root mean square of the deviation from even turning, over half a second.
-        clock_ns: standard uncertainty of the beams' times at the end.
-        reconnects: how often the lidar was away and came back.
-        left_out: what was not recorded, reason -> count.
-        lost_replies: answers of the servo that were damaged or did not come.
-        longest_gap_s: between two angles of the servo.
+        speed_deg_s: mean speed of the servo; 0 for a sweep.
+        ripple_deg: rms deviation from uniform rotation over half a second.
+        clock_ns: standard uncertainty of the beam times at the end.
+        reconnects: number of times that the lidar disconnected and came back.
+        left_out: dropped data, reason -> count.
+        lost_replies: missing or damaged replies of the servo.
+        longest_gap_s: longest time between two servo angles.
     """
 
     recording: Path

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from scanwright.design.errors import DeviceError
-from scanwright.firmware_io.serial_port import latency_timer
+from scanwright.firmware_io.serial_port import latency_ms, latency_timer
 from scanwright.firmware_io.servo.bus.registers import ControlTable, Register, Setting
 from scanwright.firmware_io.servo.bus.unit import ServoUnit
 
@@ -123,22 +123,23 @@ def settable(table: ControlTable) -> dict[str, Register]:
 
 def slow_adapter(port: str) -> str | None:
     """What to do about a USB adapter that gathers bytes before it hands them over; None where there is none."""
-    timer = latency_timer(port)
-    try:
-        latency_ms = 0 if timer is None else int(timer.read_text())
-    except (OSError, ValueError):
-        return None
-    if latency_ms <= 1:
+    gathers_ms = latency_ms(port)
+    if gathers_ms <= 1:
         return None
     return (
-        f"the USB adapter gathers bytes for {latency_ms} ms, so angles are late and few: as root, "
-        f'echo 1 > {timer}, or permanently a udev rule with ATTR{{latency_timer}}="1"'
+        f"the USB adapter gathers bytes for {gathers_ms} ms, so angles are late and few: as root, "
+        f'echo 1 > {latency_timer(port)}, or permanently a udev rule with ATTR{{latency_timer}}="1"'
     )
 
 
 def _differing(unit: ServoUnit, needed: list[tuple[Setting, str]]) -> list[SettingChange]:
-    known = [SettingChange(register, unit.count(register), count, why) for (register, count), why in needed]
-    return [change for change in known if change.now != change.needed]
+    table = unit.table
+    changes = []
+    for (register, count), why in needed:
+        now = unit.count(register)
+        named = f"{table.modes[now]}, " if register == table.wheel[0][0] and now in table.modes else ""
+        changes.append(SettingChange(register, now, count, named + why))
+    return [change for change in changes if change.now != change.needed]
 
 
 def _reading_s(table: ControlTable, baud: int) -> float:

@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, show, show_result
+from scanwright.cli.console import ConsoleProgress, Verbosity, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
@@ -53,7 +53,7 @@ def import_(
     summary = api.import_bag(
         bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or (), corrections=options
     )
-    show_result(summary.lines, asdict(summary), as_json)
+    show_result(summary.lines, summary, as_json)
 
 
 @app.command(example="repair rec.mcap")
@@ -95,7 +95,7 @@ def assemble(
 
     names = tuple(name.strip() for name in columns.split(",") if name.strip())
     summary = api.assemble(recording, angles, out, options, smooth=not straight, columns=names, camera=camera)
-    show_result(summary.lines, asdict(summary), as_json)
+    show_result(summary.lines, summary, as_json)
 
 
 @app.command(example="calibrate rec.mcap --angles out/t/angles.json -o out/t/angles.calibrated.json")
@@ -108,14 +108,14 @@ def calibrate(
 ) -> None:
     """Estimate mounting errors from recordings.
 
-    Needs static scenes with walls in several directions, and no targets. If own_body.npz is next to the angle set,
-    beams that hit the scanner itself are dropped; if scanner.urdf is there, scanner.calibrated.urdf is written next to
-    the calibrated angle set.
+    Needs static scenes with walls in several directions, and no targets. With -v, prints the frames for ROS 2 as well.
+    If own_body.npz is next to the angle set, beams that hit the scanner itself are dropped; if scanner.urdf is there,
+    scanner.calibrated.urdf is written next to the calibrated angle set.
     """
     from scanwright import api
 
     result = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
-    show_result(result.lines, result.record, as_json)
+    show_result(lambda: result.lines(verbosity() is Verbosity.VERBOSE), result.record, as_json)
 
 
 @app.command(example="register a.ply b.ply -o merged.ply", no="a cloud could not be aligned")
@@ -138,6 +138,7 @@ def register(
     Works without initial poses.
     """
     from scanwright import api
+    from scanwright.cli.results.of_commands import Registered
 
     result = api.register(
         clouds,
@@ -149,7 +150,7 @@ def register(
         map_spacing_m=map_spacing_m,
         progress=ConsoleProgress(),
     )
-    record = {"complete": result.complete, "points": result.points, "files": result.wrote, "notes": result.notes}
+    record = Registered(result.complete, result.points, result.wrote, result.notes)
     show_result(result.lines, record, as_json)
     raise typer.Exit(0 if result.complete else 1)
 
@@ -178,6 +179,7 @@ def map_(
     otherwise no cell is free.
     """
     from scanwright import api
+    from scanwright.cli.results.of_commands import Mapped
 
     summary = api.make_map(
         clouds,
@@ -191,8 +193,7 @@ def map_(
         seen_through_m=seen_through_m,
         progress=ConsoleProgress(),
     )
-    record = {"points": summary.points, "moved": summary.moved, "files": summary.wrote, "notes": summary.notes}
-    show_result(summary.lines, record, as_json)
+    show_result(summary.lines, Mapped(summary.points, summary.moved, summary.wrote, summary.notes), as_json)
 
 
 @app.command(example="convert cloud.ply cloud.laz")
@@ -200,6 +201,7 @@ def convert(
     source: Annotated[Path, Argument(metavar="IN", help="Cloud, or recording (.mcap).")],
     target: Annotated[Path, Argument(metavar="OUT", help="Cloud, .bag, or a new folder for a bag.")],
     organised: Organised = False,
+    as_json: AsJson = False,
 ) -> None:
     """Convert a point cloud or recording to another format.
 
@@ -208,4 +210,5 @@ def convert(
     """
     from scanwright.firmware_io.recording.convert import convert
 
-    show(convert(source, target, organised=organised))
+    result = convert(source, target, organised=organised)
+    show_result(result.lines, result, as_json)

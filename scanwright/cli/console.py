@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import os
 import re
+import shutil
 import signal
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -45,10 +46,15 @@ _STYLES: dict[str, dict[str, Any]] = {
 }
 _PRIORITY = -10  # nice value: before every ordinary program, behind the system's own at -20
 _APART_S = 10.0  # between two lines of one step in a file: a log of an hour stays readable
+_MOST_COLUMNS = 100
+_COLUMN = re.compile(r"\S {2,}(?=\S)")
+_MOST_GAPS = 2  # between words: a line with more is the row of a table
+_MOST_INDENT = 20  # of a line that continues another, to the column of its value
 _BAR_CHARACTERS = 24  # leaves 50 of a terminal's 80 for the step and the time that is left
 _SPEED_S = 3600.0  # over which the time that is left is estimated: stages of a build are minutes apart
 _NUMBER = re.compile(r"[\d.,]+")
 _FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
+_SETTING = re.compile(r'\b(\w+) = (true|"?([\w.+-]+)"?)')
 _options: dict[str, str] = {}
 
 
@@ -105,7 +111,20 @@ def show(lines: Iterable[str]) -> None:
         if warning:
             warn([line.removeprefix("warning: ")])
         else:
-            print(line)
+            print(wrapped(line, sys.stdout))
+
+
+def wrapped(line: str, stream: IO[str]) -> str:
+    """Return a line wrapped at 100 columns, or at those of a narrower terminal; a file gets it as it is.
+
+    The variable `COLUMNS` of the environment wraps lines in a file too.
+    """
+    if not (on_terminal(stream) or "COLUMNS" in os.environ) or len(_COLUMN.findall(line)) > _MOST_GAPS:
+        return line
+    label = re.match(r" *(?:\S+(?: \S+)*  +)?", line)
+    indent = len(label[0]) if label and 0 < len(label[0]) <= _MOST_INDENT else 2
+    width = min(shutil.get_terminal_size().columns, _MOST_COLUMNS)
+    return textwrap.fill(line, width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
 
 
 def warn(lines: Iterable[str]) -> None:
@@ -128,9 +147,18 @@ def _print_aside(kind: str, line: str) -> None:
     """Print a line on standard error, after all that went to standard output; its fields are spelt as options."""
     _end_bar()
     sys.stdout.flush()
+    if line.lstrip().startswith("hint: "):
+        line = _SETTING.sub(_as_typed, line)
     text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
-    label = f"{styled(f'{kind}:', kind, sys.stderr)} " if kind else ""
-    print(f"{label}{text}", file=sys.stderr, flush=True)
+    if kind:  # never wrapped: one line of input that is wrong is one line, and its path can be copied
+        text = styled(f"{kind}:", kind, sys.stderr) + f" {text}"
+    print(text, file=sys.stderr, flush=True)
+
+
+def _as_typed(setting: re.Match[str]) -> str:
+    """Spell `name = value` as the option that sets it."""
+    option = _options.get(setting[1])
+    return setting[0] if option is None else option if setting[2] == "true" else f"{option} {setting[3]}"
 
 
 def exit_code(error: ScanwrightError) -> int:
@@ -144,9 +172,11 @@ def name_options(options: dict[str, str]) -> None:
     _options.update(options)
 
 
-def show_json(value: Any) -> None:
-    """Print one JSON object on standard output; paths become texts."""
-    print(json.dumps(value, indent=2, default=str))
+def show_json(record: Any) -> None:
+    """Print a record as one JSON object on standard output; infinite numbers become null."""
+    from pydantic_core import to_json
+
+    print(to_json(record, indent=2, inf_nan_mode="null").decode(), flush=True)
 
 
 def show_result(lines: Callable[[], Iterable[str]], record: Any, as_json: bool) -> None:
@@ -162,7 +192,7 @@ def hint(line: str) -> None:
     if verbosity() is not Verbosity.QUIET:
         _end_bar()
         sys.stdout.flush()
-        print(styled(line, "next", sys.stderr), file=sys.stderr, flush=True)
+        print(styled(wrapped(line, sys.stderr), "next", sys.stderr), file=sys.stderr, flush=True)
 
 
 @dataclass

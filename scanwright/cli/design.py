@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
@@ -11,8 +10,9 @@ from typer import Argument, Option
 
 from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
-from scanwright.cli.console import ConsoleProgress, hint, show, show_json, show_result
+from scanwright.cli.console import ConsoleProgress, Verbosity, hint, show, show_json, show_result, verbosity
 from scanwright.cli.help import Commands
+from scanwright.design.errors import ScanwrightError, suggest
 
 app = Commands("Design")
 
@@ -38,11 +38,19 @@ def optimise(
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        warnings = optimum.asked.warnings()
-        show_json(optimum.facts() | {"planes": [plane.facts() for plane in planes], "warnings": warnings})
+        from scanwright.cli.results.angles import Optimised, PlaneResult
+
+        plane_facts = [PlaneResult(**plane.facts()) for plane in planes]
+        show_json(Optimised(**optimum.facts(), planes=plane_facts, warnings=optimum.asked.warnings()))
     else:
         scan = (f"one full scan, {plane.words()}" for plane in planes)
-        show([*optimum.lines(), *scan, *(f"warning: {warning}" for warning in optimum.asked.warnings())])
+        show(
+            [
+                *optimum.lines(verbosity() is Verbosity.VERBOSE),
+                *scan,
+                *(f"warning: {warning}" for warning in optimum.asked.warnings()),
+            ]
+        )
         if picture is not None:
             print(f"wrote {picture}")
         hint(f"next: `scanwright build {task}`")
@@ -88,7 +96,9 @@ def evaluate(
         beams = result.beam_directions()
         write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
     if as_json:
-        show_json({"task": loaded.task.name, "angles_deg": angles_deg, **result.facts()})
+        from scanwright.cli.results.angles import Evaluated
+
+        show_json(Evaluated(task=loaded.task.name, angles_deg=angles_deg, **result.facts()))
     else:
         show(result.lines())
         if cloud is not None:
@@ -104,6 +114,7 @@ def accuracy(
     choices: Annotated[bool, Option("--choices", help="Meshes and integrators instead.")] = False,
     search: Annotated[bool, Option("--search", help="Effort of the search instead.")] = False,
     out: Annotated[Path, Option(metavar="DIR", help="Parent of the folder of reports.")] = Path("out/accuracy"),
+    as_json: AsJson = False,
 ) -> None:
     """Measure the error and run time of the optimiser.
 
@@ -115,22 +126,28 @@ def accuracy(
         require_kernel("accuracy --choices")
     loaded = api.load_task(task)
     folder = out / loaded.task.name
+    from scanwright.cli.results.of_commands import WrittenFiles
+
     if choices:
         from scanwright.trials.report import report_choices
 
-        show(report_choices(loaded, folder, ConsoleProgress()))
-        return
-    from scanwright.design.accuracy.report import report_precision, report_search, report_stress
-
-    if stress:
+        lines = report_choices(loaded, folder, ConsoleProgress())
+        report = WrittenFiles(folder, ["choices.csv", "choices.png"], lines)
+    elif stress:
+        from scanwright.design.accuracy.report import report_stress
         from scanwright.firmware_io.emulators.servo_plant import plant_of
         from scanwright.trials.stress import range_rows, servo_rows
 
         more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
-        report = report_stress(loaded, folder, ConsoleProgress(), more)
-        show(report.lines)
-        raise typer.Exit(0 if report.passed else 1)
-    show((report_search if search else report_precision)(loaded, folder, ConsoleProgress()))
+        cases = report_stress(loaded, folder, ConsoleProgress(), more)
+        report = WrittenFiles(folder, ["stress.csv"], list(cases.lines), cases.passed)
+    else:
+        from scanwright.design.accuracy.report import report_precision, report_search
+
+        measure, name = (report_search, "search") if search else (report_precision, "work_precision")
+        report = WrittenFiles(folder, [f"{name}.csv", f"{name}.png"], measure(loaded, folder, ConsoleProgress()))
+    show_result(lambda: report.lines, report, as_json)
+    raise typer.Exit(1 if report.passed is False else 0)
 
 
 @app.command(example="compare ground_ahead", no="J differs from a count of simulated beams")
@@ -145,14 +162,16 @@ def compare(
     """
     from scanwright import api
     from scanwright.api.arguments import as_built_scanner
+    from scanwright.cli.results.angles import Compared, GainResult
     from scanwright.pipeline.comparison import write_comparison
 
     built = as_built_scanner(task)
     loaded = api.load_task(task) if built is None else built.loaded
     result = write_comparison(loaded, out / loaded.task.name, ConsoleProgress(), built)
-    gains = [gain.facts() for gain in result.optimum.gains]
-    record = {"task": loaded.task.name, "rows": [asdict(row) for row in result.rows], "gains": gains}
-    show_result(result.lines, record, as_json)
+    gains = [GainResult(**gain.facts()) for gain in result.optimum.gains]
+    show_result(
+        lambda: result.lines(verbosity() is Verbosity.VERBOSE), Compared(loaded.task.name, result.rows, gains), as_json
+    )
 
 
 Kind = Literal["lidar", "servo", "slip_ring", "bearing", "belt", "printer", "multibeam"]
@@ -165,9 +184,13 @@ def catalogue(
     min_range_m: Annotated[float | None, Option(metavar="M", help="Minimum range, practical if known.")] = None,
     max_mass_g: Annotated[float | None, Option(metavar="G", help="Maximum mass in grams.")] = None,
     max_price_usd: Annotated[float | None, Option(metavar="USD", help="Maximum price.")] = None,
+    sketch: Annotated[Path | None, Option(metavar="FILE.svg", help="Draw NAME with its dimensions.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """List lidars, servos, slip rings and other products."""
+    if sketch is not None and name is None:
+        raise typer.BadParameter("draws one product, with its NAME before the option", param_hint="--sketch")
+    from scanwright.cli.results.of_commands import Products
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.table import chosen, table_lines
 
@@ -183,16 +206,32 @@ def catalogue(
             max_price_usd=max_price_usd,
         )
     )
-    record = {"products": [product.facts() for product in listed]}
+    record = Products([product.facts() for product in listed])
+    if sketch is not None:
+        require_kernel("catalogue --sketch")
+        from scanwright.cad.drawings.devices.sketch import sketch_svg
+
+        sketch.write_bytes(sketch_svg(listed[0]))
     show_result(lambda: listed[0].lines() if name else table_lines(listed), record, as_json)
+    if sketch is not None:
+        hint(f"wrote {sketch}")
 
 
 @app.command(example="schema > task.schema.json")
-def schema() -> None:
+def schema(
+    command: Annotated[str | None, Argument(metavar="COMMAND", help="Print the schema of its --json output.")] = None,
+) -> None:
     """Print the JSON schema of a task file.
 
-    Editors complete and check task files by it.
+    Editors complete and check task files by it. With COMMAND, print the schema of what this command prints with --json.
     """
-    from scanwright.design.task.task import Task
+    if command is None:
+        from scanwright.design.task.task import Task
 
-    show_json(Task.model_json_schema())
+        show_json(Task.model_json_schema())
+        return
+    from scanwright.cli.results.of_commands import RESULTS, result_schema
+
+    if command not in RESULTS:
+        raise ScanwrightError(f"{command}: no command with --json{suggest(command, RESULTS)}")
+    show_json(result_schema(command))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import AbstractContextManager, closing, suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -16,10 +17,12 @@ from scanwright.cli.console import (
     ConsoleProgress,
     exit_code,
     high_priority,
+    hint,
     print_error,
     require_pages,
     show,
     show_json,
+    show_result,
 )
 from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command
@@ -29,6 +32,7 @@ from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
 if TYPE_CHECKING:
+    from scanwright.cli.results.of_commands import Devices
     from scanwright.firmware_io.scan.live_feed import Viewer
     from scanwright.firmware_io.scan.plan import ScanPlan
     from scanwright.firmware_io.scan.scan_summary import ScanSummary
@@ -63,11 +67,13 @@ def emulate(
     noise_mm: Annotated[float | None, Option(min=0, metavar="SIGMA", help="Range noise [default: data sheet].")] = None,
     seed: Annotated[int, Option(min=0, metavar="N", help="Random seed.")] = 0,
     factory_servo: Annotated[bool, Option("--factory-servo", help="Servo with factory settings.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Run an emulated lidar and servo.
 
     Runs until Ctrl-C. `scan`, `doctor` and `ros2` detect the emulated devices of the same build folder.
     """
+    from scanwright.cli.results.of_commands import Devices
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
     from scanwright.firmware_io.emulators.head import read_load
@@ -84,10 +90,14 @@ def emulate(
         ) as emulators,
         announced(out, emulators.ports),
     ):
-        places = filter(None, [emulators.ports.lidar, emulators.lidar.address])
-        print(f"lidar {angles.sensor} at {' and '.join(places)}")
-        print(f"servo {angles.servo} at {emulators.ports.servo}")
-        print(f"now run `scanwright scan {out}` in another terminal; Ctrl-C ends this one", flush=True)
+        places = [place for place in (emulators.ports.lidar, emulators.lidar.address) if place]
+        lines = [
+            f"lidar {angles.sensor} at {' and '.join(places)}",
+            f"servo {angles.servo} at {emulators.ports.servo}",
+        ]
+        devices = Devices(angles.sensor, angles.servo, places, emulators.ports.servo)
+        show_result(lambda: lines, devices, as_json)
+        hint(f"next: `scanwright scan {out}` in another terminal; Ctrl-C ends this one")
         Event().wait()
 
 
@@ -110,6 +120,7 @@ def scan(
     live: Annotated[bool, Option("--live", help="Show the growing cloud in the browser.")] = False,
     foxglove: Annotated[bool, Option("--foxglove", help="Serve scans and points to Foxglove.")] = False,
     allow_origin: AllowOrigin = None,
+    as_json: AsJson = False,
 ) -> None:
     """Record a full scan and assemble its point cloud.
 
@@ -117,10 +128,11 @@ def scan(
     """
     if live:
         require_pages("scan --live")
-    if live and foxglove:
-        raise ScanwrightError("--live, --foxglove: choose one of them")
+    if live + foxglove + as_json > 1:
+        raise ScanwrightError("--live, --foxglove, --json: choose one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright import api
+    from scanwright.cli.results.of_commands import ScanResult
     from scanwright.firmware_io.scan.plan import plan_scan
 
     plan = plan_scan(
@@ -136,21 +148,34 @@ def scan(
         stamp_at=stamp_at,
     )
     progress = ConsoleProgress()
-    show(plan.lines())
+    result = ScanResult(_devices_of(plan), plan.angles_path, plan.duration_s)
+    print_lines = _print_nothing if as_json else show
+    print_lines(plan.lines())
     if dry_run:
+        show_result(tuple, result, as_json)
         return
     with viewer as watch, closing(watch):
         try:
             recorded = _acquired(plan, progress, watch, out, servo_id)
             watch.ended(finished(recorded))  # the devices stand, whatever becomes of the cloud
             progress(f"recorded {recorded.duration_s:.1f} s, assembling")
-            show(recorded.lines())
+            print_lines(recorded.lines())
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
             watch.ended(finished(recorded, cloud.lines()))
-            show(cloud.lines())
+            show_result(cloud.lines, replace(result, recording=recorded, cloud=cloud), as_json)
         except ScanwrightError as error:
             _end(watch, failed(error), plan.recording)
             raise typer.Exit(exit_code(error)) from None
+
+
+def _print_nothing(_lines: Iterable[str]) -> None:
+    """Replace `show` if one JSON object is printed at the end."""
+
+
+def _devices_of(plan: ScanPlan) -> Devices:
+    from scanwright.cli.results.of_commands import Devices
+
+    return Devices(plan.angles.sensor, plan.angles.servo, [plan.ports.lidar], plan.ports.servo)
 
 
 def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
@@ -197,6 +222,7 @@ def ros2(
     intensity: Intensity = False,
     foxglove: Annotated[bool, Option("--foxglove", help="Also serve the data to Foxglove.")] = False,
     allow_origin: AllowOrigin = None,
+    as_json: AsJson = False,
 ) -> None:
     """Run the scanner as a ROS 2 node.
 
@@ -213,6 +239,7 @@ def ros2(
             "--foxglove, --recording: choose one of them (`scanwright view` serves a recording to Foxglove)"
         )
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
+    from scanwright.cli.results.of_commands import Published
     from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
     from scanwright.firmware_io.scan.plan import plan_scan
 
@@ -220,10 +247,11 @@ def ros2(
     points = Publishing(not straight, points_per == "turn", points_in, not no_tf)
     try:
         if recording is not None:
+            show_result(tuple, Published(None, recording), as_json)
             serve_recording(out, recording, node_arguments, ConsoleProgress(), points, rate=rate)
             return
         plan = plan_scan(out, lidar=lidar, servo=servo, servo_id=servo_id, intensity=intensity, endless=True)
-        show(plan.lines())
+        show_result(plan.lines, Published(_devices_of(plan), None), as_json)
         with high_priority(), viewer as watch:
             asking_first(
                 lambda: serve_devices(out, plan, node_arguments, ConsoleProgress(), points, watch), out, servo_id
@@ -249,6 +277,7 @@ def doctor(
 
     Reads only, unless --fix or --restore is given.
     """
+    from scanwright.cli.results.of_commands import Diagnosis
     from scanwright.firmware_io.scan import doctor as diagnosis
     from scanwright.firmware_io.scan import host
     from scanwright.firmware_io.servo import settings
@@ -257,10 +286,11 @@ def doctor(
         print(host.udev_rules(), end="")
         return
     if restore is not None:
-        print_steps("", settings.restore(restore, servo))
+        print_steps("", settings.restore(restore, servo), as_json)
         return
     if fix:
-        print_steps(*diagnosis.fix(out, servo, servo_id))
+        port, steps = diagnosis.fix(out, servo, servo_id)
+        print_steps(port, steps) if not as_json else list(steps)
     findings = []
     for finding in diagnosis.examine(out, lidar, servo, servo_id):
         hint = finding.hint
@@ -272,7 +302,7 @@ def doctor(
         if not as_json:
             print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
     if as_json:
-        show_json({"findings": [asdict(finding) for finding in findings]})
+        show_json(Diagnosis(findings))
     raise typer.Exit(1 if errors_in(findings) else 0)
 
 
@@ -288,11 +318,13 @@ def servo_setup(
     from_baud: Annotated[int | None, Option(metavar="B", help="Current baud rate [default: try all].")] = None,
     undo: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
     dry_run: Annotated[bool, Option("--dry-run", help="Print what would be written, and exit.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Set up a servo, or set its id or baud rate.
 
     Writes the settings that a scan needs, verifies them, and saves the old ones for --undo.
     """
+    from scanwright.cli.results.of_commands import Settings
     from scanwright.design.angles import load_angles
     from scanwright.design.motion import Spin
     from scanwright.firmware_io.servo import settings
@@ -303,14 +335,15 @@ def servo_setup(
         raise ScanwrightError("--id and --baud, --undo, --scanner and --dry-run: choose one of these")
     folder = scanner or Path()
     if undo is not None:
-        print_steps(port, settings.restore(undo, port))
+        print_steps(port, settings.restore(undo, port), as_json)
     elif numbers:
-        print_steps(port, set_address(port, new_id, new_baud, from_id, from_baud, folder))
+        print_steps(port, set_address(port, new_id, new_baud, from_id, from_baud, folder), as_json)
     else:
         angles = None if scanner is None else load_angles(scanner / "angles.json")
         model, motion = (None, None) if angles is None else (angles.servo, angles.motion)
         spins = None if motion is None else isinstance(motion, Spin)
         if dry_run:
-            show(map(str, settings.wanted_changes(port, model, from_id, spins=spins)))
+            changes = [str(change) for change in settings.wanted_changes(port, model, from_id, spins=spins)]
+            show_result(lambda: changes, Settings(changes), as_json)
         else:
-            print_steps(port, settings.set_up(port, model, from_id, folder, spins=spins))
+            print_steps(port, settings.set_up(port, model, from_id, folder, spins=spins), as_json)

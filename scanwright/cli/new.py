@@ -11,7 +11,8 @@ from typing import Annotated, Any, TypeVar
 import typer
 from typer import Argument, Option
 
-from scanwright.cli.console import hint, show, warn
+from scanwright.cli.arguments import AsJson
+from scanwright.cli.console import hint, show, show_result, warn
 from scanwright.cli.help import Commands
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 
@@ -47,17 +48,19 @@ def new(
     out: Annotated[
         Path | None, Option("--out", "-o", metavar="FILE.toml", help="Output file [default: NAME.toml].")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Create a task file by answering a few questions.
 
     On a terminal, `new` asks for what the options do not give. Otherwise --lidar, --servo, --height-m and --see are
     required.
     """
+    from scanwright.cli.results.of_commands import Created
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.pipeline.new_task import Answers, task_text, write_task_file
 
     products = load_catalogue()
-    asks = sys.stdin.isatty() and sys.stdout.isatty()
+    asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
     if asks:
         lidar, servo, height_m, robot, see, scan_s = _prompted(products, lidar, servo, height_m, robot, see, scan_s)
     elif lidar is None or servo is None or height_m is None or not see:
@@ -76,12 +79,13 @@ def new(
     )
     path = out or Path(f"{answers.name}.toml")
     warnings = write_task_file(path, task_text(answers, products, _command(answers, path), path))
-    show([*(f"warning: {warning}" for warning in warnings), f"wrote {path}"])
-    warn(
+    warnings += [
         f"{name}: parts printed for it will not fit the real device: `scanwright catalogue '{name}'` gives the reasons"
         for name in (answers.lidar, answers.servo)
         if products.named(name).misfit()
-    )
+    ]
+    warn(warnings)
+    show_result(lambda: [f"wrote {path}"], Created(path, answers.name, warnings), as_json)
     hint(f"next: `scanwright build {path}` (or `scanwright optimise {path}` for the angles only)")
 
 
@@ -117,17 +121,17 @@ def _prompted(
         question = "3. How many metres over the ground is the scanner?"
         height_m = _until(question, None, _number, lambda height: checked(height_m=height))
     if robot is None:
-        print("   Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
+        print("4. Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
         print("   or a file with its mesh (STL, OBJ, PLY), or none")
         robot = _until("  ", "none", str, lambda what: checked(robot=what))
     if not see:
-        print("4. What must it see? One or more, separated by spaces. Numbers are optional:")
+        print("5. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
         print("   wall:3:4         3 m ahead, 4 m wide                around:30:30  all around, 30 deg up and down")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")
         see = _until("  ", "ground ceiling", str.split, lambda regions: checked(see=regions))
     if scan_s is None:
-        question = "5. How many seconds may one full scan take? Longer is denser"
+        question = "6. How many seconds may one full scan take? Longer is denser"
         scan_s = _until(question, "10", _number, lambda seconds: checked(scan_s=seconds))
     return lidar, servo, height_m, robot, see, scan_s
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from typer import Argument, Option
 
 from scanwright.cad.checks.checks_json import entries_of, failure_lines
+from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, BuildFolder, Out, TaskFile
 from scanwright.cli.console import (
     ConsoleProgress,
@@ -42,13 +43,15 @@ def build(
 
     Writes everything into DIR/<task>/; does nothing if the build is current.
     """
+    from scanwright.cli.results.of_commands import Built, Check, Rebuilt
+
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
         from scanwright.pipeline.manifest import listed_files
 
         difference = difference_when_rebuilt(task, ConsoleProgress())
         line = f"{task}: {difference or f'built again, all {len(listed_files(task))} files are the same'}"
-        show_result(lambda: [line], {"folder": str(task), "difference": difference}, as_json)
+        show_result(lambda: [line], Rebuilt(str(task), difference), as_json)
         raise typer.Exit(0 if difference is None else 1)
     from scanwright import api
 
@@ -58,10 +61,11 @@ def build(
         print_note("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
     _print_failed_checks(built.checks)
-    record = {"folder": built.folder, "files": built.files, "warnings": built.warnings, "misfits": built.misfits}
-    record |= {"checks": entries_of(built.checks)}
+    record = Built(
+        built.folder, built.files, built.warnings, built.misfits, [Check(**entry) for entry in entries_of(built.checks)]
+    )
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
-    warn(built.misfits)
+    _warn_of_misfits(built.misfits)
     report = built.folder / "report.html"
     if built.failed:
         hint(f"next: read the failed checks in {report}, and change the task")
@@ -71,28 +75,69 @@ def build(
 
 
 @app.command(example="report out/ground_ahead")
-def report(out: BuildFolder) -> None:
+def report(out: BuildFolder, as_json: AsJson = False) -> None:
     """Regenerate report.html of a build."""
     require("cad", "report needs jinja2", "jinja2")
+    from scanwright.cli.results.of_commands import WrittenFiles
     from scanwright.pipeline.records import write_report
 
-    print(f"wrote {write_report(out)}")
+    file = write_report(out)
+    result = WrittenFiles(file.parent, [file.name], [f"wrote {file}"])
+    show_result(lambda: result.lines, result, as_json)
 
 
 @app.command(example="check out/ground_ahead", no="a check fails")
 def check(out: BuildFolder, as_json: AsJson = False) -> None:
-    """Check the parts of a build (fit, loads, printing)."""
+    """Check the parts of a build (fit, loads, printing).
+
+    Prints the failed checks and the warnings; with -v, all checks.
+    """
     from scanwright import api
+    from scanwright.cli.results.of_commands import Check, Checked
+    from scanwright.pipeline.build import finding_lines
 
     checks = api.check(out, progress=ConsoleProgress())
+    loaded = api.load_task(out / "task.toml")
     _print_failed_checks(checks)
-    warn(api.load_task(out / "task.toml").misfits())
-    if as_json:
-        show_json({"task": api.load_task(out / "task.toml").task.name, "checks": entries_of(checks)})
+    _warn_of_misfits(loaded.misfits())
+    lines = [_tally(Counter(each.severity for each in checks))]
+    if verbosity() is Verbosity.VERBOSE:
+        lines += [f"{each.severity:7} {sentence(each)}" for each in checks if each.severity != "error"]
     else:
-        show(f"{entry.severity:7} {sentence(entry)}" for entry in checks)
-        print(_tally(Counter(entry.severity for entry in checks)))
+        named = ("unverified", "known_error")  # a line sums them up
+        warnings = [each for each in checks if each.severity == "warning" and each.code not in named]
+        lines += finding_lines(warnings, checks, in_full=False)
+    show_result(lambda: lines, Checked(loaded.task.name, [Check(**entry) for entry in entries_of(checks)]), as_json)
     raise typer.Exit(1 if errors_in(checks) else 0)
+
+
+Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+@app.command(example="measure lidar.step --kind lidar --out my_lidar.toml")
+def measure(
+    model: Annotated[Path, Argument(metavar="FILE", help="Maker's model of the device: STEP or STL.")],
+    kind: Annotated[Literal["lidar", "servo"], Option(metavar="KIND", help="lidar or servo.")] = "lidar",
+    up: Annotated[Axis, Option(metavar="AXIS", help="Axis of the model up from the base, or out of the horn.")] = "+z",
+    front: Annotated[Axis, Option(metavar="AXIS", help="Axis of the model that is the device's +x.")] = "+x",
+    unit: Annotated[Literal["mm", "cm", "m", "inch"] | None, Option(help="Unit of an STL file [default: mm].")] = None,
+    out: Annotated[Path | None, Option(metavar="FILE.toml", help="Proposal [default: name of the model].")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Propose a product file from a maker's model.
+
+    Writes holes, body, window and horn, all marked unverified, and a picture of the same name.
+    """
+    require_kernel("measure")
+    from scanwright.cad.measure.files import measure_files
+    from scanwright.cli.results.of_commands import MeasuredModel
+
+    out = out or Path(model.with_suffix(".toml").name)
+    measured = measure_files(model, out, kind, up=up, front=front, unit=unit, progress=ConsoleProgress())
+    proposal = measured.proposal
+    record = MeasuredModel(proposal.values, proposal.notes, measured.toml, measured.picture)
+    show_result(measured.lines, record, as_json)
+    hint(f"next: compare {out} with the device and {measured.picture}, and add what the data sheet states")
 
 
 @app.command(example="study fleet --plan")
@@ -103,24 +148,42 @@ def study(
     results: Annotated[Path | None, Option(metavar="DIR", help="Cache of results [default: OUT/results].")] = None,
     processes: Annotated[int | None, Option(min=1, metavar="N", help="Workers [default: one per core].")] = None,
     plan: Annotated[bool, Option("--plan", help="Print the estimated cost and exit.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Optimise and build many scanners, rank the results.
 
     Combines tasks with products, evaluates every candidate with its parts, and builds the winners. The same command
     resumes an interrupted study.
     """
+    from scanwright.cli.results.of_commands import Studied, read_rows
+    from scanwright.study.study import load_study
+
+    folder = out or Path("out") / load_study(study).study.name
     if plan:
         from scanwright.study.plan import plan_study
 
-        show(plan_study(study, out, results, ConsoleProgress()))
+        planned = Studied(folder, True, plan_study(study, out, results, ConsoleProgress()))
+        show_result(lambda: planned.lines, planned, as_json)
         return
     from scanwright.study.run import run_study
 
     try:
-        show(run_study(study, out, results, scheduler, processes, ConsoleProgress()))
+        lines = run_study(study, out, results, scheduler, processes, ConsoleProgress())
+        if as_json:
+            show_json(Studied(folder, False, list(lines), read_rows(folder / "study.csv")))
+        else:
+            show(lines)
     except KeyboardInterrupt:
         print_note("stopped; run the same command to continue")
         raise typer.Exit(130) from None
+
+
+def _warn_of_misfits(misfits: Sequence[str]) -> None:
+    """Print which products the printed parts do not fit; the reasons, which are indented, only with -v."""
+    if verbosity() is Verbosity.VERBOSE:
+        warn(misfits)
+    else:
+        warn(f"{line.rstrip(':')} (-v lists why)" for line in misfits if not line.startswith(" "))
 
 
 def _print_failed_checks(checks: Sequence[Finding]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
-from scanwright.cli.console import print_error
+from scanwright.cli.console import print_error, show_json
 
 if TYPE_CHECKING:
     from scanwright.firmware_io.servo.fitness import ServoSetupError
@@ -30,8 +30,15 @@ def undo_command(port: str, file: Path) -> str:
     return f"scanwright servo-setup {port} --undo {file}"
 
 
-def print_steps(port: str, steps: Iterable[str | Path]) -> None:
-    """Print each change as it is made, and first how to undo them all."""
+def print_steps(port: str, steps: Iterable[str | Path], as_json: bool = False) -> None:
+    """Print each change as it is made, and first how to undo them all; or one JSON object when all are made."""
+    if as_json:
+        from scanwright.cli.results.of_commands import Settings
+
+        made = list(steps)
+        undo = next((step for step in made if isinstance(step, Path)), None)
+        show_json(Settings([step for step in made if isinstance(step, str)], undo))
+        return
     for step in steps:
         if isinstance(step, Path):
             print(f"the old settings are saved; `{undo_command(port, step)}` restores them", flush=True)

@@ -45,16 +45,18 @@ def view_recording(
     port: int = PORT,
     rate: float = 1.0,
     allow_origins: Collection[str] = (),
+    announce: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Serve a recording at its own pace to each viewer, until Ctrl-C.
 
     Args:
         recording: MCAP recording.
         angles: angle set of the scanner; `scanner.urdf` and `own_body.npz` are looked for beside it.
-        progress: progress callback; gets the address first.
+        progress: progress callback; called with the address, in words, first.
         port: on this computer; 0 for any that is free.
         rate: how many times as fast as it was recorded.
         allow_origins: pages that may look, beside Foxglove's own, such as "https://viewer.example.org".
+        announce: called with the address.
 
     Raises:
         RecordingError: the recording is unreadable.
@@ -62,6 +64,7 @@ def view_recording(
     """
     open_recording(recording)  # what cannot be read is refused before an address is told
     with foxglove_server(recording.name, channels(), port, progress, allow_origins) as server:
+        announce(server.address)
         shown = _shown(recording, angles, server.log)
         while True:
             _until(lambda: server.has_subscribers)

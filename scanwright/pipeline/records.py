@@ -14,16 +14,23 @@ from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.files.atomic_file import atomic_write, place_in
 from scanwright.design.left_out import LeftOut
+from scanwright.design.scene.ray_caster import load_triangles
+from scanwright.design.scene.urdf import SUFFIX as URDF
 from scanwright.design.search.search import SearchResult
 from scanwright.design.task.shapes import MapRegion, MeshRegion
 from scanwright.design.task.task import LoadedTask, Task
 from scanwright.pipeline.manifest import enter, require_as_built, write_json
+
+_BARE_MESH = {"joint_deg": {}, "joint_mm": {}, "frame": "", "omit": []}
 
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
     """Write `task.toml` with all defaults, and copy the files that it names, so that the folder can be built alone."""
     table = loaded.task.model_dump(mode="json", exclude_none=True, exclude={"camera"})  # it makes no part
     rename_files(table, loaded.task, lambda file, role: _bring(folder, loaded.source.parent / file, role))
+    for i, region in enumerate(loaded.task.mask):
+        if isinstance(region, MeshRegion) and Path(region.file).suffix.lower() == URDF:
+            table["mask"][i] |= {"file": _bring_robot(folder, loaded.source.parent, region, f"mask-{i}"), **_BARE_MESH}
     (folder / "task.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
@@ -76,4 +83,16 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
 def _bring(folder: Path, source: Path, prefix: str) -> str:
     name = f"{prefix}{source.suffix}"
     shutil.copyfile(source, folder / name)
+    return name
+
+
+def _bring_robot(folder: Path, tasks: Path, region: MeshRegion, prefix: str) -> str:
+    """Write the robot of a URDF as one mesh, as its own meshes are elsewhere."""
+    import trimesh
+
+    corners = load_triangles(tasks / region.file, posture=region.posture).reshape(-1, 3)
+    mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    name = f"{prefix}.stl"
+    (folder / name).write_bytes(trimesh.exchange.stl.export_stl(mesh))
+    (folder / f"{prefix}{URDF}").unlink()
     return name

@@ -94,9 +94,9 @@ def _alone(problem: Problem, mount: OtherMount, J: float) -> str:
     angles = ", ".join(f"{angle:g}" for angle in mount.angles_deg)
     blind = "; ".join(hole.words() for hole in holes(problem, np.radians(mount.angles_deg)))
     return (
-        f"J alone, not asked for holes or limits, would take ({angles}) with J = {mount.J:.4f}, which "
+        f"Without blind spots and limits, ({angles}) with J = {mount.J:.4f} would be best, which "
         f"{f'is {blind}' if mount.blind else 'breaks the limits of the task'}. "
-        f"What keeps all that the task asks costs {price(problem, J, mount.J)} against it."
+        f"Keeping the requirements of the task costs {price(problem, J, mount.J)}."
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
 
 from scanwright.design.progress import Progress
@@ -14,25 +15,28 @@ _LOG = logging.getLogger(__name__)
 ALONE_S = 300.0  # without a visitor; a browser that restarts returns sooner
 
 
-def run_studio(loaded: LoadedTask, *, port: int, out: Path, progress: Progress) -> None:
-    """Serve the studio of a task, and print its address; task files are saved to the working folder.
+def run_studio(
+    loaded: LoadedTask, *, port: int, out: Path, progress: Progress, announce: Callable[[str], None]
+) -> None:
+    """Serve the studio of a task; task files are saved to the working folder.
 
     Args:
         loaded: first task.
         port: of 127.0.0.1; 0 chooses a free one.
         out: parent of the build folders.
         progress: progress callback.
+        announce: called with the address of the page.
 
     Raises:
         TaskError: the port is taken, or the task has no region.
     """
-    with guarded_server(f"Scanwright: {loaded.task.name}", port) as (server, gate):
+    with guarded_server(f"Scanwright: {loaded.task.name}", port, recall=True) as (server, gate):
         progress("reading the task (first run: compiling, about 5 s)")
         studio = Studio(server, loaded, Path.cwd(), out)
         try:
-            print(f"open {gate.address}", flush=True)
+            announce(gate.address)
             studio.searching.begin()
-            print(f"press Ctrl-C to end; without a visitor the studio ends after {ALONE_S / 60:g} minutes", flush=True)
+            progress(f"press Ctrl-C to end; without a visitor the studio ends after {ALONE_S / 60:g} minutes")
             wait_until_alone(gate, ALONE_S)
         finally:
             studio.close()

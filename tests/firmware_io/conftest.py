@@ -30,8 +30,7 @@ def virtual_bus(monkeypatch):
 
         def open_port(port, baud, timeout):
             assert port == made.port
-            made.baudrate, made.timeout = baud, timeout
-            return made
+            return made.open(port, baud, timeout)
 
         monkeypatch.setattr(serial_line, "open_serial_port", open_port)
         for module in (serial_line, unit, examine, prepare):

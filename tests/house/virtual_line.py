@@ -1,39 +1,36 @@
 """A lidar's machine behind a line whose clock goes forward only where somebody waits."""
 
-import time
 from collections import deque
 from pkgutil import resolve_name
+
+import pytest
+from virtual_time import OnClock
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.emulators.lidar_line import _AHEAD_NS
 from scanwright.firmware_io.lidar.families import family_of
 
 _BUFFER_NS = 50_000_000  # of a line that nobody reads
 
 
-class VirtualLine:
+class VirtualLine(OnClock):
     """The machine of an emulator behind a stream of the drivers' shape, and the clock of both."""
 
-    def __init__(self, model, ranging):
+    def __init__(self, model, ranging, clock=None):
         self.model = model
+        super().__init__(clock)
         lidar = load_catalogue().get(model, Lidar)
-        self.machine = resolve_name(family_of(model).emulator)(lidar, ranging, 0).machine
-        self.now_ns = time.monotonic_ns()  # at which the machine was made
+        make = resolve_name(family_of(model).emulator)
+        with pytest.MonkeyPatch.context() as patch:
+            self.clock.put_in_place_of_time(patch, "scanwright.firmware_io.emulators")
+            self.machine = make(lidar, ranging, 0).machine
         self.plugged = True
         self.damage = deque()  # what happens to the next packets
         self._scanning = self.machine.scanning
         self._received = b""
         self._coming = deque()  # when, and what
-
-    def monotonic(self):
-        return self.now_ns / 1e9
-
-    def monotonic_ns(self):
-        return self.now_ns
-
-    def sleep(self, seconds):
-        self.now_ns += round(seconds * 1e9)
 
     def unplug(self):
         self.plugged = False
@@ -58,6 +55,8 @@ class VirtualLine:
         end_ns = self.now_ns + max(round(timeout_s * 1e9), 0)
         self.machine.leave_out(self.now_ns - _BUFFER_NS)
         while not (self._coming and self._coming[0][0] <= end_ns) and self.machine.next_ns() <= end_ns:
+            self.now_ns = max(self.now_ns, self.machine.next_ns() - _AHEAD_NS)  # nobody knows where the axis is then
+            self._here()
             for sent_ns, packet in self.machine.next_packets():
                 self._coming.append((sent_ns, self.damage.popleft()(packet) if self.damage else packet))
         if not self._coming or self._coming[0][0] > end_ns:

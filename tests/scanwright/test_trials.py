@@ -56,7 +56,7 @@ def test_the_command_reports_every_choice_and_the_chosen_one(command, monkeypatc
     monkeypatch.setattr(solvers, "TOLERANCES", (1e-6,))
     monkeypatch.setattr(axis, "BEAMS", 20_000)
     (tmp_path / "ahead.toml").write_text(cheapest_task)
-    code, out, _ = command("accuracy", tmp_path / "ahead.toml", "--choices", "--out", tmp_path)
+    code, out, _ = command("accuracy", tmp_path / "ahead.toml", "--choices", "--out", tmp_path, "--json")
     assert code == 0
     with (tmp_path / "ahead" / "choices.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

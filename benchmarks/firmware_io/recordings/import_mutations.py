@@ -1,10 +1,12 @@
 """Do the import checks report every fault that matters? Random faults in good recordings.
 
-    python -m benchmarks.firmware_io.recordings.import_mutations 400 [FIRST_SEED]
+    python -m benchmarks.firmware_io.recordings.import_mutations 400 [FIRST_SEED] [corrected] [small]
 
 Each sample is a good recording of a random scanner with one random fault in its headers, clocks or angles. It is
 imported, and the place of every beam at 5 m is compared with the truth. A sample is wrong if more than 1 % of its beams
-are off by more than 5 mm; it must then have a warning, or be refused. The rest must have none.
+are off by more than 5 mm; it must then have a warning, or be refused. The rest must have none. With `corrected` each
+reported sample is imported again with the corrections that its hints offer, and judged again. With `small` faults have
+a hundredth to one times the smallest size of the others: it prints below which error each kind can be missed.
 
 Left out are faults that a recording cannot show: the wrong sense of an angle or of the beams with limits to match, a
 wrong angle_max that nothing uses, and offsets between clocks below 15 ms, as the transport of messages hides them.
@@ -13,10 +15,11 @@ wrong angle_max that nothing uses, and offsets between clocks below 15 ms, as th
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -28,7 +31,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from scanwright.design.arrays import Floats, Ints
 from scanwright.design.errors import RecordingError
-from scanwright.firmware_io.recording.importer import import_bag
+from scanwright.design.findings import Finding
+from scanwright.firmware_io.recording.import_checks.corrections import Corrections
+from scanwright.firmware_io.recording.importer import ImportSummary, import_bag
 from scanwright.firmware_io.recording.recording import open_recording
 
 START_NS = 1_700_000_000 * 10**9
@@ -103,8 +108,14 @@ def good(rng: Generator) -> Fake:
     )
 
 
+class Small(Generator):
+    """Draws small faults."""
+
+
 def _size(rng: Generator, low: float, high: float) -> float:
     """A random size of a random sign, evenly by its logarithm."""
+    if isinstance(rng, Small):
+        low, high = low / 100, low
     return float(np.exp(rng.uniform(np.log(low), np.log(high))) * rng.choice([-1, 1]))
 
 
@@ -264,14 +275,28 @@ def errors_mm(one: Fake, recording: Path) -> Floats:
     return np.concatenate(off)
 
 
+_OFFERED = re.compile(r'^(\w+) = "?([\w.+-]+)"?')
+
+
 @dataclass(frozen=True)
 class Sample:
-    """What became of one recording: its fault, error at 5 m (99 % of the beams) and codes of the warnings."""
+    """What became of one recording.
+
+    Attributes:
+        fault: its fault.
+        seed: of the generator.
+        error_mm: that 99 % of its beams keep at 5 m.
+        codes: of its warnings.
+        offered: names of the corrections that its hints offer.
+        corrected_mm: as error_mm, of the import with these; NaN if it was not tried.
+    """
 
     fault: str
     seed: int
     error_mm: float
     codes: tuple[str, ...]
+    offered: tuple[str, ...] = ()
+    corrected_mm: float = math.nan
 
     @property
     def missed(self) -> bool:
@@ -284,29 +309,52 @@ class Sample:
         return self.error_mm <= WRONG_MM and bool(self.codes)
 
 
-def sample(seed: int, folder: Path) -> Sample:
-    """Make, import and judge one recording."""
-    rng = np.random.default_rng(seed)
+def offered(findings: Iterable[Finding]) -> Corrections:
+    """Return the corrections that the hints of warnings offer."""
+    values: dict[str, Any] = {}
+    for finding in findings:
+        if finding.severity == "warning" and (match := _OFFERED.match(finding.hint)):
+            name, text = match.groups()
+            number = name in ("scan_offset_s", "no_return_from_m")
+            values[name] = float(text) if number else True if text == "true" else text
+    return Corrections(**values)
+
+
+def _imported(one: Fake, bag: Path, corrections: Corrections) -> tuple[ImportSummary, float]:
+    out = bag.with_suffix(".mcap")
+    summary = import_bag(
+        bag, out, scan="/scan", angle="/joint:pan", angle_unit="rad", hold=False, corrections=corrections
+    )
+    false_points = one.false_points and corrections.no_return_from_m is None
+    return summary, math.inf if false_points else float(np.quantile(errors_mm(one, out), 1 - WRONG_SHARE))
+
+
+def sample(seed: int, folder: Path, *, corrected: bool = False, small: bool = False) -> Sample:
+    """Make, import and judge one recording, and what its hints make of it."""
+    rng = (Small if small else Generator)(np.random.PCG64(seed))
     fault = list(FAULTS)[seed % len(FAULTS)]
     one = FAULTS[fault](good(rng), rng)
-    bag, out = folder / "in.bag", folder / "out.mcap"
+    bag = folder / "in.bag"
     bag.unlink(missing_ok=True)
     write(one, bag)
     try:
-        summary = import_bag(bag, out, scan="/scan", angle="/joint:pan", angle_unit="rad", hold=False)
+        summary, error_mm = _imported(one, bag, Corrections())
     except RecordingError as error:
         return Sample(fault, seed, math.inf, (f"refused: {error}",))
     codes = tuple(finding.code for finding in summary.findings if finding.severity == "warning")
-    wrong = math.inf if one.false_points else float(np.quantile(errors_mm(one, out), 1 - WRONG_SHARE))
-    return Sample(fault, seed, wrong, codes)
+    offer = offered(summary.findings)
+    if not corrected or offer == Corrections():
+        return Sample(fault, seed, error_mm, codes)
+    names = tuple(each.name for each in fields(offer) if getattr(offer, each.name) != each.default)
+    return Sample(fault, seed, error_mm, codes, names, _imported(one, bag, offer)[1])
 
 
-def main(count: int, first: int) -> int:
+def main(count: int, first: int, *, corrected: bool, small: bool) -> int:
     """Judge `count` recordings from a first seed on; print what was missed and what was reported though harmless."""
     with TemporaryDirectory() as folder:
-        samples = [sample(seed, Path(folder)) for seed in range(first, first + count)]
+        samples = [sample(seed, Path(folder), corrected=corrected, small=small) for seed in range(first, first + count)]
     for one in samples:
-        if one.missed or one.false_alarm:
+        if (one.missed and not small) or one.false_alarm:
             what = "missed" if one.missed else "false alarm"
             print(f"{what:12} {one.fault:24} seed {one.seed}: {one.error_mm:8.1f} mm {', '.join(one.codes)}")
     wrong = sum(one.error_mm > WRONG_MM for one in samples)
@@ -314,8 +362,22 @@ def main(count: int, first: int) -> int:
     print(f"{count} recordings, {wrong} wrong by more than {WRONG_MM:g} mm at {AT_M:g} m: {missed} not reported")
     print(f"{count - wrong} harmless: {alarms} reported ({alarms / max(count - wrong, 1):.1%})")
     print(", ".join(f"{fault} {n}" for fault, n in Counter(one.fault for one in samples if one.codes).items()))
+    for fault in FAULTS if small else ():
+        errors = [one.error_mm for one in samples if one.fault == fault and one.missed]
+        if errors:
+            print(f"{fault:24} {len(errors)} missed, up to {max(errors):.1f} mm")
+    for fault in FAULTS if corrected else ():
+        some = [one for one in samples if one.fault == fault and one.offered and one.error_mm > WRONG_MM]
+        if some:
+            right = sum(one.corrected_mm <= WRONG_MM for one in some)
+            worst = max(some, key=lambda one: one.corrected_mm)
+            names = ", ".join(sorted({name for one in some for name in one.offered}))
+            rest = f"; worst {worst.corrected_mm:.1f} mm (seed {worst.seed})"
+            print(f"{fault:24} {right} of {len(some)} right after {names}{rest}")
     return int(missed > 0)
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(int, (*sys.argv[1:], *("324", "0")[len(sys.argv) - 1 :]))))
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    modes = {mode: mode in sys.argv for mode in ("corrected", "small")}
+    sys.exit(main(*(*numbers, *(324, 0)[len(numbers) :]), **modes))

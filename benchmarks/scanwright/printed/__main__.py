@@ -2,20 +2,21 @@
 
     uv run python -m benchmarks.scanwright.printed [--write] [PAGE...]
 
-Runs the command of every marked block (`benchmarks.scanwright.printed.blocks`) in an empty folder. Prints a line for
-each block and exits with 1 if one differs; `--write` replaces the output in the page instead.
+Runs the marked blocks (`benchmarks.scanwright.printed.blocks`) of each page one after another in one folder, so that a
+block uses the files of those above it. `emulate` runs until the page is done. Prints a line for each block and exits
+with 1 if one differs; `--write` replaces the output in the page instead.
 """
 
 from __future__ import annotations
 
-import shlex
-import subprocess
 import sys
+from contextlib import ExitStack
 from difflib import unified_diff
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.scanwright.printed.blocks import Block, blocks_of, with_output
+from benchmarks.scanwright.printed.blocks import blocks_of, with_output
+from benchmarks.scanwright.printed.shell import Shell
 
 ROOT = Path(__file__).parents[3]
 
@@ -27,31 +28,29 @@ def main() -> None:
     pages = [Path(name) for name in names] or [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
     different = 0
     for path in (page for page in pages if "_build" not in page.parts):
-        text = path.read_text(encoding="utf-8")
-        for block in reversed(blocks_of(text)):  # from below, so that the lines above keep their numbers
-            printed = run(block)
-            same = block.agrees(printed)
-            print(f"{path.name}:{block.line}: {'same' if same else 'differs'}: {block.command}", flush=True)
-            if not same and write:
-                text = with_output(text, block, block.renewed(printed))
-            elif not same:
-                print("\n".join(unified_diff(block.output, printed, "page", "run", lineterm="")))
-            different += not same
-        if write:
-            path.write_text(text, encoding="utf-8")
+        different += _compared(path, write)
     sys.exit(1 if different and not write else 0)
 
 
-def run(block: Block) -> list[str]:
-    """Return the lines that the command of a block prints on standard output."""
-    words = shlex.split(block.command)[1:]
-    with TemporaryDirectory() as folder:
-        result = subprocess.run(
-            [sys.executable, "-m", "scanwright", *words], cwd=folder, capture_output=True, text=True, check=False
-        )
-    if result.returncode not in (0, 1):
-        raise SystemExit(f"{block.command}: exit code {result.returncode}\n{result.stderr}")
-    return result.stdout.splitlines()
+def _compared(path: Path, write: bool) -> int:
+    """Compare the blocks of a page with runs; return how many differ."""
+    text, different, longer = path.read_text(encoding="utf-8"), 0, 0
+    with TemporaryDirectory() as folder, ExitStack() as running:
+        shell = Shell(Path(folder), running)
+        for block in blocks_of(text):
+            printed = shell.run(block.command)
+            same = block.agrees(printed)
+            print(f"{path.name}:{block.line}: {'same' if same else 'differs'}: {block.command}", flush=True)
+            if not same and write:
+                renewed = block.renewed(printed)
+                text = with_output(text, block, renewed, longer)
+                longer += len(renewed) - len(block.output)
+            elif not same:
+                print("\n".join(unified_diff(block.output, printed, "page", "run", lineterm="")))
+            different += not same
+    if write:
+        path.write_text(text, encoding="utf-8")
+    return different
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Marked blocks of a page: a command with its output, which a run can be compared with.
 
-A block is marked by the line before it, `<!-- printed -->` or `<!-- printed: mask REGEX -->`:
+A block is marked by the line before it, `<!-- printed -->`, `<!-- printed: mask REGEX -->` or
+`<!-- printed: numbers -->`:
 
     <!-- printed: mask in [0-9.]+ s$ -->
     ```console
@@ -9,7 +10,8 @@ A block is marked by the line before it, `<!-- printed -->` or `<!-- printed: ma
     [...]
     ```
 
-A line `[...]` in it is any number of lines. Text that the mask matches can differ.
+A line `[...]` in it is any number of lines. Text that the mask matches can differ; with `numbers`, all
+numbers and the spaces before them.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ GAP = "[...]"
 _MARKED = re.compile(
     r"(?P<mark><!-- printed(?P<option>[^\n]*?) -->\n)```(?P<kind>\w*)\n(?P<text>.*?)^```", re.DOTALL | re.MULTILINE
 )
-_OPTION = re.compile(r"|: mask (?P<mask>.+)")
+_OPTION = re.compile(r"|: numbers|: mask (?P<mask>.+)")
+NUMBER = r" *[-+]?\d[\d.,e-]*"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +33,7 @@ class Block:
 
     Attributes:
         line: number of its mark in the page, from 1.
-        command: the line after `$ `.
+        command: text after `$ `; a line of it can end with a backslash.
         output: the lines below it.
         mask: pattern of the text that can differ; empty if none can.
     """
@@ -45,11 +48,7 @@ class Block:
         return re.sub(self.mask, "#", line) if self.mask else line
 
     def renewed(self, printed: list[str]) -> list[str]:
-        """Return the output as a run printed it, with the gaps of the page.
-
-        Raises:
-            ValueError: a line between gaps has no counterpart.
-        """
+        """Return the output as a run printed it, with the gaps of the page if its lines still exist."""
         if GAP not in self.output:
             kept = dict(zip(map(self.masked, self.output), self.output, strict=True))
             return [kept.get(self.masked(line), line) for line in printed]
@@ -60,7 +59,7 @@ class Block:
                 continue
             places = [k for k, new in enumerate(rest) if _key(new) == _key(line)]
             if not places:
-                raise ValueError(f"no line like {line!r}")
+                return printed
             new, rest = rest[places[0]], rest[places[0] + 1 :]
             renewed.append(line if self.masked(new) == self.masked(line) else new)
         return renewed
@@ -92,21 +91,22 @@ def _block(line: int, match: re.Match[str] | None) -> Block:
         raise ValueError(f"line {line}: no console block after the mark")
     option = _OPTION.fullmatch(match["option"])
     if option is None:
-        raise ValueError(f"line {line}: unknown option {match['option']!r} (allowed: mask REGEX)")
-    first, *output = match["text"].splitlines()
+        raise ValueError(f"line {line}: unknown option {match['option']!r} (allowed: mask REGEX, numbers)")
+    first, *output = match["text"].replace("\\\n", "\\\0").splitlines()
+    command = first.replace("\\\0", "\\\n")
     if not first.startswith("$ scanwright ") or not output or any(one.startswith("$ ") for one in output):
-        raise ValueError(f"line {line}: a block is one line `$ scanwright ...` and its output")
-    mask = option["mask"] or ""
+        raise ValueError(f"line {line}: a block is one command `$ scanwright ...` and its output")
+    mask = option["mask"] or (NUMBER if match["option"] else "")
     try:
         re.compile(mask)
     except re.error as error:
         raise ValueError(f"line {line}: mask {mask!r}: {error}") from None
-    return Block(line, first.removeprefix("$ "), tuple(output), mask)
+    return Block(line, command.removeprefix("$ "), tuple(output), mask)
 
 
-def with_output(page: str, block: Block, output: list[str]) -> str:
-    """Return the page with other output of a block."""
+def with_output(page: str, block: Block, output: list[str], lower: int = 0) -> str:
+    """Return the page with other output of a block, which is `lower` lines below its place."""
     lines = page.splitlines()
-    start = block.line + 2  # after the mark, the fence and the command
+    start = block.line + lower + 2 + block.command.count("\n")  # after the mark, the fence and the command
     lines[start : start + len(block.output)] = output
     return "\n".join(lines) + "\n"

@@ -81,11 +81,10 @@ def gains(problem: Problem, angles_deg: Sequence[float], J: float, mounts: Itera
 
 
 def gain_lines(result: tuple[Gain, ...]) -> list[str]:
-    """The gains in words, a line each, the smallest first; and whether it is worth a mount that is not simple."""
-    unit = "J, against" if result[0].factor is None else "beams per ball over the weighted region, against"
-    lines = [f"{unit} the best simple mount: {result[0].words()}"]
-    lines += [f"{unit} another simple mount: {gain.words()}" for gain in result[1:]]
-    return lines + verdict(result)
+    """Return the gains, one line each, the smallest first; and whether a simple mount is as good."""
+    what = "J" if result[0].factor is None else "beam density in the region"
+    lines = [f"{what}, against simple mounts tuned to the task, without parts:"]
+    return [*lines, *(f"  {gain.words()}" for gain in result), *verdict(result)]
 
 
 def verdict(result: tuple[Gain, ...]) -> list[str]:
@@ -97,7 +96,7 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     better = _better(free[0])  # the best one first
     best = free[0] if better else min(free, key=lambda gain: (not gain.same, not gain.simpler))
     if best.same:
-        return [f"the answer is itself a simple mount: {best.mount.name}"]
+        return [f"the optimum is itself a simple mount: {best.mount.name}"]
     assert best.factor is not None
     how = f"better ({1 / best.factor:.2f} times the beams)" if better else f"as good within {AS_GOOD - 1:.0%}"
     rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""

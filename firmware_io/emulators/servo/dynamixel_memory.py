@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scanwright.firmware_io.emulators.servo.memory import TableItem, ro, rw, signed
+from scanwright.firmware_io.emulators.servo.memory import TableItem, one_of, ro, rw, signed
 
 
 def _protocol_1(
@@ -45,11 +45,12 @@ def _protocol_2(
 
     Indirect data are bytes that stand elsewhere: `indirect` tells where each stretch keeps its targets and its data.
     """
+    modes = (1, 3, 4, 16) if current is None else (0, 1, 3, 4, 5, 16)
     targets = [(low + 2 * k, data + k) for low, data, many in indirect for k in range(many)]
     currents = [] if current is None else [rw(38, 2, current, current), signed(102, 2, current)]
     return [
         *(ro(0, 2, number), ro(2, 4), ro(6, 1, firmware), rw(7, 1, 1, 252), rw(8, 1, 1, 7), rw(9, 1, 250, 254)),
-        *(rw(10, 1, 0, 5), rw(11, 1, 3, 16), rw(12, 1, 255), rw(13, 1, 2, 2, 1), signed(20, 4, 1_044_479)),
+        *(rw(10, 1, 0, 5), one_of(11, 1, 3, modes), rw(12, 1, 255), rw(13, 1, 2, 2, 1), signed(20, 4, 1_044_479)),
         *(rw(24, 4, 10, 1023), rw(31, 1, hot, 100), rw(32, 2, volts[1], volts[1], volts[0])),
         *(rw(34, 2, volts[0], volts[1], volts[0]), rw(36, 2, 885, 885), rw(44, 4, speed, 1023), *currents),
         *([rw(40, 4, 32767, 32767)] if acceleration else []),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 # Errors of a request, as protocol 2.0 numbers them; 1.0 knows only some (see `ServoTwin`).
@@ -10,7 +11,7 @@ RANGE, LENGTH, ACCESS = 4, 5, 7
 
 @dataclass(frozen=True, slots=True)
 class TableItem:
-    """One entry; a writable one takes counts from `low` to `high`."""
+    """One entry; a writable one takes counts from `low` to `high`, or only those of `only` if there are any."""
 
     address: int
     size: int
@@ -18,6 +19,12 @@ class TableItem:
     low: int = 0
     high: int = 0
     writable: bool = False
+    only: frozenset[int] = frozenset()
+
+
+def one_of(address: int, size: int, value: int, only: Collection[int]) -> TableItem:
+    """An entry to read and write that takes certain counts."""
+    return TableItem(address, size, value, min(only), max(only), True, frozenset(only))
 
 
 def rw(address: int, size: int, value: int, high: int | None = None, low: int = 0) -> TableItem:
@@ -76,7 +83,8 @@ class Memory:
             if address + item.size > end:
                 return LENGTH
             part = data[len(data) - (end - address) :][: item.size]
-            if not item.low <= int.from_bytes(part, "little", signed=item.low < 0) <= item.high:
+            count = int.from_bytes(part, "little", signed=item.low < 0)
+            if not item.low <= count <= item.high or (item.only and count not in item.only):
                 return RANGE
             address += item.size
         return 0

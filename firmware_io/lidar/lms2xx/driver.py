@@ -270,7 +270,7 @@ class LmsLidar(LineDriver):
             angle_min_rad=float(bearing_rad[0]),
             angle_increment_rad=step_rad,
             time_increment_s=step_rad / (2 * np.pi) * _TURN_S,
-            scan_time_s=_TURN_S * (self._skip + 1),
+            scan_time_s=_TURN_S,
             range_min_m=self._lidar.range_min_mm / 1e3,
             range_max_m=self._lidar.range_max_mm / 1e3,
             range_m=measured.range_m[turn :: self._interlaced],
@@ -279,7 +279,7 @@ class LmsLidar(LineDriver):
         warning = "its window is dirty: clean it" if measured.status & protocol.POLLUTED else ""
         if not warning and self._baud < _FAST_BAUD:
             warning = f"at {self._baud} baud most turns are lost; use an adapter with {_FAST_BAUD} baud"
-        return TimedScan(scan, arrival_ns, count.arrivals.uncertainty_ns, warning)
+        return TimedScan(scan, arrival_ns, self._line.widened(count.arrivals.uncertainty_ns), warning)
 
 
 def open_lms2xx(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LmsLidar:

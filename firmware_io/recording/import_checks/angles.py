@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
-from scanwright.design.arrays import Floats, Times
+from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
@@ -20,6 +20,7 @@ _LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are sma
 _STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
 _SIGMAS = 8.0  # of the differences to the neighbours: noise alone never gets there
 _MOVING_RAD_S = math.radians(1.0)  # slower than any sweep
+_RESTS, _CAUGHT_UP = 5, 1.8  # steps of 0, and times the usual speed after them: no servo starts so fast
 _FASTEST = 4.0  # times the usual speed: no servo jumps to it for one sample
 
 
@@ -31,10 +32,11 @@ def usual_speed_rad_s(log: JointLog) -> float:
     return float(np.median(speed[moving])) if moving.any() else 0.0
 
 
-def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
+def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
     """Return which positions lie far off their neighbours, and by how much [rad], shape (n,) each.
 
-    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near.
+    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near; and it
+    lies on the line through the two before or the two after it, as it does where the axis turns back or stops.
     """
     count = position_rad.size
     wrong, off = np.zeros(count, bool), np.zeros(count)
@@ -49,7 +51,24 @@ def outliers(position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
     usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
     limit = max(_LEAST_RAD, _STEPS * usual, _SIGMAS * 1.4826 * float(np.median(off[inner])))
     wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)
-    return wrong, off
+    lone_rad = _off_both_lines(time_ns, position_rad)
+    lone = lone_rad > max(_LEAST_RAD, _SIGMAS * 1.4826 * float(np.median(lone_rad)))
+    return wrong | lone, np.where(lone, np.maximum(off, lone_rad), off)
+
+
+def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
+    """Return how far positions lie off the nearer of the lines through two before and two after them, shape (n,)."""
+    seconds, off = (time_ns - time_ns[0]) / 1e9, np.zeros(time_ns.size)
+    here = np.arange(2, time_ns.size - 2)
+    sides = []
+    for side in (-1, 1):
+        near, far = here + side, here + 2 * side
+        apart_s = seconds[near] - seconds[far]
+        rate = _wrapped(position_rad[near] - position_rad[far]) / np.where(apart_s == 0, np.inf, apart_s)
+        line = position_rad[near] + rate * (seconds[here] - seconds[near])
+        sides.append(np.abs(_wrapped(position_rad[here] - line)))
+    off[here] = np.minimum(*sides)
+    return off
 
 
 def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed: bool) -> Iterator[Finding]:
@@ -61,7 +80,7 @@ def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed
         dropped: outliers are dropped.
         timed: the times are exact enough to judge speeds by.
     """
-    wrong, off = outliers(position_rad)
+    wrong, off = outliers(time_ns, position_rad)
     if wrong.any():
         cost_mm = 1000 * AT_M * float(np.sin(min(off[wrong].max(), math.pi / 2)))
         share = np.mean(wrong)
@@ -102,6 +121,11 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
         return
     far = step_rad > max(_LEAST_RAD, _FASTEST * float(np.median(step_rad[moving])))
     jump = far & (speed > _FASTEST * np.median(speed[moving]))
+    if np.mean(moving) > 0.5:  # one that turns, whose angle stays for some samples and then catches up
+        caught_up = (step_rad > max(_LEAST_RAD, _CAUGHT_UP * float(np.median(step_rad[moving])))) & (
+            speed > _CAUGHT_UP * np.median(speed[moving])
+        )
+        jump |= caught_up & (_rests_before(step_rad) >= _RESTS)
     if jump.any():
         worst_rad = float(step_rad[jump].max())
         yield Finding(
@@ -114,6 +138,13 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
             float(np.sum(jump)),
             hint="check the source of the angle around these times",
         )
+
+
+def _rests_before(step_rad: Floats) -> Ints:
+    """Return how many steps of exactly 0 are right before each step, shape (n,)."""
+    number = np.arange(step_rad.size)
+    last_moved = np.maximum.accumulate(np.where(step_rad > 0, number, -1))
+    return number - 1 - np.concatenate([[-1], last_moved[:-1]])
 
 
 def _wrapped(angle_rad: Floats) -> Floats:

@@ -25,11 +25,11 @@ def joint_positions(angle: Floats, unit_rad: float, corrections: Corrections) ->
 def corrected_scan(
     scan: Scan, corrections: Corrections, time_increment_s: float | None, limits_rad: tuple[float, float]
 ) -> Scan:
-    """Return a scan with its header and ranges corrected.
+    """Return a scan with its header corrected.
 
     Args:
         scan: as received.
-        corrections: of bearings and ranges.
+        corrections: of bearings.
         time_increment_s: to use; None for that of the scan.
         limits_rad: angle_min and angle_max of its header.
     """
@@ -37,7 +37,12 @@ def corrected_scan(
         scan = replace(scan, time_increment_s=time_increment_s)
     if corrections.bearings == "limits" and scan.range_m.size > 1:
         scan = replace(scan, angle_increment_rad=(limits_rad[1] - limits_rad[0]) / (scan.range_m.size - 1))
-    if corrections.no_return_from_m is not None:
-        far = scan.range_m >= np.float32(corrections.no_return_from_m)
-        scan = replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))
     return scan
+
+
+def without_far(scan: Scan, corrections: Corrections) -> Scan:
+    """Return a scan without the ranges that mean no return."""
+    if corrections.no_return_from_m is None:
+        return scan
+    far = scan.range_m >= np.float32(corrections.no_return_from_m)
+    return replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))

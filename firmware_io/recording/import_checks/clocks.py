@@ -21,7 +21,7 @@ _LEAST_MM = 5.0  # at AT_M: smaller costs are not worth a warning
 
 
 def clock_findings(
-    scans: Stamps, angles: Stamps, arc_ns: Ints, speed_rad_s: float, *, one_message: bool
+    scans: Stamps, angles: Stamps, arc_ns: Ints, speed_rad_s: float, *, same_clock: bool
 ) -> Iterator[Finding]:
     """Check the stamps of scans and angles that are to be on one clock.
 
@@ -30,16 +30,18 @@ def clock_findings(
         angles: times of the angles, in the order of their receipt.
         arc_ns: from the first to the last beam of each scan, shape (n,).
         speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        one_message: scan and angle come in one message, so that they share a clock.
+        same_clock: they are known to share one, such as that of one message.
     """
     for name, stamps in (("scans", scans), ("angles", angles)):
         yield from _steps_back(name, stamps, speed_rad_s)
     if not (scans.complete() and angles.complete()):
         return
-    scan_s, angle_s = _delay_s(scans), _delay_s(angles)
-    if not one_message:  # both ahead of the receiver by the same: they agree
-        scan_s = scan_s - min(float(np.quantile(angle_s, 0.05)), 0.0)
-    least_s, arc_s = float(np.quantile(scan_s, 0.05)), float(np.median(arc_ns)) / 1e9
+    arc_s = float(np.median(arc_ns)) / 1e9
+    least_s, angle_least_s = (float(np.quantile(_delay_s(stamps), 0.05)) for stamps in (scans, angles))
+    if not same_clock and max(least_s - arc_s, angle_least_s) < -_JITTER_S:  # both are ahead of the receiver
+        ahead_s = max(least_s - arc_s, angle_least_s)
+        near = abs(least_s - arc_s - angle_least_s) < _LATE_S  # messages are delivered with such differences
+        least_s, angle_least_s = (arc_s, 0.0) if near else (least_s - ahead_s, angle_least_s - ahead_s)
     if least_s < -_JITTER_S:
         yield _warning("scan_stamps_late", "scans", -least_s, speed_rad_s, f"stamps lie {-least_s:.4g} s after receipt",
                        'the clock of the lidar is ahead: correct it, or stamp = "receipt"')  # fmt: skip
@@ -48,9 +50,8 @@ def clock_findings(
         yield _warning("scan_stamp_not_first_beam", "scans", arc_s, speed_rad_s,
                        f"received {early_s:.4g} s before their last beam would be measured: stamps are not those of "
                        "the first beam", 'stamp = "last" if they are those of the last beam')  # fmt: skip
-    if one_message:
+    if same_clock:
         return
-    angle_least_s = float(np.quantile(angle_s, 0.05))
     if angle_least_s < -_JITTER_S:
         yield _warning("angle_stamps_late", "angles", -angle_least_s, speed_rad_s,
                        f"stamps lie {-angle_least_s:.4g} s after receipt",

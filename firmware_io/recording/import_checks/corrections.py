@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.samples import Echo
 
-Echo = Literal["first", "last", "strongest"]
 _COUNTS = re.compile(r"(\d{1,12}(?:\.\d+)?)/turn")
 
 
@@ -51,7 +51,7 @@ class Corrections:
         bearings: limits spreads the beams from angle_min to angle_max.
         scan_offset_s: added to the times of the scans.
         no_return_from_m: ranges from this one on are no returns.
-        echo: range of a MultiEchoLaserScan.
+        echo: ranges of a MultiEchoLaserScan: first, last, strongest or all.
         drop_outliers: drop angles far off both neighbours.
 
     Raises:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
+from scanwright.firmware_io.samples import Scan
 
 AT_M = 5.0  # range at which a finding states its cost
 _LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
-_SPAN_STEPS = 1.6  # headers of real bags state n - 1 or n steps between angle_min and angle_max
-_TIME_ERROR = 0.1  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
+_WRONG_MM = 5.0  # at that range, of the last beam
+_TIME_ERROR = 0.03  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
 _TURN_ERROR = 0.03  # how near to an integer the turns between two scans are that a driver dropped
 _SAME_RANGE = 0.01  # share of the beams with the longest range: no scene puts so many at one distance
 _FEWEST = 20  # beams
@@ -50,10 +53,15 @@ class Headers:
     unequal_intensities: int
 
     @classmethod
-    def of(cls, rows: list[tuple[Any, ...]], longest: Counter[float]) -> Headers:
-        """Make the record of `header_of` each scan."""
-        stamps, beams, steps, spans, increments, scan_times, limits, unequal = map(np.array, zip(*rows, strict=True))
-        return cls(stamps, beams, steps, spans, increments, scan_times, limits, longest, int(np.sum(unequal)))
+    def of(cls, rows: Iterable[tuple[float, ...]]) -> Headers:
+        """Make the record of the row of each scan: `header_of` or `header_of_scan`."""
+        stamp_ns, beams, step, span, increment, period, range_max, unequal, longest_m, count = map(
+            np.array, zip(*rows, strict=True)
+        )
+        longest: Counter[float] = Counter()
+        for far_m, beams in zip(longest_m.tolist(), count.tolist(), strict=True):
+            longest[far_m] += beams
+        return cls(stamp_ns, beams, step, span, increment, period, range_max, +longest, int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
         """Return the headers as they are after corrections."""
@@ -65,6 +73,32 @@ class Headers:
         if corrections.no_return_from_m is not None:
             changed = replace(changed, longest=Counter[float]())
         return changed
+
+    @property
+    def bearings_disagree(self) -> Bool[ndarray, " n"]:
+        """Which scans span another angle than angle_max - angle_min, shape (n,).
+
+        That is n - 1 steps of n beams, or n in the headers of some drivers.
+        """
+        off_rad = [np.abs(self.span_rad - self.step_rad * (self.beams - k)) for k in (0, 1)]
+        return (self.beams > 1) & (1000 * AT_M * np.minimum(*off_rad) > _WRONG_MM)
+
+    def judged(self) -> Headers:
+        """Return the headers by which times are judged.
+
+        If steps and limits disagree, the times between beams decide which of them is used.
+        """
+        if not self.bearings_disagree.any():
+            return self
+        by_limits = self.corrected(None, Corrections(bearings="limits"))
+        off = [abs(each.time_increment_ratio - 1) for each in (self, by_limits)]
+        return by_limits if off[1] < off[0] else self
+
+    @property
+    def time_increment_ratio(self) -> float:
+        """Stated time from beam to beam over that of an even mirror turn; NaN if either is unknown."""
+        even_s, stated_s = self.time_increment_from_turn_s, float(np.median(self.time_increment_s))
+        return stated_s / even_s if even_s and stated_s else math.nan
 
     @property
     def mirror_turn_s(self) -> float:
@@ -92,16 +126,26 @@ class Headers:
         return np.rint(1e9 * increment_s * (self.beams - 1)).astype(np.int64)
 
 
-def header_of(scan: Any, stamp_ns: int, longest: Counter[float]) -> tuple[Any, ...]:
-    """Return the row of one LaserScan for `Headers.of`, and count its longest range."""
-    ranges = np.asarray(scan.ranges, np.float32)
-    finite = ranges[np.isfinite(ranges)]
-    if finite.size:
-        longest[float(finite.max())] += int(np.sum(finite == finite.max()))
-    unequal = len(scan.intensities) not in (0, ranges.size)
-    span = float(scan.angle_max) - float(scan.angle_min)
-    times = float(scan.time_increment), float(scan.scan_time)
-    return stamp_ns, ranges.size, float(scan.angle_increment), span, *times, float(scan.range_max), unequal
+def header_of(message: Any, stamp_ns: int) -> tuple[float, ...]:
+    """Return the row of a LaserScan for `Headers.of`."""
+    span = float(message.angle_max) - float(message.angle_min)
+    numbers = float(message.time_increment), float(message.scan_time), float(message.range_max)
+    return _row(stamp_ns, message.ranges, message.intensities, float(message.angle_increment), span, *numbers)
+
+
+def header_of_scan(scan: Scan) -> tuple[float, ...]:
+    """Return the row of a scan for `Headers.of`."""
+    span = scan.angle_increment_rad * (scan.range_m.size - 1)
+    numbers = scan.time_increment_s, scan.scan_time_s, scan.range_max_m
+    return _row(scan.stamp_ns, scan.range_m, scan.intensity, scan.angle_increment_rad, span, *numbers)
+
+
+def _row(stamp_ns: int, ranges: Any, intensities: Any, *numbers: float) -> tuple[float, ...]:
+    range_m = np.asarray(ranges, np.float32)
+    longest_m = range_m[np.isfinite(range_m)].max(initial=0)
+    unequal = len(intensities) not in (0, range_m.size)
+    count = int(np.sum(range_m == longest_m)) if longest_m > 0 else 0
+    return stamp_ns, range_m.size, *numbers, unequal, float(longest_m), count
 
 
 def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
@@ -112,7 +156,7 @@ def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
         speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
     """
     yield from _bearings(headers)
-    yield from _time_increment(headers, speed_rad_s)
+    yield from _time_increment(headers.judged(), speed_rad_s)
     yield from _longest_range(headers)
     if headers.unequal_intensities:
         yield Finding(
@@ -125,12 +169,7 @@ def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
 
 
 def _bearings(headers: Headers) -> Iterator[Finding]:
-    several = headers.beams > 1
-    if not several.any():
-        return
-    step, span, beams = headers.step_rad[several], headers.span_rad[several], headers.beams[several]
-    off_steps = np.abs(span / np.where(step == 0, np.nan, step) - (beams - 1))
-    wrong = ~(off_steps <= _SPAN_STEPS)
+    step, span, beams, wrong = headers.step_rad, headers.span_rad, headers.beams, headers.bearings_disagree
     if not wrong.any():
         return
     k = int(np.flatnonzero(wrong)[0])
@@ -160,7 +199,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
         return
     if not even_s:
         return
-    ratio = float(np.median(stated_s)) / even_s
+    ratio = headers.time_increment_ratio
     if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _LEAST_MM:
         yield Finding(
             "time_increment_off",

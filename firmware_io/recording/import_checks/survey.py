@@ -26,6 +26,7 @@ class BagSurvey:
         scan_stamps: times of the scans.
         headers: of the scans.
         endless: scans without a longest range.
+        echoes: most echoes of a ray that are kept.
         angle_stamps: times of the angles.
         angle: in its unit.
         turned: the angles come from quaternions, in radians.
@@ -36,6 +37,7 @@ class BagSurvey:
     scan_stamps: Stamps
     headers: Headers
     endless: int
+    echoes: int
     angle_stamps: Stamps
     angle: Floats
     turned: bool
@@ -65,9 +67,9 @@ def survey_bag(
     left_out: Counter[str] = Counter()
     scans: list[tuple[int, int, bool]] = []
     rows: list[tuple[Any, ...]] = []
-    longest: Counter[float] = Counter()
     angles: list[tuple[int, int, tuple[float, ...]]] = []
     joints: set[str] = set()
+    echoes = 1
     if table is not None:
         angles = [(when, when, (value,)) for when, value in zip(*(part.tolist() for part in table), strict=True)]
     topics = {scan_source.topic, *([] if angle_source is None else [angle_source.topic])}
@@ -79,8 +81,9 @@ def survey_bag(
             if fault:
                 left_out[fault] += 1
             else:
+                echoes = max(echoes, laser_scan.echoes[0].shape[1] if hasattr(laser_scan, "echoes") else 1)
                 scans.append((scan_stamp_ns, message.receive_ns, endless(laser_scan)))
-                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns, longest))
+                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns))
         if angle_source is not None and message.topic == angle_source.topic:
             values = angles_in(message.body, angle_source, bag.path)
             if not values and isinstance(angle_source, Source):
@@ -108,8 +111,9 @@ def survey_bag(
         angle = numbers[:, 0]
     return BagSurvey(
         scan_stamps=Stamps(times(stamps), times(receives)),
-        headers=Headers.of(rows, longest),
+        headers=Headers.of(rows),
         endless=sum(without_end),
+        echoes=echoes,
         angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
         angle=angle,
         turned=turned,

@@ -33,16 +33,16 @@ _MOST_LISTED = 8  # gaps
 
 @dataclass(slots=True)
 class RepairSummary:
-    """What is left of a recording.
+    """Content and damage of a recording.
 
     Attributes:
-        messages: topic -> whole messages.
-        lost_messages: messages that are not whole, where the file still tells how many.
-        damaged_chunks: chunks whose checksum does not hold.
-        lost_bytes: what is in no record that can be read, damaged chunks among it.
-        repaired: what else is damaged and is made anew -> how often.
+        messages: topic -> intact messages.
+        lost_messages: damaged messages, if the file has their number.
+        damaged_chunks: chunks with a wrong checksum.
+        lost_bytes: bytes of records that cannot be read, damaged chunks included.
+        repaired: other damage that a repair corrects -> count.
         times_ns: log times of the first and of the last message.
-        missing_ns: log times before and after what is lost, where both are known.
+        missing_ns: log times before and after lost messages, if both are known.
     """
 
     messages: Counter[str] = field(default_factory=Counter)

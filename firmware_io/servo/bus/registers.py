@@ -7,7 +7,7 @@ encoder's centre. Load is a fraction of the rated (stall) torque, or of the duty
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from scanwright.design.errors import DeviceError
@@ -98,6 +98,7 @@ class ControlTable:
         max_torque: what `torque_limit` is when the servo starts; after a shutdown it is less.
         lock: 1 in it keeps settings as they are, or writes to them from outlasting the power.
         watchdog: stops a servo to which nobody talks for so long.
+        modes: names of the counts of the first register of `wheel`, as its maker calls them.
     """
 
     model: str
@@ -133,6 +134,7 @@ class ControlTable:
     hardware_error: Register | None = None
     lock: Register | None = None
     watchdog: Register | None = None
+    modes: dict[int, str] = field(default_factory=dict)
 
     def is_permanent(self, register: Register) -> bool:
         """Whether a register outlasts the power (EEPROM): such a register is written only if a person agrees."""

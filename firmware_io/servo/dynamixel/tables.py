@@ -30,6 +30,10 @@ _BAUDS_1 = {
 }
 _BAUDS_1_MX = {250: 2_250_000, 251: 2_500_000, 252: 3_000_000}
 _BAUDS_2 = {0: 9600, 1: 57_600, 2: 115_200, 3: 1_000_000, 4: 2_000_000, 5: 3_000_000, 6: 4_000_000, 7: 4_500_000}
+_MODES_2 = {
+    **{0: "current control", 1: "velocity control", 3: "position control", 4: "extended position control"},
+    **{5: "current-based position control", 16: "PWM control"},
+}
 _FAULTS_1 = {0: "voltage", 2: "overheating", 5: "overload"}
 _FAULTS_2 = {0: "voltage", 2: "overheating", 3: "motor encoder", 4: "electrical shock", 5: "overload"}
 
@@ -115,6 +119,7 @@ def _protocol_2(model: str, number: int, *, load: float, most_baud: int = 4_500_
         temperature=Register(146, 1),
         hardware_error=Register(70, 1),
         watchdog=Register(98, 1, 0.020),
+        modes=_MODES_2,
     )
 
 

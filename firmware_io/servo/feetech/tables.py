@@ -58,5 +58,6 @@ TABLES = (
         torque_limit=Register(48, 2, 0.001),
         max_torque=Register(16, 2, 0.001),
         lock=Register(55, 1),
+        modes={0: "position", 1: "wheel", 2: "open loop", 3: "steps"},
     ),
 )

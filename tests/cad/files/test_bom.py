@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scanners import CAPSULE, RING, ROLLING, TILTED, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.files.bom import WIRING, _wiring, bom_text, items_of
+from scanwright.cad.assembly.scenes import scenes_of
+from scanwright.cad.files.bom import _wiring, bom_text, items_of
 from scanwright.cad.files.manual.instructions import instructions_text, screws_in_words
-from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
@@ -23,6 +23,7 @@ from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.angles import Angles
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Provenance
 from scanwright.design.catalogue.servo import Servo
 
@@ -86,7 +87,6 @@ def test_every_small_thing_of_a_drive_has_an_estimate(slip_ring):
     parts = parts_of(placement_of(scanner_at(ROLLING, slip_ring=slip_ring)))
     needs = [row for part in parts if isinstance(part, PartSpec) for row in part.rows]
     assert needs and {need.estimate for need in needs} <= EACH_USD.keys()
-    assert {row.estimate for rows in WIRING.values() for row in rows} <= EACH_USD.keys()
 
 
 def test_the_steps_begin_with_what_does_not_fit_and_warn_before_the_first_wire(steps):
@@ -95,8 +95,8 @@ def test_the_steps_begin_with_what_does_not_fit_and_warn_before_the_first_wire(s
     )
     assert "**Caution: UTM-30LX" not in steps and "**Caution: MX-64R" not in steps
     (wiring,) = (step for step in steps.split("\n## ") if "Look, then wire" in step.splitlines()[0])
-    assert wiring.index("Caution, before you join a wire") < wiring.index("set a multimeter to continuity")
-    assert wiring.index("set a multimeter to continuity") < wiring.index("Turn the linkage by hand")
+    assert wiring.index("Caution, before you join a wire") < wiring.index("with a multimeter")
+    assert wiring.index("with a multimeter") < wiring.index("Turn the linkage by hand")
 
 
 def test_the_tools_are_those_that_the_steps_ask_for(rows, made):
@@ -125,8 +125,20 @@ def test_there_is_a_cable_tie_for_every_place_that_the_layout_has(rows, made):
 
 def test_what_the_paper_asks_for_is_there(rows):
     wiring = [row["part"] for row in rows if row["kind"] == "wiring"]
-    assert sum("USB" in part for part in wiring) == 2
     assert any("12 V" in part for part in wiring)
+
+
+@pytest.mark.parametrize("lidar", [product.name for product in load_catalogue() if isinstance(product, Lidar)])
+def test_what_takes_each_cable_of_a_lidar_is_bought_and_no_cable_that_is_fixed_to_it(lidar):
+    scanner = scanner_at(ROLLING, sensor=lidar)
+    items = list(_wiring(scanner))
+    parts = [item.part for item in items]
+    assert {item.estimate for item in items if item.estimate} <= EACH_USD.keys()
+    for cable in scanner.lidar.cables:
+        taken = "terminal block" if cable.end == "bare" else f"{cable.end} socket"
+        assert any(part.startswith(taken) for part in parts)
+    assert sum("lead for the plug" in part for part in parts) == sum(not cable.fixed for cable in scanner.lidar.cables)
+    assert not any("socket" in item.part for item in _wiring(replace(scanner, slip_ring=None)))
 
 
 @pytest.mark.parametrize(

@@ -113,6 +113,6 @@ def test_what_must_not_be_built_and_cautions_stand_above_the_boxes():
 def test_cables_that_differ_by_revision_are_measured_and_the_words_tell_how():
     files = wiring_files(scanner_for(*SCANNERS["colours that differ"]), "0" * 12)
     text = files["wiring.md"].decode()
-    assert "- UH1256-02-0610-06S 1 + to RPLIDAR S1 +: 5 V, measure first, 1.5 A" in text
+    assert "- UH1256-02-0610-06S 1 + to XH2.54 socket with bare leads +: 5 V, measure first, 1.5 A" in text
     assert "its maker has used black, red, brown, purple for + and white, yellow, orange for -" in text
     assert "set a multimeter to continuity" in text.split("## Power")[0]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from quick_tests import samples
 
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
@@ -38,15 +39,17 @@ def scanner_for(alpha_rot, beta_rot, deck):
     return scanner_of(angles, "fdm-0.4", load_catalogue(), deck)
 
 
-@pytest.mark.parametrize(
-    ("deck", "count"),
-    [
-        (Rectangle(shape="rectangle", size_mm=(150, 70), screw="M5"), 4),
-        (Circle(shape="circle", diameter_mm=110, count=6, first_deg=0, screw="M6"), 6),
-        (Circle(shape="circle", diameter_mm=100, count=3, first_deg=90, screw="M3"), 3),
-    ],
+DECKS = (
+    (Rectangle(shape="rectangle", size_mm=(150, 70), screw="M5"), 4),
+    (Circle(shape="circle", diameter_mm=110, count=6, first_deg=0, screw="M6"), 6),
+    (Circle(shape="circle", diameter_mm=100, count=3, first_deg=90, screw="M3"), 3),
 )
-@pytest.mark.parametrize(("alpha_rot", "beta_rot"), [(0, 90), (0, 0), (180, 0), (66, -52)])
+AXES = ((0, 90), (0, 0), (180, 0), (66, -52))
+MOUNTS = [(*deck, *axis) for axis in AXES for deck in DECKS]
+DAILY = [MOUNTS[k] for k in (0, 4, 8, 9)]  # every axis, and every deck, once
+
+
+@pytest.mark.parametrize(("deck", "count", "alpha_rot", "beta_rot"), samples(MOUNTS, DAILY))
 def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count, alpha_rot, beta_rot):
     scanner = scanner_for(alpha_rot, beta_rot, deck)
     stack = drive_of(scanner).stack

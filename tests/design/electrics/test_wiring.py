@@ -147,7 +147,8 @@ def test_the_default_scanner_by_hand():
     lidar = next(drop for drop in made.drops if drop.device == "UTM-30LX")
     assert 12 - lidar.volts == pytest.approx(2 * 0.0178 / 0.25 + 2 * 0.05)  # a metre there and back, two circuits
     colours = {(wire.start[0], wire.end): wire.colour for wire in made.wires}
-    assert colours["ring", ("lidar", "+")] == "brown" and colours["ring", ("lidar", "-")] == "blue"
+    assert colours["socket 2", ("lidar", "+")] == "brown" and colours["socket 2", ("lidar", "-")] == "blue"
+    assert colours["ring", ("socket 1", "D+")] == "green" and colours["ring", ("socket 2", "+")] == ""
     assert "USB through a ring" in made.risks[0] and made.unknown == ()
 
 
@@ -157,6 +158,24 @@ def test_six_circuits_take_a_lidar_on_usb_without_its_shield():
     assert ("lidar", "shield") not in {wire.end for wire in made.wires} and check_network(made) == []
     assert "Ethernet" in network("UST-10LX", ring="SRC022A-6").risks[0]
     assert network(ring=None).circuits == () and network(ring=None).risks == ()
+
+
+@pytest.mark.parametrize("lidar", names(Lidar))
+def test_behind_a_ring_every_wire_of_a_lidar_comes_from_the_socket_or_terminal_that_its_cable_ends_in(lidar):
+    made, device = network(lidar), CATALOGUE.get(lidar, Lidar)
+    sockets = {box.name: box for box in made.boxes if box.name.startswith("socket")}
+    assert len(sockets) == len(device.cables)
+    for wire in made.wires:
+        if wire.end[0] == "lidar" and wire.start[0] != "lidar":
+            cable = device.cables[int(wire.start[0].split()[1]) - 1]
+            assert cable.takes(wire.end[1])
+            title = sockets[wire.start[0]].title
+            assert title.startswith("terminal block" if cable.end == "bare" else f"{cable.end} socket")
+    assert not any("cut" in wire.words for wire in made.wires)
+    without = replace(
+        scanner_of(angle_set(lidar), "fdm-0.4", CATALOGUE), lidar=device.model_copy(update={"cables": None})
+    )
+    assert f"{lidar}: cables is not in the catalogue" in [fault.message for fault in network_of(without).unknown]
 
 
 def test_each_rule_sees_what_it_is_there_for():

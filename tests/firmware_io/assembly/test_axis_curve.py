@@ -133,6 +133,40 @@ def test_wrong_readings_are_rejected_and_named(wrong):
     assert f"rejected {len(wrong)} of {log.time_ns.size} angles, at {named:.2f}" in said
 
 
+@pytest.mark.parametrize("counts", [3, 7, 40, 800])
+@pytest.mark.parametrize("share", [1, 10, 50])
+def test_wrong_readings_of_any_size_cost_next_to_nothing(counts, share):
+    """Seven steps off, one angle of 1000 made the whole log go straight between samples; three bent the curve."""
+    log, truth = turning(20)
+    rng = np.random.default_rng(share)
+    wrong = rng.choice(np.arange(5, 995), share, replace=False)
+    position = log.position_rad.copy()
+    position[wrong] += counts * STEP * rng.choice([-1, 1], share)
+    found = smooth(JointLog(log.time_ns, position))
+    assert np.isin(log.time_ns[wrong], found.rejected_ns).mean() >= 0.9
+    assert np.isin(found.rejected_ns, log.time_ns[wrong]).mean() > 0.98
+    assert off_rad(found.curve, log, truth) < 1.3 * off_rad(smooth(log).curve, log, truth)
+
+
+def slip(counts):
+    log, _ = turning(20)
+    position = log.position_rad.copy()
+    position[500:] += counts * STEP
+    return JointLog(log.time_ns, position)
+
+
+@pytest.mark.parametrize("counts", [20, 40, 800])
+def test_a_slip_is_no_wrong_reading(counts):
+    assert isinstance(smooth(slip(counts)), str)
+
+
+@pytest.mark.parametrize("speed", [10, 60, 360])
+@pytest.mark.parametrize("rate_hz", [60.0, 500.0])
+def test_no_good_reading_is_rejected(speed, rate_hz):
+    found = smooth(turning(speed, rate_hz=rate_hz)[0])
+    assert isinstance(found, str) or not found.rejected_ns.size
+
+
 def test_a_gap_in_the_log_does_not_break_the_fit():
     log, truth = turning(20, duration_s=36)
     kept = (log.time_ns < START + 10 * 10**9) | (log.time_ns > START + 11 * 10**9)

@@ -8,11 +8,16 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from scanwright import api
+from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.beam_outcome import between_surfaces
+from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
 from scanwright.firmware_io.recording.importer import import_bag
 from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.samples import Scan, blocks, with_all_echoes
 
 START_NS = 1_700_000_000 * 10**9
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -138,3 +143,44 @@ def test_one_of_several_echoes_is_the_range(tmp_path, echo, ranges):
     for each in recording.scans():
         np.testing.assert_array_equal(each.range_m, ranges)
         assert each.intensity.size == 3
+
+
+def test_all_echoes_are_kept_and_assemble_chooses(tmp_path):
+    """Three rays: two echoes (the second stronger), none, one."""
+    echoes = ([[1.0, 2.0], [], [3.0]], [[10, 20], [], [30]])
+    summary, recording = brought(folder(tmp_path / "in", rows(echoes=echoes)), echo="all")
+    assert summary.beams == 12 * 3 * 2
+    one = next(iter(recording.scans()))
+    np.testing.assert_array_equal(one.range_m, [1, 2, np.inf, np.inf, 3, np.inf])
+    np.testing.assert_allclose(one.bearing_rad, [-0.5, -0.5, 0, 0, 0.5, 0.5], atol=1e-6)
+    np.testing.assert_allclose(np.diff(one.time_ns), [0, 7957747, 0, 7957747, 0], atol=2)
+    angles = AngleSet(
+        task="echo",
+        angles_deg=Angles(alpha_rot=0, beta_rot=0, alpha_laser=60, beta_laser=20),
+        sensor="any",
+        servo="any",
+    )
+    for echo, near in (("all", [1, 2, 3]), ("first", [1, 3]), ("last", [2, 3]), ("strongest", [2, 3])):
+        made = api.assemble(recording.path, angles, tmp_path / f"{echo}.ply", AssembleOptions(echo=echo))
+        assert made.beams == made.points + sum(made.left_out.values())
+        cloud = api.read_cloud(tmp_path / f"{echo}.ply")
+        lengths = np.linalg.norm(cloud.points_m, axis=1)
+        np.testing.assert_allclose(np.sort(lengths), np.sort(np.tile(near, 12)), atol=1e-5)
+        _, single = brought(folder(tmp_path / f"in_{echo}", rows(echoes=echoes)), echo=echo)
+        kept = np.concatenate([scan.range_m for scan in single.scans()])
+        np.testing.assert_array_equal(np.sort(kept[np.isfinite(kept)]), np.sort(np.tile(np.float32(near), 12)))
+
+
+def test_neighbours_of_an_echo_are_the_same_echoes_of_other_rays():
+    rng = np.random.default_rng(0)
+    near = np.where(np.arange(40) < 20, 2.0, 4.0) + rng.normal(0, 0.001, 40)
+    near[20] = 3.0
+    numbers = {"angle_min_rad": 0.0, "angle_increment_rad": 0.005, "time_increment_s": 1e-5, "scan_time_s": 0.1}
+    limits = {"range_min_m": 0.1, "range_max_m": 9.0, "intensity": np.empty(0, np.float32)}
+    single = Scan(stamp_ns=START_NS, **numbers, **limits, range_m=near.astype(np.float32))
+    both = np.stack([near, near + 1], axis=1).astype(np.float32)
+    double = with_all_echoes(single, both, np.zeros_like(both), 2)
+    (one,), (two,) = blocks([single]), blocks([double])
+    expected = between_surfaces(one, 8.0)[0]
+    assert expected.any()
+    np.testing.assert_array_equal(between_surfaces(two, 8.0)[0, ::2], expected)

@@ -142,13 +142,14 @@ def test_outliers_are_neither_turning_points_nor_steps_of_an_axis_that_stops():
     back_and_forth = np.abs(np.arange(400) % 80 - 40) * 0.06
     stops = np.repeat(np.arange(30) * 0.4, 12)
     for angle in (back_and_forth, stops, np.arange(300) * 0.06, np.cumsum(np.linspace(0, 0.1, 200))):
-        assert not outliers(angle)[0].any()
+        time_ns = 10_000_000 * np.arange(angle.size)
+        assert not outliers(time_ns, angle)[0].any()
         spiked = angle.copy()
         spiked[[50, 51, 90]] += [1.0, 1.0, -2.0]
-        assert {50, 51, 90} >= set(np.flatnonzero(outliers(spiked)[0]).tolist()) >= {90}
+        assert {50, 51, 90} >= set(np.flatnonzero(outliers(time_ns, spiked)[0]).tolist()) >= {90}
 
 
 def test_an_outlier_of_half_a_turn_is_one():
     angle = 0.01 * np.arange(3000)
     angle[1500] += np.pi
-    assert np.flatnonzero(outliers(angle)[0]).tolist() == [1500]
+    assert np.flatnonzero(outliers(10_000_000 * np.arange(3000), angle)[0]).tolist() == [1500]

@@ -1,5 +1,6 @@
 """`repair` keeps every message whose bytes are whole, wherever the damage is, and calls nothing whole that is not."""
 
+import json
 import struct
 from io import BytesIO
 from pathlib import Path
@@ -210,6 +211,8 @@ def test_the_command_writes_beside_the_file_and_says_what_it_kept(tmp_path, jour
         f"wrote {out}",
     ]
     assert path.read_bytes() == data[: ends[2] + 10]
+    _, as_json, _ = command("repair", path, "--json")
+    assert json.loads(as_json)["lost_bytes"] == 10
     assert "nothing to repair" in command("repair", out)[1]
     path.write_bytes(data[:-1] + b"x")
     assert "every message is whole" in command("repair", path, "-o", tmp_path / "mended.mcap")[1]

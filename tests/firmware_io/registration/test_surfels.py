@@ -1,5 +1,6 @@
 """The adjustment of flat pieces: its derivatives, its bias, what it states, and what it needs to be told."""
 
+import json
 from itertools import product
 
 import numpy as np
@@ -143,6 +144,8 @@ def test_what_the_sigmas_leave_out_is_said_of_our_own_clouds(command, tmp_path):
     assert code == 0
     assert "note: sigmas assume exact scanner angles" in out
     assert "a: at (0.0000, 0.0000, 0.0000) m, the frame of the map" in out
+    _, as_json, _ = command("register", *paths, "-o", tmp_path / "map.ply", "--json")
+    assert json.loads(as_json)["complete"] is True
 
 
 def test_leaves_keep_what_their_points_say():

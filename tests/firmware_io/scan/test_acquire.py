@@ -2,23 +2,15 @@
 
 import json
 import math
-import os
 import random
-import signal
-import subprocess
-import sys
-import time
-from contextlib import contextmanager
 from itertools import islice
-from pathlib import Path
-from threading import Thread
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from patience import until
 from quick_tests import samples
+from virtual_scanner import VirtualScanner
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -28,21 +20,15 @@ from scanwright.design.motion import Spin, StopAndGo, Sweep
 from scanwright.design.scene.ray_caster import cast
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.clouds.ply import read_ply
-from scanwright.firmware_io.emulators.scanner import emulated_scanner
-from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.world import room
-from scanwright.firmware_io.lidar.scip import dialogue
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING
 from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.recording.repair.repair import repair
 from scanwright.firmware_io.samples import JointLog
-from scanwright.firmware_io.scan import acquire, axis_thread, doctor, lidar_scans
-from scanwright.firmware_io.scan.plan import plan_scan
+from scanwright.firmware_io.scan import axis_thread, lidar_scans
 from scanwright.firmware_io.scan.setpoints import course
 from scanwright.firmware_io.servo.progress import ServoState
-from scanwright.firmware_io.servo.servo import open_servo
 
-ROOT = Path(__file__).parents[3]
 SPIN = {"mode": "spin", "period_s": 2.0}
 
 
@@ -56,6 +42,11 @@ def angle_set(**more):
 def out(tmp_path):
     (tmp_path / "angles.json").write_text(angle_set().to_json())
     return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def patience():
+    """As long as devices are waited for: here nobody is late."""
 
 
 # The course of the servo
@@ -217,34 +208,12 @@ def test_a_dry_run_says_what_it_would_do_and_does_nothing(out, command):
     assert code == 0
     assert "lidar UTM-30LX at L" in said
     assert "3 x spin of 2 s: 6 s of recording" in said
+    _, as_json, _ = command("scan", out, "--lidar", "L", "--servo", "S", "--turns", 3, "--dry-run", "--json")
+    assert (json.loads(as_json)["duration_s"], json.loads(as_json)["recording"]) == (6, None)
     assert [path.name for path in out.iterdir()] == ["angles.json"]
 
 
-# On the emulators
-
-
-@contextmanager
-def program(*words):
-    """A command in a process of its own, which is not left behind."""
-    command = [sys.executable, "-m", "scanwright", *map(str, words)]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-@contextmanager
-def emulating(out, *words):
-    """`scanwright emulate` while the body runs; it must end well, and leave nothing."""
-    with program("emulate", out, *words) as process:
-        until(lambda: (out / "emulated.json").exists() or process.poll() is not None)
-        assert process.poll() is None, process.stderr.read()
-        yield
-        process.send_signal(signal.SIGTERM)
-        _, complaints = process.communicate(timeout=300)
-    assert (process.returncode, complaints) == (0, "")
-    assert not (out / "emulated.json").exists()
+# On emulated devices, by a clock that goes forward only where somebody waits
 
 
 def residuals_m(cloud, angles, scene):
@@ -287,55 +256,41 @@ SCANNERS = [  # every family of lidars and of servos
 ]
 
 
-@pytest.mark.parametrize(("scanner", "turns", "points"), samples(SCANNERS, SCANNERS[:5]))
-def test_a_scan_of_the_room_lies_on_the_room(tmp_path, scanner, turns, points):
-    out, angles = tmp_path, angle_set(**scanner)
-    (out / "angles.json").write_text(angles.to_json())
-    lidar = load_catalogue().get(angles.sensor, Lidar)
-    # A busy computer blurs the times of some beams, and emulators leave scans out; what is systematic shows in all
-    # runs, and in the middle of all beams.
-    with emulating(out, "--seed", 1):
-        for attempt in range(5):
-            recording = out / f"{attempt}.mcap"
-            with program("scan", out, "--turns", turns, "-o", recording) as process:
-                said, complaints = process.communicate(timeout=600)
-            assert process.returncode == 0, complaints
-            error_m, range_m, share = residuals_m(read_ply(recording.with_suffix(".ply")), angles, room(None))
-            sigmas = error_m / np.hypot(lidar.sigma_mm(1000 * range_m) / 1000, 0.001 / math.sqrt(12))
-            bias = abs(np.median(sigmas))
-            spread = abs(np.median(np.abs(sigmas - np.median(sigmas))) / 0.67449 - 1)  # of a normal distribution
-            if spread < 0.02 and bias < 0.1:
-                break
-    assert sigmas.size > points
-    assert share > 0.8
-    assert spread < 0.02
-    assert bias < 0.1
-    assert np.mean(np.abs(sigmas) > 6) < 0.01
-    assert "timestamp uncertainty: " in said
+@pytest.fixture
+def virtual(monkeypatch, out):
+    """Makes the devices of an angle set, and the clock."""
+
+    def make(angle_rad=0.0, **more):
+        angles = angle_set(**more)
+        (out / "angles.json").write_text(angles.to_json())
+        return VirtualScanner(angles, seed=1, angle_rad=angle_rad).install(monkeypatch)
+
+    return make
 
 
 @pytest.fixture
-def emulators(monkeypatch):
+def scanner(virtual, monkeypatch):
     monkeypatch.setattr(lidar_scans, "_CLOCK_LEAST_S", 0.3)  # here nobody asks how exact the beams' times are
-    with emulated_scanner(angle_set(), room(None)) as scanner:
-        yield scanner
+    return virtual()
 
 
-def run(out, emulators, when=("", lambda: None), **more):
-    """Scan; something happens when a step begins with some words, once the recording runs if they are "running"."""
-    words, happens = when
-    due = [happens]
-
-    def progress(step, fraction=None):
-        if due and (fraction is not None if words == "running" else step.startswith(words)):
-            due.pop()()
-
-    plan = plan_scan(out, lidar=emulators.ports.lidar, servo=emulators.ports.servo, **more)
-    return acquire.acquire(plan, progress)
-
-
-def stands(emulators):
-    return abs(emulators.servo.axis.motion(time.monotonic_ns()).rate_rad_s) < 0.02
+@pytest.mark.parametrize(("devices", "turns", "points"), samples(SCANNERS, SCANNERS[:5]))
+def test_a_scan_of_the_room_lies_on_the_room(out, command, virtual, devices, turns, points):
+    virtual(**devices)
+    angles = angle_set(**devices)
+    code, said, complaints = command(
+        "scan", out, "--lidar", "L", "--servo", "S", "--turns", turns, "-o", out / "r.mcap"
+    )
+    assert code == 0, complaints
+    lidar = load_catalogue().get(angles.sensor, Lidar)
+    error_m, range_m, share = residuals_m(read_ply(out / "r.ply"), angles, room(None))
+    sigmas = error_m / np.hypot(lidar.sigma_mm(1000 * range_m) / 1000, 0.001 / math.sqrt(12))
+    assert sigmas.size > points
+    assert share > 0.8
+    assert abs(np.median(np.abs(sigmas - np.median(sigmas))) / 0.67449 - 1) < 0.02  # of a normal distribution
+    assert abs(np.median(sigmas)) < 0.05
+    assert np.abs(sigmas).max() < 6
+    assert "timestamp uncertainty: " in said
 
 
 def recorded(out):
@@ -344,36 +299,43 @@ def recorded(out):
 
 
 FATAL = {
-    "stall": (lambda emulators: emulators.servo.stall(), DeviceFaultError),
-    "servo unplugged": (lambda emulators: emulators.servo.unplug(), DeviceError),
-    "servo brown-out": (lambda emulators: emulators.servo.brown_out(), DeviceError),
-    "overload": (lambda emulators: emulators.servo.overload(), DeviceFaultError),
-    "lidar unplugged for good": (lambda emulators: emulators.lidar.unplug(), DeviceError),
+    "stall": (lambda scanner: scanner.servo.servo.axis.change(scanner.clock.now_ns, blocked=True), DeviceFaultError),
+    "servo unplugged": (lambda scanner: scanner.servo.unplug(), DeviceError),
+    "servo brown-out": (lambda scanner: scanner.servo.servo.restart(scanner.clock.now_ns), DeviceError),
+    "overload": (lambda scanner: scanner.servo.servo.overload(scanner.clock.now_ns), DeviceFaultError),
+    "lidar unplugged for good": (lambda scanner: scanner.lidar.unplug(), DeviceError),
 }
 
 
 @pytest.mark.parametrize("fault", FATAL)
-def test_a_fault_stops_the_servo_and_keeps_the_recording(out, emulators, monkeypatch, fault):
-    monkeypatch.setattr(lidar_scans, "_AWAY_S", 0.5)
+def test_a_fault_stops_the_servo_and_keeps_the_recording(out, scanner, fault):
     happens, kind = FATAL[fault]
     with pytest.raises(kind) as caught:
-        run(out, emulators, ("recording", lambda: happens(emulators)), turns=5)
+        scanner.scan(out, ("recording", lambda: happens(scanner)), turns=5)
     assert "\n" not in str(caught.value)
     if fault != "servo unplugged":  # then nobody can tell it, protocol 1.0 has no watchdog
-        until(lambda: stands(emulators))
+        scanner.clock.sleep(1.0)
+        assert scanner.stands()
     assert repair(recorded(out)).intact
 
 
+def garble(scanner):
+    def flip(packet):
+        return packet[:40] + bytes([packet[40] ^ 8]) + packet[41:]
+
+    scanner.lidar.damage.extend([flip] * 3 + [lambda packet: packet[: len(packet) // 2]] * 3)
+
+
 HARMLESS = {
-    "lidar brown-out": lambda emulators: emulators.lidar.power_cycle(),
-    "garbage": lambda emulators: (emulators.lidar.garble(3), emulators.lidar.cut(3)),
-    "bit errors of the servo": lambda emulators: emulators.servo.bit_errors(1e-3),
+    "lidar brown-out": lambda scanner: scanner.lidar.machine.power_cycle(scanner.clock.now_ns),
+    "garbage": garble,
+    "bit errors of the servo": lambda scanner: setattr(scanner.servo, "bit_error_rate", 1e-3),
 }
 
 
 @pytest.mark.parametrize("fault", HARMLESS)
-def test_what_can_be_mended_is_mended(out, emulators, fault):
-    summary = run(out, emulators, ("recording", lambda: HARMLESS[fault](emulators)))
+def test_what_can_be_mended_is_mended(out, scanner, fault):
+    summary = scanner.scan(out, ("recording", lambda: HARMLESS[fault](scanner)))
     assert summary.reconnects >= fault.startswith("lidar")
     assert (summary.left_out.get("bad packets", 0) >= 3) == (fault == "garbage")
     recording = open_recording(recorded(out))
@@ -381,27 +343,27 @@ def test_what_can_be_mended_is_mended(out, emulators, fault):
     assert summary.scans == recording.beams.size > 20
 
 
-def test_the_servo_stands_while_the_lidar_is_away_and_that_turn_is_taken_again(out, emulators):
-    plugged_ns = []
+def test_the_servo_stands_while_the_lidar_is_away_and_that_turn_is_taken_again(out, scanner):
+    clock, plugged_ns = scanner.clock, []
 
     def plug_again():
-        until(lambda: stands(emulators))
-        plugged_ns.append(time.time_ns())
-        emulators.lidar.plug()
+        assert scanner.stands()
+        plugged_ns.append(clock.time_ns())
+        scanner.lidar.plugged = True
 
     def pull():
-        emulators.lidar.unplug()
-        Thread(target=plug_again).start()
+        scanner.lidar.unplug()
+        scanner.at(3.0, plug_again)
 
     # progress is told each second: in the middle of the first of two turns
-    summary = run(out, emulators, ("running", pull), turns=2)
+    summary = scanner.scan(out, ("running", pull), turns=2)
     assert summary.reconnects == 1
     assert abs(summary.speed_deg_s - 180) < 4
     recording = open_recording(recorded(out))
     after_ns = recording.stamp_ns[recording.stamp_ns > plugged_ns[0]]
     before = recording.stamp_ns.size - after_ns.size
     assert before > 20
-    assert after_ns[0] - plugged_ns[0] < 30 * 10**9
+    assert after_ns[0] - plugged_ns[0] < 3 * 10**9
     first_rad, last_rad = recording.joint_log.angle_at(after_ns[[0, -1]])
     assert 4 * math.pi < last_rad - first_rad < 4.6 * math.pi
     steps_rad = np.diff(recording.joint_log.angle_at(after_ns))
@@ -409,48 +371,9 @@ def test_the_servo_stands_while_the_lidar_is_away_and_that_turn_is_taken_again(o
     assert np.abs(steps_rad - due_rad).max() < math.radians(1)  # none while it came up to speed
 
 
-def grown(out):
-    """Whether a recording has come to some seconds."""
-    return any(path.stat().st_size > 200_000 for path in (out / "recordings").glob("*.mcap"))
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_scan_that_is_stopped_or_killed_leaves_the_servo_still_and_its_recording(out, emulators, number):
-    words = ("--lidar", emulators.ports.lidar, "--servo", emulators.ports.servo, "--turns", 100)
-    with program("scan", out, *words) as process:
-        until(lambda: process.poll() is not None or grown(out))
-        assert process.poll() is None, process.stderr.read()
-        assert not stands(emulators)
-        stopped_ns = time.time_ns()
-        process.send_signal(number)
-        _, complaints = process.communicate(timeout=300)
-    until(lambda: stands(emulators))
-    summary = repair(recorded(out))
-    assert stopped_ns - summary.times_ns[1] < 10 * 10**9  # a second, and ten on a busy computer
-    assert summary.intact == (number == signal.SIGINT)
-    if number == signal.SIGINT:
-        assert process.returncode == 130
-        assert "servo 1 (MX-64R) has answered that its torque is off" in complaints
-
-
-def test_a_servo_that_did_not_answer_is_not_said_to_stand(out, emulators):
-    words = ("--lidar", emulators.ports.lidar, "--servo", emulators.ports.servo, "--turns", 100)
-    with program("scan", out, *words) as process:
-        until(lambda: process.poll() is not None or grown(out))
-        assert process.poll() is None, process.stderr.read()
-        emulators.servo.unplug()  # protocol 1.0 has no watchdog: it turns on
-        process.send_signal(signal.SIGINT)
-        _, complaints = process.communicate(timeout=300)
-    assert process.returncode in (2, 130)  # whether the cut bus or Ctrl-C is noticed first is chance
-    assert "could not be stopped: cut its power" in complaints
-    assert "torque is off" not in complaints
-
-
-def test_only_scans_at_rest_are_taken_at_stops(out, emulators):
-    motion = {"mode": "stop_and_go", "stops": 4, "dwell_s": 0.3, "move_s": 0.5}
-    (out / "angles.json").write_text(angle_set(motion=motion).to_json())
-    emulators.servo.set_up(spins=False)
-    summary = run(out, emulators)
+def test_only_scans_at_rest_are_taken_at_stops(out, virtual):
+    scanner = virtual(motion={"mode": "stop_and_go", "stops": 4, "dwell_s": 0.3, "move_s": 0.5})
+    summary = scanner.scan(out)
     recording = open_recording(recorded(out))
     assert summary.left_out["scans between two stops"] > 10
     assert recording.at_rest
@@ -458,14 +381,15 @@ def test_only_scans_at_rest_are_taken_at_stops(out, emulators):
         assert np.ptp(recording.joint_log.angle_at(scan.time_ns)) < math.radians(0.2)
 
 
-def test_another_lidar_than_the_angle_set_says_is_refused(out, emulators):
+def test_another_lidar_than_the_angle_set_says_is_refused(out, scanner):
     (out / "angles.json").write_text(angle_set(sensor="URG-04LX").to_json())
     with pytest.raises(DeviceError, match="this is a UTM-30LX, but the angle set is for a URG-04LX"):
-        run(out, emulators)
+        scanner.scan(out)
 
 
-def test_the_doctor_finds_healthy_devices_healthy(out, emulators, command):
-    code, said, _ = command("doctor", out, "--lidar", emulators.ports.lidar, "--servo", emulators.ports.servo)
+def test_the_doctor_finds_healthy_devices_healthy(out, virtual, command):
+    virtual()
+    code, said, _ = command("doctor", out, "--lidar", "L", "--servo", "S")
     assert code == 0, said
     assert "UTM-30LX, serial number 00903971, firmware P.1.05" in said
     assert "(nominal 40.0)" in said
@@ -473,17 +397,13 @@ def test_the_doctor_finds_healthy_devices_healthy(out, emulators, command):
     assert "error" not in said
 
 
-def test_scan_and_doctor_report_a_dirty_window(tmp_path, command, monkeypatch, caplog):
-    monkeypatch.setattr(lidar_scans, "_CLOCK_LEAST_S", 0.3)
-    monkeypatch.setattr(doctor, "_MEASURED_S", 1.0)
-    angles = angle_set(**SICK)
-    (tmp_path / "angles.json").write_text(angles.to_json())
-    with emulated_scanner(angles, room(None)) as scanner:
-        scanner.lidar.machine.status = DIRT_WARNING
-        acquire.acquire(plan_scan(tmp_path, lidar=scanner.ports.lidar, servo=scanner.ports.servo))
-        received = "LMS111: its window is dirty, but it still measures: clean it"
-        assert [line for line in caplog.messages if "dirty" in line] == [received]
-        code, lines, _ = command("doctor", tmp_path, "--lidar", scanner.ports.lidar, "--servo", scanner.ports.servo)
+def test_scan_and_doctor_report_a_dirty_window(out, virtual, command, caplog):
+    scanner = virtual(**SICK)
+    scanner.lidar.machine.status = DIRT_WARNING
+    scanner.scan(out)
+    received = "LMS111: its window is dirty, but it still measures: clean it"
+    assert [line for line in caplog.messages if "dirty" in line] == [received]
+    code, lines, _ = command("doctor", out, "--lidar", "L", "--servo", "S")
     assert code == 1
     assert "LMS111, serial number 18030000, firmware V1.00" in lines
     assert "(nominal 50.0)" in lines
@@ -491,48 +411,15 @@ def test_scan_and_doctor_report_a_dirty_window(tmp_path, command, monkeypatch, c
     assert "its window is dirty" in error
 
 
-def test_the_doctor_says_what_is_wrong_and_the_remedy(emulators, command, monkeypatch):
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.1)
-    monkeypatch.setattr("scanwright.firmware_io.device_ports.list_ports.comports", lambda: [])
-    assert command("doctor")[0] == 1
-    code, said, _ = command("doctor", "--lidar", emulators.ports.servo, "--servo", "no-such-port")
-    assert code == 1
-    wrong = [line for line in said.splitlines() if line.startswith("error")]
-    assert len(wrong) == 2
-    assert emulators.ports.servo in wrong[0]
-    assert "no-such-port" in wrong[1]
-
-
-def test_a_scanner_is_not_emulated_twice_nor_where_nothing_is_to_be_seen(out, command):
-    (out / "emulated.json").write_text(json.dumps({"lidar": "L", "servo": "S", "pid": os.getpid()}))
-    code, _, complaints = command("emulate", out)
-    assert (code, len(complaints)) == (3, 1)
-    assert f"process {os.getpid()} emulates this scanner already" in complaints[0]
-    code, _, complaints = command("emulate", out, "--at", 500, 0, 0)
-    assert code == 2
-    assert "no surface within 30 m" in complaints[0]
-
-
-def test_a_servo_in_its_dead_sector_is_not_moved(tmp_path, emulators):
+def test_a_servo_in_its_dead_sector_is_not_moved(out, virtual):
     motion = {"mode": "sweep", "limits_deg": [-60, 60], "period_s": 4.0}
-    (tmp_path / "angles.json").write_text(angle_set(servo="AX-12A", motion=motion).to_json())
-    with ServoEmulator("AX-12A", angle_rad=math.radians(170)) as servo:
-        plan = plan_scan(tmp_path, lidar=emulators.ports.lidar, servo=servo.port)
-        with pytest.raises(DeviceError, match="is in its dead sector"):
-            acquire.acquire(plan)
+    scanner = virtual(math.radians(170), servo="AX-12A", motion=motion)
+    with pytest.raises(DeviceError, match="is in its dead sector"):
+        scanner.scan(out)
 
 
-SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")]
-
-
-@pytest.mark.parametrize(("servo", "protocol"), SERVOS)
-def test_a_servo_is_emulated_as_it_comes_from_the_factory(servo, protocol):
-    with emulated_scanner(angle_set(servo=servo), room(None)) as emulators, open_servo(emulators.ports.servo) as opened:
-        assert (opened.model, opened.protocol) == (servo, protocol)
-
-
-def test_clusters_and_every_second_scan_reach_the_recording(out, emulators):
-    summary = run(out, emulators, cluster=5, every=2)
+def test_clusters_and_every_second_scan_reach_the_recording(out, scanner):
+    summary = scanner.scan(out, cluster=5, every=2)
     scans = list(open_recording(recorded(out)).scans())
     assert summary.scans == len(scans)
     assert {scan.range_m.size for scan in scans} == {217}

@@ -131,6 +131,23 @@ def test_a_scan_with_a_servo_that_is_set_up_writes_nothing_that_outlasts_the_pow
     assert kept_writes(emulator) == set() and kept(emulator) == before
 
 
+CURRENT_MODES = {0: "current control", 5: "current-based position control", 16: "PWM control"}
+
+
+@pytest.mark.parametrize("model", ["XL330-M288", "XM430-W350"])
+@pytest.mark.parametrize("spins", [True, False])
+@pytest.mark.parametrize("mode", CURRENT_MODES)
+def test_a_mode_of_current_is_refused_by_its_name(model, spins, mode, virtual_bus):
+    emulator = virtual_bus(model, "2.0")
+    emulator.set_up(spins=spins)
+    emulator.memory[11] = mode
+    with pytest.raises(ServoSetupError) as refused:
+        open_servo(emulator.port, model, spins=spins)
+    does = "turn continuously" if spins else "go to every angle"
+    expected = f"operating_mode (register 11) is {mode}, {CURRENT_MODES[mode]}, so that it does not {does}; "
+    assert f"{expected}{1 if spins else 3} is right" in str(refused.value)
+
+
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_a_driver_that_may_not_write_does_not_change_the_mode(model, protocol, virtual_bus):
     emulator = virtual_bus(model, protocol)
@@ -257,6 +274,8 @@ def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):
     before = bytes(emulator.memory.data)
     code, said, _ = command("servo-setup", emulator.port, "--dry-run")
     assert code == 0 and "return_delay_time (register 5) is 200" in said
+    _, as_json, _ = command("servo-setup", emulator.port, "--dry-run", "--json")
+    assert json.loads(as_json) == {"changes": said.splitlines(), "undo": None}
     assert bytes(emulator.memory.data[:36]) == before[:36] and not list(tmp_path.glob("servo-*"))
 
 
@@ -299,6 +318,8 @@ def test_scan_stops_where_nobody_can_be_asked(command, tmp_path):
         assert f"`scanwright servo-setup {emulators.ports.servo} --scanner {tmp_path}`" in complaints[2]
         assert len(complaints) == 3
         assert bytes(emulators.servo.memory.data[:24]) == before and not list(tmp_path.glob("servo-*"))
+        code, as_json, _ = command("doctor", tmp_path, "--json")
+        assert code == 0 and {finding["severity"] for finding in json.loads(as_json)["findings"]} >= {"ok", "warning"}
         code, said, _ = command("servo-setup", emulators.ports.servo, "--scanner", tmp_path)
         assert code == 0 and "ccw_angle_limit (register 8): 4095 -> 0" in said
         assert open_servo(emulators.ports.servo, spins=True).warnings() == ()

@@ -68,6 +68,8 @@ def test_a_cloud_becomes_a_map(run, shop):
     assert set(np.unique(pixels)) == {0, 205, 254}
     assert 10 < (pixels == 254).sum() * 0.05**2 < 7.2 * 5.6
     assert "free_thresh: 0.196" in (shop / "room.yaml").read_text()
+    _, as_json, _ = run("room.ply", "--angles", "angles.json", "-o", "room.yaml", "--json")
+    assert json.loads(as_json)["files"] == ["room.yaml", "room.pgm"]
 
 
 def test_without_a_place_nothing_is_free_and_a_line_says_so(run, shop):

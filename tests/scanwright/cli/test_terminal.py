@@ -14,6 +14,7 @@ from scanwright.cli import console
 from scanwright.cli.console import ConsoleProgress, Verbosity, command_console, hint, set_verbosity, show
 from scanwright.cli.help import GroupedHelp, first_sentence
 from scanwright.design.errors import DeviceFaultError, NumericalError, RecordingError, TaskError
+from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.importer import ImportSummary
 
 
@@ -98,8 +99,11 @@ def test_warnings_among_results_go_to_standard_error(capsys):
     assert capsys.readouterr() == ("result\nmore\n", "warning: measure these:\n  MX-64R: mass_g\n")
 
 
+LATE = Finding("late", "warning", "/scan", "scans are late")
+
+
 def test_a_result_as_json_is_its_record(command, monkeypatch):
-    summary = ImportSummary(Path("r.mcap"), 2, 40, 9, 0.1, (0.0, 1.5), {"no_angle": 1}, ("late",))
+    summary = ImportSummary(Path("r.mcap"), 2, 40, 9, 0.1, (0.0, 1.5), {"no_angle": 1}, (LATE,))
     monkeypatch.setattr("scanwright.api.import_bag", lambda *_, **__: summary)
     words = ("import", "a.bag", "--scan", "/scan", "--angle", "/joint_states:pan", "-o", "r.mcap")
     code, out, _ = command(*words, "--json")

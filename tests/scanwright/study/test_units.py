@@ -1,5 +1,6 @@
 """Who does the work of a study: units that die, hang and fail, processes that are killed, and errors in one line."""
 
+import json
 import os
 import re
 import signal
@@ -173,4 +174,6 @@ def test_the_plan_says_what_is_left_to_do(command, tmp_path):
     assert "9 different searches, 0 in the results folder" in printed
     assert "core-hours" in printed
     assert "GB of memory per worker" in printed
+    _, as_json, _ = command("study", "fleet", "--plan", "--out", tmp_path / "none", "--json")
+    assert json.loads(as_json)["lines"] == printed.splitlines()
     assert not (tmp_path / "none").exists()

@@ -1,0 +1,83 @@
+"""The checks of the import on scans and angles while they come: over a rolling window, each kind reported once."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from scanwright.design.findings import Finding
+from scanwright.firmware_io.recording.bag_clocks import Stamps
+from scanwright.firmware_io.recording.import_checks.angles import angle_findings, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
+from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings, header_of_scan
+from scanwright.firmware_io.samples import JointLog, Scan
+
+WINDOW_S = 20.0
+EVERY_S = 5.0
+_UNKNOWN = -1  # time of receipt
+_LEAST = 20  # scans and angles: medians of fewer mean little
+
+
+class StreamChecks:
+    """Checks scans and angles that are on one clock."""
+
+    def __init__(self, *, at_rest: bool) -> None:
+        """`at_rest`: the axis stands still during each scan."""
+        self._at_rest = at_rest
+        self._headers: deque[tuple[float, ...]] = deque()
+        self._received_ns: deque[int] = deque()
+        self._angles: deque[tuple[int, float]] = deque()
+        self._reported: set[str] = set()
+        self._checked_ns: int | None = None
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """Take an angle."""
+        self._angles.append((time_ns, position_rad))
+        while time_ns - self._angles[0][0] > WINDOW_S * 1e9:
+            self._angles.popleft()
+
+    def scan(self, scan: Scan, received_ns: int | None = None) -> list[Finding]:
+        """Take a scan; every `EVERY_S` return the findings that are new.
+
+        Args:
+            scan: in the order of its receipt.
+            received_ns: when; None if this is unknown.
+        """
+        self._headers.append(header_of_scan(scan))
+        self._received_ns.append(_UNKNOWN if received_ns is None else received_ns)
+        while scan.stamp_ns - self._headers[0][0] > WINDOW_S * 1e9:
+            self._headers.popleft()
+            self._received_ns.popleft()
+        if self._checked_ns is None:
+            self._checked_ns = scan.stamp_ns
+        if scan.stamp_ns - self._checked_ns < EVERY_S * 1e9:
+            return []
+        self._checked_ns = scan.stamp_ns
+        return self.check()
+
+    def check(self) -> list[Finding]:
+        """Return the findings of the window that are new."""
+        if min(len(self._headers), len(self._angles)) < _LEAST:
+            return []
+        new = [
+            finding
+            for finding in self._findings()
+            if finding.severity in ("warning", "error") and finding.code not in self._reported
+        ]
+        self._reported.update(finding.code for finding in new)
+        return new
+
+    def _findings(self) -> list[Finding]:
+        headers = Headers.of(self._headers)
+        arc_ns = headers.judged().arc_ns
+        time_ns, position_rad = (np.array(column) for column in zip(*self._angles, strict=True))
+        order = np.argsort(time_ns, kind="stable")
+        unique_ns, first = np.unique(time_ns, return_index=True)
+        speed_rad_s = 0.0 if self._at_rest else usual_speed_rad_s(JointLog(unique_ns, position_rad[first]))
+        angles = [] if self._at_rest else angle_findings(time_ns[order], position_rad[order], dropped=False, timed=True)
+        received_ns = np.array(self._received_ns, np.int64)
+        prompt_ns = headers.stamp_ns + arc_ns  # tells the checks nothing
+        scans = Stamps(headers.stamp_ns, np.where(received_ns == _UNKNOWN, prompt_ns, received_ns))
+        clocks = clock_findings(scans, Stamps(time_ns, time_ns), arc_ns, speed_rad_s, same_clock=True)
+        return [*angles, *header_findings(headers, speed_rad_s), *clocks]

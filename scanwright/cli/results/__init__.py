@@ -1,0 +1,1 @@
+"""The records that commands print with `--json`, and their JSON schemas."""
