@@ -235,10 +235,9 @@ def refine_candidates(
 
     parts = in_chunks(lambda some: [finished(descent) for descent in apart[some]], len(apart), smallest=1)
     ready = list(chain.from_iterable(parts))
-    if rounds > 1:  # which is the best, only exact scores tell
-        k = min(range(len(ready)), key=lambda k: ready[k].score.J)
-        narrow = finished(walked(ranges, apart[k], NARROW, required), NARROW.nodes)
-        ready[k] = min(narrow, ready[k], key=lambda family: family.score.J)
+    if MOST_WALKS[rounds] > 1:  # which is the best, exact scores tell; within a tolerance of the mounting the walks do
+        k = 0 if ranges.tolerance_deg else int(np.argmin([family.score.J for family in ready]))
+        ready[k] = finished(walked(ranges, apart[k], NARROW, required), NARROW.nodes)
     families: list[Family] = []
     for family in sorted(ready, key=lambda family: family.score.J):
         if _is_apart(family.angles_deg, family.score.J, families):

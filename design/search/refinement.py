@@ -120,6 +120,8 @@ def walked(ranges: AngleRanges, descent: Descent, walk: Walk, required: Requirem
     def J(moved: Array) -> float:
         return _J_of(easier, ranges, chart.setting(moved), walk.nodes)
 
+    if not free.any():
+        return replace(descent, J=J(chart.origin), gain=0.0)
     sides = np.eye(free.sum())
     if number:
         sides = np.linalg.qr(np.random.default_rng(number).normal(size=sides.shape))[0]

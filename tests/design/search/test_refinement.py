@@ -18,7 +18,7 @@ from scanwright.design.search.families import MOST_WALKS
 from scanwright.design.search.grid_classes import plane_key
 from scanwright.design.search.refinement import Enough, _Chart, _on_the_grid, descended, lowest_by_simplex
 from scanwright.design.search.search import search
-from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.task import Limits, load_task
 
 CORNERS = np.array([[-1.2, 0.8, 0.5], [-0.7, 0.8, 0.5], [-1.2, 0.4, 0.5], [-1.2, 0.8, 0.9]])
@@ -133,3 +133,10 @@ def test_what_gains_nothing_is_walked_from_once(most):
     found = descended(AngleRanges(), starts, Plateau(), most, no_progress)
     assert [descent.start for descent in found] == [0, 1]
     assert sum(flat) < 60
+
+
+def test_a_task_that_fixes_all_angles_is_not_walked_from():
+    fixed = AngleRanges(**{f"{name}_deg": 5.0 for name in NAMES})
+    found = descended(fixed, [(np.full(4, 5.0), False)], Valley(), 16, no_progress)
+    assert found[0].angles_deg.tolist() == [5.0] * 4
+    assert found[0].J == Valley().J(found[0].angles_deg, 0)
