@@ -59,8 +59,8 @@ class Headers:
             np.array, zip(*rows, strict=True)
         )
         longest: Counter[float] = Counter()
-        for far_m, beams in zip(longest_m.tolist(), count.tolist(), strict=True):
-            longest[far_m] += beams
+        for far_m, number in zip(longest_m.tolist(), count.tolist(), strict=True):
+            longest[far_m] += number
         return cls(stamp_ns, beams, step, span, increment, period, range_max, +longest, int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:

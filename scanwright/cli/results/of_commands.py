@@ -25,7 +25,7 @@ from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class CheckEntry:
     """A check of the parts, as in `checks.json`.
 
     Attributes:
@@ -63,7 +63,7 @@ class Built:
     files: tuple[str, ...]
     warnings: tuple[str, ...]
     misfits: tuple[str, ...]
-    checks: list[Check]
+    checks: list[CheckEntry]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ class Checked:
     """
 
     task: str
-    checks: list[Check]
+    checks: list[CheckEntry]
 
 
 @dataclass(frozen=True, slots=True)
