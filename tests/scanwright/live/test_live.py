@@ -241,7 +241,9 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
         raise error
 
     seen = Seen()
-    plan = SimpleNamespace(lines=list, recording=Path(__file__))
+    ports = SimpleNamespace(lidar="lidar", servo="servo")
+    plan = SimpleNamespace(lines=list, recording=Path(__file__), angles=ANGLES, ports=ports, duration_s=None)
+    plan.angles_path = Path("angles.json")
     monkeypatch.setattr("scanwright.firmware_io.scan.plan.plan_scan", lambda *_, **__: plan)
     monkeypatch.setattr("scanwright.firmware_io.scan.acquire.acquire", acquire)
     monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
