@@ -59,6 +59,7 @@
     set(root, "role", "main");
     nameRows();
     nameButtons();
+    for (const bar of document.querySelectorAll('[role="progressbar"]')) set(bar, "aria-label", "Progress");
     for (const canvas of document.querySelectorAll("canvas[data-engine]")) {
       canvas.closest('[style*="z-index: 0"]')?.classList.add("sw-view");
       set(canvas, "role", "img");

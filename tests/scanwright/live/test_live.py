@@ -241,7 +241,9 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
         raise error
 
     seen = Seen()
-    plan = SimpleNamespace(lines=list, recording=Path(__file__))
+    ports = SimpleNamespace(lidar="lidar", servo="servo")
+    plan = SimpleNamespace(lines=list, recording=Path(__file__), angles=ANGLES, ports=ports, duration_s=None)
+    plan.angles_path = Path("angles.json")
     monkeypatch.setattr("scanwright.firmware_io.scan.plan.plan_scan", lambda *_, **__: plan)
     monkeypatch.setattr("scanwright.firmware_io.scan.acquire.acquire", acquire)
     monkeypatch.setattr(devices, "_viewer", lambda *_, **__: nullcontext(seen))
@@ -399,7 +401,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
     rng = np.random.default_rng(0)
     floor = np.column_stack([rng.uniform(-3, 3, (20_000, 2)), np.full(20_000, -1.0)]).astype(np.float32)
     with guarded_server("a page") as (server, gate):
-        view = CloudView(server, "hall", np.zeros(3))
+        view = CloudView(server, "hall", np.zeros(3), 18.0)  # with a bar of progress
         nothing = np.zeros(len(floor), np.float32)
         view.add(CloudGrowth(floor, nothing, nothing, (), 0))
         small = {"width": 900, "height": 600, "device_scale_factor": 0.5}  # drawn on the processor here
