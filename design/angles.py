@@ -116,6 +116,11 @@ def load_angles(path: str | Path) -> AngleSet:
     Raises:
         MissingFileError: there is no such file.
         TaskError: the file cannot be read, is not JSON, or is not an angle set.
+
+    Example:
+        >>> import scanwright as sw
+        >>> sw.load_angles("angles.json").source
+        'design'
     """
     path = Path(path)
     if path.is_dir():

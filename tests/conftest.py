@@ -18,6 +18,7 @@ if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and 
     sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "pycache")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ.pop("COLUMNS", None)  # results would be wrapped, also in files
 
 sys.path.insert(0, str(Path(__file__).parent / "house"))
 import checked_arrays

@@ -46,10 +46,10 @@ def main(angles: tuple[float, ...] = TILTED) -> None:
     refused, misses = Counter[str](), Counter[str]()
     for lidar, servo, ring in itertools.product(lidars, servos, rings):
         try:
-            layout = _layout(catalogue, angles, lidar, servo, ring)
+            layout = laid_out_at(catalogue, angles, lidar, servo, ring)
             misses.update(screws_without_a_hole(layout))
         except BuildError as error:
-            refused[f"{servo} with {ring}: {_general(str(error), lidar)}"] += 1
+            refused[f"{servo} with {ring}: {general(str(error), lidar)}"] += 1
         else:
             fits[servo, ring].append(lidar)
     accepted = sum(map(len, fits.values()))
@@ -64,7 +64,8 @@ def main(angles: tuple[float, ...] = TILTED) -> None:
     sys.exit(bool(misses))
 
 
-def _layout(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, servo: str, ring: str | None) -> Layout:
+def laid_out_at(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, servo: str, ring: str | None) -> Layout:
+    """Lay out one scanner at (alpha_rot, beta_rot, alpha_laser, beta_laser)."""
     names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
     chosen = AngleSet(
         task="combinations",
@@ -100,8 +101,8 @@ def _misses(joint: Joint, start: Array, holes: list[Hole]) -> Iterator[str]:
             yield f"{joint.part} on {joint.onto}: {joint.number} is longer than the thread of {near[0].depth_mm:g} mm"
 
 
-def _general(reason: str, lidar: str) -> str:
-    """Without the lidar's name and the numbers that go with it, so that like reasons count together."""
+def general(reason: str, lidar: str) -> str:
+    """Return a reason without the lidar's name and the numbers that go with it, so that like reasons count together."""
     return re.sub(r"-?\d+\.\d+", "#", reason.replace(lidar, "the lidar"))
 
 

@@ -1,4 +1,7 @@
-"""Bed, support, walls and holes of each printed part in its print pose. Millimetres.
+"""Bed, support, islands, walls and holes of each printed part in its print pose. Millimetres.
+
+An island is a layer that starts in the air, which a slicer must support: an outline of a layer that touches no outline
+of the layer below.
 
 Walls are measured from points on the surface along the normal to the other side, and counted if the other side is
 parallel: every sharp corner is a wedge that thins to nothing, and prints. A thin spot is a warning; thin walls on more
@@ -14,12 +17,11 @@ from dataclasses import dataclass, replace
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.checks.islands import islands_check
 from scanwright.cad.checks.limits import at_least, at_most, note, spot, tidy
 from scanwright.cad.checks.table import SMALLEST_HOLE_MM, THIN_SHARE
 from scanwright.cad.geometry.holes import Round, rounds_of
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.geometry.print_pose import PrintPose
+from scanwright.cad.geometry.print_pose import PrintPose, on_bed
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.findings import Finding
@@ -28,6 +30,8 @@ from scanwright.design.scene import ray_caster
 POINTS = 6000  # per part: one for 2 to 8 mm2 of the parts of the shipped tasks
 PARALLEL_COS = math.cos(math.radians(15.0))  # a wedge below 15 deg prints as a wall
 SAME_MM = 0.02  # between two thicknesses: a twentieth of a nozzle
+LAYER_MM = 0.4  # two layers of the printer: what is lower than that is a burr
+SMALL_MM2 = 0.2  # smaller outlines are less than a line of a 0.4 mm nozzle
 NEAR_HOLE_MM = 2.0  # from a thin spot to a hole that is named with it
 
 
@@ -123,3 +127,40 @@ def _surface(mesh: TriMesh) -> tuple[Array, Array, float]:
     v = (0.5 + np.arange(POINTS) * 0.5698402909980532) % 1.0
     points = (1 - u)[:, None] * a[face] + (u * (1 - v))[:, None] * b[face] + (u * v)[:, None] * c[face]
     return points, cross[face] / doubled[face, None], float(upto[-1] / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Island:
+    """Middle, height above the bed and area of the first layer of an island."""
+
+    middle: tuple[float, float]
+    height: float
+    area_mm2: float
+
+
+def islands_check(name: str, mesh: TriMesh, pose: PrintPose) -> Finding:
+    """Return a warning if a part has islands."""
+    islands = islands_of(on_bed(mesh, pose))
+    if not islands:
+        return Finding("islands", "ok", name, f"{name}: no layer starts in the air", 0.0, 0.0)
+    lowest, largest = islands[0], max(island.area_mm2 for island in islands)
+    at = np.linalg.inv(pose.T_bed_part) @ [*lowest.middle, lowest.height, 1.0]
+    message = (
+        f"{name}: {len(islands)} layers start in the air, the lowest {lowest.height:.1f} mm above the bed, "
+        f"{spot(at[:3])}, the largest {largest:.0f} mm2"
+    )
+    return Finding("islands", "warning", name, message, tidy(len(islands)), 0.0, hint="let the slicer support them")
+
+
+def islands_of(mesh: TriMesh) -> list[Island]:
+    """Return the islands of a closed mesh that lies on the plane z = 0, the lowest first."""
+    body, islands = mesh.manifold(), []
+    below = body.slice(LAYER_MM / 2)
+    for height in np.arange(1.5 * LAYER_MM, float(mesh.vertices[:, 2].max()), LAYER_MM):
+        layer = body.slice(float(height))
+        for outline in layer.decompose():
+            if outline.area() >= SMALL_MM2 and (outline ^ below).is_empty():
+                x0, y0, x1, y1 = outline.bounds()
+                islands.append(Island(((x0 + x1) / 2, (y0 + y1) / 2), float(height) - LAYER_MM / 2, outline.area()))
+        below = layer
+    return islands

@@ -9,14 +9,17 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
+from scanwright.cad.checks.access import access_checks
 from scanwright.cad.checks.beams import beam_checks
 from scanwright.cad.checks.cables import fixed_cable_checks, rotor_cable_checks
 from scanwright.cad.checks.checks_json import checks_text
 from scanwright.cad.checks.clearance import clearance_checks
+from scanwright.cad.checks.loads.angle import angle_checks
 from scanwright.cad.checks.loads.deflection import deflection_checks
 from scanwright.cad.checks.loads.mechanics import mechanics_checks
 from scanwright.cad.checks.loads.mount import mount_checks
 from scanwright.cad.checks.loads.retention import retention_checks
+from scanwright.cad.checks.loads.vibration import vibration_checks
 from scanwright.cad.checks.printing import printing_checks
 from scanwright.cad.checks.products import known_errors, module_checks, products_of, unverified
 from scanwright.cad.checks.wiring import wiring_checks
@@ -58,17 +61,22 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
     progress("checking clearance, loads and walls")
     printed = {name: solid for name, solid in assembly.made.items() if not assembly.parts[name].metal}
     products, bodies = products_of(scanner, layout.drive), link_bodies(scanner, assembly)
+    bent, linkage = deflection_checks(scanner, assembly, bodies, meshes)
+    leans, mount = mount_checks(scanner, assembly, bodies, meshes)
     checks = [
         *known_errors(products),
         *clearance_checks(assembly),
+        *access_checks(assembly),
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),
         *mechanics_checks(layout, bodies),
         *retention_checks(scanner, assembly),
+        *angle_checks(scanner, assembly),
         *wiring_checks(scanner),
         *rotor_cable_checks(assembly),
         *fixed_cable_checks(assembly),
-        *deflection_checks(scanner, assembly, bodies, meshes),
-        *mount_checks(scanner, assembly, bodies, meshes),
+        *bent,
+        *leans,
+        *([] if linkage is None else vibration_checks(scanner, assembly, bodies, linkage, mount)),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *module_checks(scanner, layout.left_out),
         *unverified(products, assembly),

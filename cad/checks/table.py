@@ -11,7 +11,9 @@ CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at 
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
 LINKAGE_HIDES_DEG = 2.0  # beyond servo, ring and shaft: below 1 % of a field of view of 270 deg
 SHOCK_G = 5.0  # bumps and transport: assumed
+HELD_G = 2.0  # bumps that must not turn the mount: assumed
 LEAST_MARGIN = 2.0  # over strengths that are makers' or assumed
+FREQUENCY_RATIO = 1.2  # of the first natural frequency to the lidar's mirror: clear of its resonance
 LEAN_DEG = 1.0  # more than a pose on a robot is usually known to
 THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is not what was meant
 SMALLEST_HOLE_MM = 1.5  # diameter: smaller ones close when printed
@@ -35,6 +37,12 @@ TABLE = (
         "clearance", "turning and fixed bodies, over a full turn", f"at least {CLEARANCE_MM:g} mm", "print accuracy"
     ),
     CheckRow("interference", "bodies that move together", f"at most {OVERLAP_MM3:g} mm3", "accuracy of the meshes"),
+    CheckRow(
+        "driver_access",
+        "straight line for a key on every screw's head, in the step of assembly that needs it",
+        "none blocked",
+        "lengths of keys, ISO 2936",
+    ),
     CheckRow("beams_hidden", "beams hidden at every axis angle"),
     CheckRow("beams_partly_hidden", "beams hidden on average over a turn"),
     CheckRow("beams_linkage", "beams hidden by the linkage alone", f"at most {LINKAGE_HIDES_DEG:g} deg", "chosen"),
@@ -49,8 +57,13 @@ TABLE = (
     CheckRow(
         "tilt_moment", "moment on the servo's horn", "radial load at 10 mm; half of it with a bearing", "catalogue"
     ),
-    CheckRow("axial_load", "weight along the servo's axis", "axial load of the servo", "catalogue"),
-    CheckRow("bearing_load", "load across a bearing", "static load of the bearing", "catalogue"),
+    CheckRow(
+        "axial_load",
+        "weight along the servo's axis",
+        f"axial load of the servo; warning if {SHOCK_G:g} g exceed it",
+        "catalogue",
+    ),
+    CheckRow("bearing_load", f"load across a bearing at {SHOCK_G:g} g", "static load of the bearing", "catalogue"),
     CheckRow("bearing_axial", "load along a bearing"),
     CheckRow("belt_tension", "tighter strand of the belt", "working tension of the belt", "catalogue"),
     CheckRow("belt_angle", "angle between axis and servo encoder", NOISE, "catalogue"),
@@ -61,6 +74,7 @@ TABLE = (
     CheckRow(
         "retention", "each joint under a shock", f"margin {LEAST_MARGIN:g} at {SHOCK_G:g} g; error below 1", "assumed"
     ),
+    CheckRow("angle_held", "friction of the hub on its shaft", f"margin {LEAST_MARGIN:g} at {HELD_G:g} g", "assumed"),
     CheckRow(
         "screw", "thread engagement of each joint", "length that carries its preload", "ISO 3506-1; makers' tables"
     ),
@@ -76,6 +90,12 @@ TABLE = (
     CheckRow("deflection", "constant bend by gravity", f"{NOISE}; error above 1 deg", "catalogue"),
     CheckRow("deflection_turning", "bend by gravity that changes over a turn", NOISE, "catalogue"),
     CheckRow("mount_lean", "lean of the mount", f"warning above {LEAN_DEG:g} deg", "chosen"),
+    CheckRow(
+        "natural_frequency",
+        "first natural frequency of linkage, shaft, servo and mount; deck rigid, servo keeps its position",
+        f"warning below {FREQUENCY_RATIO:g} times the lidar's scan rate",
+        "chosen",
+    ),
     CheckRow("bed", "size of a part in its print pose", "bed of the printer", "catalogue"),
     CheckRow("support", "volume of support in the print pose"),
     CheckRow("islands", "layers that start in the air", "warning above 0", "a slicer must support them"),

@@ -41,7 +41,7 @@ class BomItem:
     """One row; the fields but `estimate` are the columns. Empty texts and None are unknown.
 
     Attributes:
-        kind: printed, turned, sawn, material, bought, screw, nut, insert, wiring, consumable, tool or total.
+        kind: printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total.
         part: what it is.
         number: drawing number of a made part, designation of a standard part.
         quantity: pieces.
@@ -154,11 +154,14 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
     nuts: Counter[tuple[str, str]] = Counter()
     inserts: Counter[str] = Counter()
+    washers: Counter[str] = Counter()
     for joint in joints:
         if joint.protrudes_mm is None:
             screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
             nuts[joint.screw.name, joint.screw.nut_standard] += joint.count
+        if joint.washer_mm is not None:
+            washers[f"ISO 7093 {joint.screw.name}"] += joint.count
         if joint.inserts:
             inserts[joint.screw.name] += joint.count
     for number, used in sorted(screws.items()):
@@ -168,6 +171,8 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
         yield BomItem("screw", kind, number, total, source=JOINTS, note=places, estimate="screw")
     for (name, standard), count in sorted(nuts.items()):
         yield BomItem("nut", "hexagon nut", f"{standard} {name}", count, source=JOINTS, estimate="nut")
+    for number, count in sorted(washers.items()):
+        yield BomItem("washer", "plain washer", number, count, source=JOINTS, estimate="washer")
     for name, count in sorted(inserts.items()):
         note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm"
         yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note, estimate="insert")

@@ -21,6 +21,7 @@ EACH_USD: dict[str, tuple[float, float]] = {
     "sawn": (8.0, 30.0),
     "screw": (0.05, 0.35),
     "nut": (0.03, 0.20),
+    "washer": (0.01, 0.10),
     "insert": (0.10, 0.40),
     "power supply": (15.0, 45.0),
     "converter": (4.0, 15.0),

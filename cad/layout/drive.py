@@ -181,6 +181,7 @@ class DriveLayout:
         records: numbers of its parts, a record for each kind of part.
         shaft: the part that carries the linkage.
         bend: of the shaft at the hub.
+        gives: the same with its servo's horn or its bearings' seats, which tilt and move.
         mounted: what the base mount carries.
         servo_pose: of the servo's frame in the rotation frame: rotation (3, 3) and origin (3,), on the horn's face.
         floor: height of all below the rotor that does not turn, or is as wide.
@@ -203,6 +204,7 @@ class DriveLayout:
     records: tuple[object, ...]
     shaft: str
     bend: ShaftBend
+    gives: ShaftBend
     mounted: Mounted
     servo_pose: tuple[Array, Array]
     floor: float

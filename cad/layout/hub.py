@@ -16,12 +16,12 @@ from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Bearing
 
 HUB_HEIGHT = 14.0
-HUB_WALL = 11.0  # around the spigot: between the heads of the cross screws and the shaft
+HUB_WALL = 12.0  # around the spigot: between the heads of the cross screws and the shaft
 CUP_HUB_WALL = 6.0  # likewise around a cup, which is wide enough to hold it stiffly
 NECK_ON_RIM = 1.5  # how far the neck stays inside a cup's rim
 HUB_GAP = 10.0  # the rotor's wires leave here
 SPIGOT = 11.0  # length of the shaft inside the hub
-CROSS_ABOVE_BOTTOM = 5.0  # of the cross screws, from the hub's lower face
+CROSS_ABOVE_BOTTOM = 6.25  # of the cross screws, from the hub's lower face: a wall below their washers
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
 JOURNAL_END = 1.0  # of the sleeve below the bearing
 

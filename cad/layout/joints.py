@@ -64,6 +64,7 @@ class Joint:
         thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
         slot_mm: width and length of the slots that they may slide in, if not holes.
         protrudes_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
+        washer_mm: diameter of the washers under their heads; None without washers.
         heel_mm: from a lone screw, or the line of a pair, to the edge over which the part tips off; None for others.
     """
 
@@ -77,6 +78,7 @@ class Joint:
     thread: Thread | None = None
     slot_mm: tuple[float, float] | None = None
     protrudes_mm: float | None = None
+    washer_mm: float | None = None
     heel_mm: float | None = None
 
     @property

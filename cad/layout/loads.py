@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
+HORN_TILTS_RAD = 1e-3  # of a servo's horn at its rated moment: assumed, no maker states it
 RUBS_NM = (5e-3, 5e-3)  # of bearings, and of a ring whose friction is not in the catalogue: assumed
 NEAR_MM = 500.0
+UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
 FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of the ranges
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
@@ -36,6 +38,10 @@ class Weight:
     along_n: float
     lever_m: float
     off_axis_m: float
+
+    def at_g(self, g: float) -> Weight:
+        """Return the same rotor under a multiple of gravity."""
+        return replace(self, across_n=g * self.across_n, along_n=g * self.along_n)
 
     @property
     def moment_nm(self) -> float:
@@ -87,6 +93,12 @@ def rated_moment_nm(scanner: Scanner) -> float | None:
     """Tilt moment that the horn is rated for; None where the maker gives no radial load."""
     rated = scanner.servo.radial_load_n
     return None if rated is None else rated * RATED_AT_MM / 1000
+
+
+def trusted_moment_nm(scanner: Scanner) -> float:
+    """Return the tilt moment that the horn is trusted with, rated or not."""
+    rated = rated_moment_nm(scanner)
+    return UNRATED_NM if rated is None else rated
 
 
 def friction_nm(scanner: Scanner) -> tuple[float, float]:

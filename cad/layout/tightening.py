@@ -41,13 +41,15 @@ class Material:
     source: str
 
 
-PRINTED = Material("printed plastic", 40.0, 25.0, True, "PLA and PETG, makers' 45 to 60 MPa, half for years; assumed")
+PRINTED = Material(
+    "printed plastic", 40.0, 20.0, True, "PLA and PETG, makers' 45 to 60 MPa; what creep leaves of it, warm; assumed"
+)
 ALUMINIUM = Material("aluminium 6082-T6", 290.0, 200.0, False, "EN 755-2; pressure under heads, VDI 2230")
 STEEL = Material("steel", 360.0, 235.0, False, "S235, EN 10025-2")
 BOUGHT = Material("metal of a bought device", 180.0, 120.0, False, "cast aluminium, the softest of its kind; assumed")
 
 MOULDED = Material(
-    "plastic of a bought device", 40.0, 25.0, True, "PBT and PA of servo cases, taken as printed; assumed"
+    "plastic of a bought device", 40.0, 20.0, True, "PBT and PA of servo cases, taken as printed; assumed"
 )
 
 
@@ -90,7 +92,7 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
         return None
     screw, hole = joint.screw, joint.screw.nominal + 0.4
     proof = PROOF_MPA * stress_area_mm2(screw)
-    head = _under_head_mm2(joint, hole)
+    head = nut = _under_head_mm2(joint, hole)
     in_nut = joint.fixing in ("nut", "trap", "deck")
     engaged = screw.nut_height if in_nut else joint.length_mm - joint.grip_mm
     if in_nut and joint.protrudes_mm is not None:
@@ -101,12 +103,14 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
         pulls["the insert"] = INSERT_N
     elif in_nut:
         if joint.fixing == "trap":
-            pulls[f"{into.name} under the nut"] = math.pi / 4 * (screw.nut_across**2 - hole**2) * into.strength_mpa
+            nut = math.pi / 4 * (screw.nut_across**2 - hole**2)
+            pulls[f"{into.name} under the nut"] = nut * into.strength_mpa
             floor = math.pi * screw.nut_across * joint.thread_mm
             pulls[f"{into.name} around the nut"] = SHEARED * floor * into.strength_mpa
     else:
         pulls[f"the thread in {into.name}"] = _strips(screw, engaged, into)
-    preload = min(PRELOAD * proof, head * under.pressure_mpa, min(pulls.values()) / 1.5)
+    lasting = min(head * under.pressure_mpa, nut * into.pressure_mpa if joint.fixing == "trap" else math.inf)
+    preload = min(PRELOAD * proof, lasting, min(pulls.values()) / 1.5)
     needed = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
     pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": _wall(joint, under)}
     pull_by, push_by = min(pulls, key=pulls.__getitem__), min(pushes, key=pushes.__getitem__)
@@ -124,8 +128,8 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
 
 
 def _under_head_mm2(joint: Joint, hole: float) -> float:
-    """What a head bears on: less the hole, or the strip of a slot that is longer than the head."""
-    head = joint.screw.head_diameter
+    """What a head or its washer bears on: less the hole, or the strip of a slot that is longer than the head."""
+    head = joint.washer_mm or joint.screw.head_diameter
     disc = math.pi / 4 * head**2
     if joint.slot_mm is None:
         return disc - math.pi / 4 * hole**2

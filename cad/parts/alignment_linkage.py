@@ -35,6 +35,7 @@ from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.free_space import in_hull
 from scanwright.cad.layout.rotor.linkage import (
     CROSS_SCREW,
+    CROSS_WASHER_MM,
     AlignmentLinkage,
     cross_floor_mm,
     cross_seat_mm,
@@ -112,6 +113,7 @@ def _crossed(p: AlignmentLinkage, shaft: str) -> Joint:
         grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
         thread_mm=cross_thread_mm(p),
         thread=p.cross_thread,
+        washer_mm=CROSS_WASHER_MM,
     )
 
 

@@ -14,7 +14,6 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.direct.loads import JOURNAL_WALL
-from scanwright.cad.layout.direct.misalignment import TRUED_MM
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.hub import BEARING_STEP
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
@@ -40,9 +39,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
     words = (
         f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
         "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's way "
-        "out for the wires; pull the rotor's leads up through the channel. When it has set, loosen the screws of the "
-        "flange by a quarter turn, put an indicator on the sleeve and turn the servo: tap the flange until the sleeve "
-        f"runs true within {TRUED_MM:g} mm over the turn, then tighten them."
+        "out for the wires; pull the rotor's leads up through the channel. Let it set."
     )
     seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
     bore = ToleratedDiameter(stack.shaft_diameter + BOND, True, "±0.01", "bonded to the shaft")
@@ -50,7 +47,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         name=JOURNAL_SLEEVE,
         turns=True,
         make=partial(journal_sleeve, place.linkage, stack),
-        step=Step("Sleeve of the bearing, and the shaft trued", words, "the indicator stays within 0.05 mm"),
+        step=Step("Sleeve of the bearing", words, "the sleeve does not move by hand"),
         process="turned",
         material=TURNED_FROM,
         why_metal=f"{stack.bearing.name} wants a round seat to g6",
@@ -64,7 +61,6 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
                 COMPOUND,
                 "sleeve on the shaft",
             ),
-            Row("tool", "dial indicator", "dial indicator on a stand", "assembly.md", "reads 0.01 mm"),
         ),
     )
 

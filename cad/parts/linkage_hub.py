@@ -12,7 +12,7 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.direct.loads import JOURNAL_WALL
-from scanwright.cad.layout.rotor.linkage import CROSS_SCREW, AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
@@ -101,7 +101,7 @@ def _crossed(p: AlignmentLinkage) -> list[cq.Solid]:
     stack, cuts = p.stack, []
     for azimuth in p.cross_azimuths:
         cuts.append(solids.radial(p.cross_hole / 2, azimuth, stack.cross))
-        cuts.append(solids.radial(CROSS_SCREW.head_room, azimuth, stack.cross, cross_seat_mm(stack)))
+        cuts.append(solids.radial(CROSS_ROOM, azimuth, stack.cross, cross_seat_mm(stack) - CROSS_WASHER_THICK))
     return cuts
 
 

@@ -15,13 +15,14 @@ import cadquery as cq
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL
+from scanwright.cad.layout.direct.misalignment import TRUED_MM
 from scanwright.cad.layout.direct.stack import GROOVES, DirectStack
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import Joint, horn_centres, horn_joint, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SERVO_HORN, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import CROSS_AT, CROSS_SCREW
-from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, Step
+from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, Row, Step
 from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
@@ -47,11 +48,20 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
         f"{screws(SERVO_HORN)}"
     )
+    check, rows = "the index groove stands over the middle of the +Y face", ()
+    if stack.bearing is not None:
+        words += (
+            " Loosen them by a quarter turn, put an indicator on the upper end of the shaft and turn the servo once: "
+            f"tap the flange until the shaft runs true within {TRUED_MM:g} mm over the turn, then tighten them."
+        )
+        check = f"{check}, and the indicator stays within {TRUED_MM:g} mm"
+        rows = (Row("tool", "dial indicator", "dial indicator on a stand", "assembly.md", "reads 0.01 mm"),)
     return PartSpec(
         name=SERVO_SHAFT,
         turns=True,
         make=partial(servo_shaft, stack, scanner.servo, scanner.printer),
-        step=Step("Shaft on the horn", words, "the index groove stands over the middle of the +Y face"),
+        step=Step("Shaft on the horn", words, check),
+        rows=rows,
         process="turned",
         material=TURNED_FROM if stack.bearing is None else ALUMINIUM.name,
         why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",

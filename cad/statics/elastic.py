@@ -130,6 +130,17 @@ def moved(model: Model, at: Places, displacements: Array) -> Array:
     return np.asarray(np.einsum("pa,paic->pic", at.shapes, displacements[model.nodes[at.cell]]))
 
 
+def lumps(model: Model, density_g_cm3: float) -> tuple[Array, Array, Array]:
+    """Return the mass of each cell's share of the body [kg], its centre [mm], and the shape functions' means over it.
+
+    Shapes (m,), (m, 3) and (m, 20).
+    """
+    middles, filled = _middles(model.grid.parts), model.share.sum(axis=1)
+    cube = (model.grid.edge / model.grid.parts) ** 3
+    centres = model.grid.low + model.grid.edge * (model.cells + model.share @ middles / filled[:, None])
+    return density_g_cm3 * 1e-6 * cube * filled, centres, model.share @ _shapes_and_slopes(middles)[0] / filled[:, None]
+
+
 def _middles(parts: int) -> Array:
     """Of the cubes of a cell of edge 1, shape (parts^3, 3)."""
     along = (np.arange(parts) + 0.5) / parts

@@ -16,6 +16,7 @@ from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
 from scanwright.cad.statics.sag import POISSON
+from scanwright.cad.statics.spring import Spring, spring_of, wrenches
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
@@ -47,8 +48,11 @@ class Carried:
 
 def mount_sag(
     mesh: TriMesh, deck: Deck, mounted: Mounted, carried: Carried, modulus_mpa: float, density_g_cm3: float
-) -> tuple[Array, Array]:
-    """Rotation of what it holds [rad] on the finer grid, and what finer ones would add: rotation frame, shapes (3,).
+) -> tuple[Array, Array, Spring]:
+    """Return how the mount gives way under what it holds.
+
+    Rotation [rad] on the finer grid, and what finer ones would add, rotation frame, shapes (3,); the mount as a spring
+    between deck and servo.
 
     Args:
         mesh: of the mount, rotation frame [mm].
@@ -62,12 +66,12 @@ def mount_sag(
         RuntimeError: nothing holds the mount.
     """
     coarse, fine = (_on_grid(edge, mesh, deck, mounted, carried, modulus_mpa, density_g_cm3) for edge in EDGES)
-    return fine, (fine - coarse) / (EDGES[0] / EDGES[1] - 1)
+    return fine[0], (fine[0] - coarse[0]) / (EDGES[0] / EDGES[1] - 1), fine[1]
 
 
 def _on_grid(
     edge: float, mesh: TriMesh, deck: Deck, mounted: Mounted, carried: Carried, modulus: float, density: float
-) -> Array:
+) -> tuple[Array, Spring]:
     R, centre = deck.rotation(), np.array(deck.centre)
     triangles = ((mesh.vertices - centre) @ R)[mesh.faces]
     grid = _grid(triangles, edge)
@@ -81,10 +85,13 @@ def _on_grid(
     down = (R.T @ carried.down)[:, None] * STANDARD_GRAVITY_M_S2
     lever = R.T @ (carried.centre_m * 1000 - centre)
     loads = elastic.weight(model, density * 1e-6 * down)
-    loads += elastic.pull(model, at, shared(seats, carried.mass_kg * down, lever))
-    washer_mm2 = len(washers) * STEP**2
-    moved = elastic.solve(model, modulus, POISSON, clamped, washer_mm2, loads)
-    return R @ rigid(seats, elastic.moved(model, at, moved))[1][:, 0]
+    force = carried.mass_kg * down
+    loads += elastic.pull(model, at, shared(seats, force, np.cross(lever, force, axisb=0, axisc=0)))
+    origin = -R.T @ centre  # of the rotation frame
+    both = np.concatenate([loads, wrenches(model, at, seats, origin)], axis=2)
+    moved = elastic.solve(model, modulus, POISSON, clamped, len(washers) * STEP**2, both)
+    rotation = rigid(seats, elastic.moved(model, at, moved[:, :, :1]))[1][:, 0]
+    return R @ rotation, spring_of(model, density, (at, seats, moved[:, :, 1:]), R, origin)
 
 
 def _grid(triangles: Array, edge: float) -> Grid:

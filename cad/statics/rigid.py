@@ -7,12 +7,11 @@ import numpy as np
 from scanwright.design.arrays import Array
 
 
-def shared(points: Array, force: Array, at: Array) -> Array:
-    """Forces on points that add up to forces (3, cases) at a place, as a rigid seat would share them: (p, 3, cases)."""
+def shared(points: Array, force: Array, moment: Array) -> Array:
+    """Return forces on points (p, 3, cases) as a rigid seat shares forces and moments about the origin (3, cases)."""
     middle = points.mean(axis=0)
     arms = points - middle
-    moment = np.cross(at - middle, force, axisb=0, axisc=0)
-    turn = np.linalg.solve(_second_moments(arms), moment)
+    turn = np.linalg.solve(_second_moments(arms), moment - np.cross(middle, force, axisb=0, axisc=0))
     return force / len(points) + np.cross(turn.T[None], arms[:, None], axis=2).transpose(0, 2, 1)
 
 

@@ -9,7 +9,7 @@ grids then differ much, and the error says so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
+from scanwright.cad.statics.spring import Spring, spring_of, wrenches
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
@@ -38,12 +39,14 @@ class Sag:
         shift_m: of the optical centre.
         rotation_error_rad: of the finite elements, with its sign.
         shift_error_m: likewise.
+        spring: the same parts as a spring between hub and lidar.
     """
 
     rotation_rad: Array
     shift_m: Array
     rotation_error_rad: Array
     shift_error_m: Array
+    spring: Spring
 
 
 def linkage_sag(
@@ -61,8 +64,8 @@ def linkage_sag(
     """
     coarse, fine = (_on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3) for edge in EDGES)
     # what is left of an error that falls with the edge: the elements gain more, corners and edges no less
-    errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse, fine, strict=True)]
-    return Sag(*fine, *errors)
+    errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse[:2], fine[:2], strict=True)]
+    return Sag(*fine[:2], *errors, fine[2])
 
 
 def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
@@ -75,11 +78,10 @@ def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
         rotation = shaft.rotation_of(force, moment)
         turned.append(rotation)
         shifted.append(shaft.shift_of(force, moment) + np.cross(rotation, -end))
-    return Sag(
-        sag.rotation_rad + np.stack(turned, axis=1),
-        sag.shift_m + np.stack(shifted, axis=1),
-        sag.rotation_error_rad,
-        sag.shift_error_m,
+    return replace(
+        sag,
+        rotation_rad=sag.rotation_rad + np.stack(turned, axis=1),
+        shift_m=sag.shift_m + np.stack(shifted, axis=1),
     )
 
 
@@ -91,8 +93,8 @@ def _on_grid(
     lidar: Inertial,
     modulus: float,
     density: float,
-) -> tuple[Array, Array]:
-    """Rotation [rad] and shift [m] of one grid, rotation frame."""
+) -> tuple[Array, Array, Spring]:
+    """Return rotation [rad] and shift [m] of one grid, and the spring, rotation frame."""
     R = stack.R()
     triangles = [(mesh.vertices @ R)[mesh.faces] for mesh in meshes]
     grid = _grid(np.concatenate(triangles), edge, float(seat[2]))
@@ -105,10 +107,13 @@ def _on_grid(
     down = STANDARD_GRAVITY_M_S2 * R.T  # columns: gravity along each axis of the rotation frame, laser frame
     loads = elastic.weight(model, density * 1e-6 * down)
     lever = lidar.centre_m * 1000
-    loads += elastic.pull(model, at, shared(points[on_seat], lidar.mass_kg * down, lever))
-    moved = elastic.solve(model, modulus, POISSON, clamped, spigot_mm2, loads)
-    shift, rotation = rigid(points[on_seat], elastic.moved(model, at, moved))
-    return R @ rotation, R @ shift / 1000
+    force = lidar.mass_kg * down
+    loads += elastic.pull(model, at, shared(points[on_seat], force, np.cross(lever, force, axisb=0, axisc=0)))
+    both = np.concatenate([loads, wrenches(model, at, points[on_seat], np.zeros(3))], axis=2)
+    moved = elastic.solve(model, modulus, POISSON, clamped, spigot_mm2, both)
+    shift, rotation = rigid(points[on_seat], elastic.moved(model, at, moved[:, :, :3]))
+    spring = spring_of(model, density, (at, points[on_seat], moved[:, :, 3:]), R, np.zeros(3))
+    return R @ rotation, R @ shift / 1000, spring
 
 
 def _grid(triangles: Array, edge: float, seat: float) -> Grid:

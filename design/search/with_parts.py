@@ -7,7 +7,9 @@ the work ends when no bound is below the best J found: what is left cannot win.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -99,8 +101,18 @@ def choose_with_parts(
     limits: Limits,
     workshop: Workshop,
     progress: Progress,
+    failed: Mapping[tuple[float, ...], str] = MappingProxyType({}),
 ) -> Chosen:
-    """The family that is best with its parts; with `prefer = "simple"` the first one that can be built.
+    """Return the family that is best with its parts; with `prefer = "simple"` the first one that can be built.
+
+    Args:
+        problem: of the task.
+        families: candidates.
+        ranges: of the angles.
+        limits: of the task.
+        workshop: makes the parts.
+        progress: progress callback.
+        failed: settings [deg] whose parts failed their checks, and which one: they are not chosen.
 
     Raises:
         BuildError: none can be built within the limits of the task.
@@ -121,6 +133,9 @@ def choose_with_parts(
             break
         bounds = []
         for angles_deg in equivalents(problem, family.angles_deg, ranges):
+            if angles_deg in failed:
+                refused.append(f"{_shown(angles_deg)}: its parts fail a check: {failed[angles_deg]}")
+                continue
             bound = workshop.bound(np.radians(angles_deg))
             bounded += 1
             if isinstance(bound, Refused):

@@ -262,6 +262,11 @@ def load_task(source: Path | str | Mapping[str, Any], folder: Path = Path()) -> 
     Raises:
         TaskError: the file is missing or malformed, a product is unknown, a map cannot be read, or the servo
             cannot do the motion.
+
+    Example:
+        >>> import scanwright as sw
+        >>> sw.load_task("ground_ahead").task.sensor
+        'UTM-30LX'
     """
     if isinstance(source, Mapping):
         return _load(dict(source), folder / "task")

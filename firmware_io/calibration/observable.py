@@ -156,9 +156,9 @@ def _motion(beams: ReturnedBeams, group: tuple[int, ...], backlash_rad: float) -
     if stood_still(beams):
         return "the axis stood still while the lidar measured"
     if group == model.LAG and not several_speeds(beams):
-        return "one way at one speed: late angles turn the whole cloud about the axis, and no scene shows that"
+        return "one direction at one speed: a delay turns the cloud about the axis, which no scene shows"
     if group == model.BACKLASH and len(directions) == 1:
-        return "the axis turned one way only"
+        return "the axis turned in one direction only"
     moving = np.abs(beams.speed_rad_s[beams.direction != 0])
     slow, fast = np.percentile(moving, [5, 95])
     if group == model.BACKLASH and fast < 1.2 * slow:

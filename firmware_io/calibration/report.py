@@ -168,24 +168,24 @@ def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedB
 def lines(record: dict[str, Any]) -> Iterator[str]:
     """The record for a person."""
     for reason, count in record["left_out"].items():
-        yield f"left out {count:,} beams: {reason.replace('_', ' ')}"
+        yield f"dropped {count:,} beams: {reason.replace('_', ' ')}"
     yield (
-        f"{record['beams_used']:,} of {record['beams']:,} beams see {record['surfaces']} flat surfaces, "
-        f"{record['beams_at_edges']:,} more lie near edges; "
-        f"noise of a range {record['range_noise_mm']:.1f} mm, walls bulge {record['wall_bulge_mm']:.1f} mm"
+        f"{record['beams']:,} beams: {record['beams_used']:,} on {record['surfaces']} flat surfaces, "
+        f"{record['beams_at_edges']:,} near edges (not used); "
+        f"range noise {record['range_noise_mm']:.1f} mm, surface unevenness {record['wall_bulge_mm']:.1f} mm"
     )
     for one in record["parameters"]:
         change = f"  from {one['start']:.4f}" if one["applied_by"] == "angle set" else ""
         yield f"  {one['words']:22} {one['value']:10.4f} +- {one['sd']:.4f} {one['unit']}{change}"
     for fixed in record["held"]:
-        yield f"  {fixed['words']:22}       held: {fixed['why']}"
+        yield f"  {fixed['words']:22}       not estimated: {fixed['why']}"
     residual, walls, entropy = record["residual_mm"], record["wall_straightness_mm"], record["entropy"]
     yield (
         f"residual          {residual['before']:.1f} -> {residual['after']:.1f} mm "
         f"({residual['as_assembled']:.1f} as `assemble` applies it)"
     )
     pairs = ", ".join(f"{a:.1f} -> {b:.1f}" for a, b in zip(walls["before"], walls["after"], strict=True))
-    yield f"walls straight    {pairs} mm"
+    yield f"bend of walls     {pairs} mm"
     fallen = entropy["after"] - entropy["before"]
     own = [
         f"{name.rsplit('_', 1)[0]} {off['value']:+.3f} {off['unit']}" if off else f"{name.rsplit('_', 1)[0]} ?"
@@ -194,11 +194,11 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     change = (
         f"{entropy['before']:.3f} -> {entropy['after']:.3f}, changed by {fallen:+.3f} +- {entropy['change_sd']:.3f}"
     )
-    yield f"entropy           {change}; its own minimum lies at {', '.join(own)}"
+    yield f"entropy           {change}; its minimum is at {', '.join(own)}"
     views = record["second_looks"]
     yield (
-        f"looked at twice   {100 * views['compared'] // max(views['asked'], 1)} % of the beams: "
-        "who walked elsewhere, or stood still, leaves no trace"
+        f"double coverage   {100 * views['compared'] // max(views['asked'], 1)} % of the beams "
+        "(motion elsewhere, and people who stand still, are not detected)"
     )
     for note in record["notes"]:
         yield f"warning: {note}"

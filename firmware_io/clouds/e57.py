@@ -7,7 +7,8 @@ float32. Ours go under an extension of the format, prefix `sw`, which other soft
 from __future__ import annotations
 
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,14 +29,17 @@ from scanwright.firmware_io.clouds.cloud import (
     pose_numbers,
     with_header,
 )
+from scanwright.firmware_io.clouds.streams.parts import Parts, Survey, survey
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
 _MOST_PACKED = 8  # points to a byte: three axes of a bit each, with nothing else
 _MOST_EMPTY = 100  # cells to a point: rows and columns that are emptier mean something else
+_AT_ONCE = 100_000  # points
 _NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
 _COLOURS = {"red": "colorRed", "green": "colorGreen", "blue": "colorBlue"}
 _OWN_FIELD = {"intensity": "intensity", "time_s": "timeStamp", **_COLOURS}
+_NORMALS = {f"n{axis.lower()}": f"nor:normal{axis}" for axis in "XYZ"}  # extension of libE57Format
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _STRUCTURE = {"cartesianInvalidState", "sphericalInvalidState", "rowIndex", "columnIndex"}
@@ -55,19 +59,47 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         return clouds, []
 
 
+def parts(path: Path, rows: int) -> Parts:
+    """Return the clouds of a file in parts of so many points, without their rows and columns."""
+    if not path.is_file():
+        raise RecordingError(f"{path}: cannot read: No such file or directory")
+
+    def again(number: int) -> Iterator[Cloud]:
+        with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
+            header = e57.get_header(number)
+            for values_of in _chunks(e57, header, rows):
+                yield _flat_cloud(header, values_of)
+
+    with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
+        fields = {name for number in range(e57.scan_count) for name in e57.get_header(number).point_fields}
+        notes = ("rows and columns of a file of this size are not kept",) if "rowIndex" in fields else ()
+        return Parts(tuple(partial(again, number) for number in range(e57.scan_count)), notes)
+
+
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     """Write one scan for each cloud."""
-    with atomic_write(path, RecordingError) as part:
-        foreign(f"{path}: cannot write", _write_scans, part, clouds, path.stem)
+    with atomic_write(path, RecordingError) as place:
+        scans = ((survey([cloud]), cloud.shape, [cloud]) for cloud in clouds)
+        foreign(f"{path}: cannot write", _write_scans, place, scans, path.stem)
     return []
 
 
-def _write_scans(part: Path, clouds: Sequence[Cloud], name: str) -> None:
-    e57 = pye57.E57(str(part), mode="w")
+def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+    """Write a flat cloud part by part."""
+    with atomic_write(path, RecordingError) as place:
+        foreign(f"{path}: cannot write", _write_scans, place, [(known, (1, known.rows), parts)], path.stem)
+    return []
+
+
+_Scan = tuple[Survey | None, tuple[int, int], Iterable[Cloud]]
+
+
+def _write_scans(place: Path, scans: Iterable[_Scan], name: str) -> None:
+    e57 = pye57.E57(str(place), mode="w")
     try:
         e57.image_file.extensionsAdd(_PREFIX, _URI)
-        for number, cloud in enumerate(clouds, 1):
-            _write_scan(e57, cloud, f"{name} {number}")
+        for number, scan in enumerate(scans, 1):
+            _write_scan(e57, *scan, f"{name} {number}")
         e57.close()
     except BaseException:
         e57.image_file.cancel()
@@ -78,10 +110,13 @@ def _write_scans(part: Path, clouds: Sequence[Cloud], name: str) -> None:
 
 def _read_scan(e57: pye57.E57, number: int) -> Cloud:
     header = e57.get_header(number)
-    size = Path(e57.path).stat().st_size
-    if not 0 < header.point_count <= _MOST_PACKED * size:
-        raise RecordingError(f"{header.point_count:,} points announced, {size:,} bytes there")
-    values_of = _read_points(e57, header)
+    values_of = next(_chunks(e57, header, header.point_count))
+    row, column = values_of.get("rowIndex"), values_of.get("columnIndex")
+    cloud = _flat_cloud(header, values_of)
+    return cloud if row is None or column is None else _organised(cloud, row, column)
+
+
+def _flat_cloud(header: Any, values_of: dict[str, Column]) -> Cloud:
     if all(name in values_of for name in _AXES):
         points = np.stack([values_of.pop(name) for name in _AXES], axis=1)
     else:
@@ -91,10 +126,9 @@ def _read_scan(e57: pye57.E57, number: int) -> Cloud:
     for name in ("cartesianInvalidState", "sphericalInvalidState"):
         if name in values_of:
             points[values_of[name] != 0] = np.nan
-    row, column = values_of.get("rowIndex"), values_of.get("columnIndex")
-    back = {own: name for name, own in _OWN_FIELD.items()}
+    back = {own: name for name, own in (_OWN_FIELD | _NORMALS).items()}
     columns = {
-        back.get(name, name.removeprefix(f"{_PREFIX}:")): values
+        back.get(name) or name.removeprefix(f"{_PREFIX}:").replace(":", "_"): values
         for name, values in values_of.items()
         if name not in _STRUCTURE
     }
@@ -110,8 +144,7 @@ def _read_scan(e57: pye57.E57, number: int) -> Cloud:
         T = pose_matrix([*header.translation, x, y, z, w])
     text = header["description"].value() if header.node.isDefined("description") else ""
     start = with_header(Cloud(points), text.splitlines()).start_ns
-    flat_cloud = Cloud(points, columns, (1, len(points)), T, start)
-    return flat_cloud if row is None or column is None else _organised(flat_cloud, row, column)
+    return Cloud(points, columns, (1, len(points)), T, start)
 
 
 def _organised(cloud: Cloud, row: Column, column: Column) -> Cloud:
@@ -130,7 +163,11 @@ def _organised(cloud: Cloud, row: Column, column: Column) -> Cloud:
     return Cloud(points, columns, (height, width), cloud.T_world_cloud, cloud.start_ns)
 
 
-def _read_points(e57: pye57.E57, header: Any) -> dict[str, Column]:
+def _chunks(e57: pye57.E57, header: Any, rows: int) -> Iterator[dict[str, Column]]:
+    """Read the fields of a scan, at most so many points at a time."""
+    size = Path(e57.path).stat().st_size
+    if not 0 < header.point_count <= _MOST_PACKED * size:
+        raise RecordingError(f"{header.point_count:,} points announced, {size:,} bytes there")
     prototype = libe57.StructureNode(header.points.prototype())
     values_of: dict[str, Column] = {}
     integers = set()
@@ -142,74 +179,104 @@ def _read_points(e57: pye57.E57, header: Any) -> dict[str, Column]:
         single = real and libe57.FloatNode(node).precision() == libe57.E57_SINGLE
         if node.type() == libe57.NodeType.E57_INTEGER:
             integers.add(name)
-        values_of[name] = np.empty(header.point_count, np.float32 if single else np.float64)
-        buffers.append(libe57.SourceDestBuffer(e57.image_file, name, values_of[name], header.point_count, True, True))
+        values_of[name] = np.empty(min(rows, header.point_count), np.float32 if single else np.float64)
+        buffers.append(libe57.SourceDestBuffer(e57.image_file, name, values_of[name], values_of[name].size, True, True))
     reader = header.points.reader(buffers)
     try:
-        reader.read()
+        while count := reader.read():
+            yield {
+                name: values[:count].astype(np.int64) if name in integers else values[:count].copy()
+                for name, values in values_of.items()
+            }
     finally:
         reader.close()
-    return {name: values.astype(np.int64) if name in integers else values for name, values in values_of.items()}
 
 
-def _write_scan(e57: pye57.E57, cloud: Cloud, name: str) -> None:
+def _write_scan(
+    e57: pye57.E57, known: Survey | None, shape: tuple[int, int], parts: Iterable[Cloud], name: str
+) -> None:
     file = e57.image_file
-    valid = np.isfinite(cloud.points_m).all(axis=1)
-    fields: dict[str, Column] = {
-        axis: np.where(valid, cloud.points_m[:, k], 0).astype(cloud.points_m.dtype) for k, axis in enumerate(_AXES)
-    }
-    if not valid.all():
-        fields["cartesianInvalidState"] = np.where(valid, 0, _NO_POINT).astype(np.int64)
-    height, width = cloud.shape
-    if cloud.organised:
-        fields["rowIndex"] = np.repeat(np.arange(height), width)
-        fields["columnIndex"] = np.tile(np.arange(width), height)
-    fields |= {_OWN_FIELD.get(column, f"{_PREFIX}:{column}"): values for column, values in cloud.columns.items()}
+    if known is None:
+        raise RecordingError("no row is a point")
+    (height, width), organised, head = shape, shape[0] > 1, known.head
+    marked = known.rows < height * width
     scan = libe57.StructureNode(file)
     scan.set("guid", libe57.StringNode(file, f"{{{uuid.uuid4()}}}"))
     scan.set("name", libe57.StringNode(file, name))
-    start = [line for line in headlines(cloud) if line.startswith("time_s")]
+    start = [line for line in headlines(head) if line.startswith("time_s")]
     scan.set("description", libe57.StringNode(file, "\n".join(start)))
     bounds = {"rowMinimum": 0, "rowMaximum": height - 1, "columnMinimum": 0, "columnMaximum": width - 1}
-    _set(file, scan, "indexBounds", bounds if cloud.organised else {"rowMaximum": 0, "columnMaximum": width - 1})
-    x, y, z, i, j, k, w = (float(value) for value in pose_numbers(cloud.T_world_cloud))
+    _set(file, scan, "indexBounds", bounds if organised else {"rowMaximum": 0, "columnMaximum": width - 1})
+    x, y, z, i, j, k, w = (float(value) for value in pose_numbers(head.T_world_cloud))
     pose = libe57.StructureNode(file)
     scan.set("pose", pose)
     _set(file, pose, "rotation", {"w": w, "x": i, "y": j, "z": k})
     _set(file, pose, "translation", {"x": x, "y": y, "z": z})
-    if "intensity" in fields and np.isfinite(fields["intensity"]).any():
-        low, high = float(np.nanmin(fields["intensity"])), float(np.nanmax(fields["intensity"]))
+    if "intensity" in head.columns:
+        low, high = map(float, known.limits["intensity"])
         _set(file, scan, "intensityLimits", {"intensityMinimum": low, "intensityMaximum": high})
-    if set(_COLOURS) <= set(cloud.columns):
+    if set(_COLOURS) <= set(head.columns):
         limits = {
             f"{name}{end}": value for name in _COLOURS.values() for end, value in (("Minimum", 0), ("Maximum", 255))
         }
         _set(file, scan, "colorLimits", limits)
     prototype = libe57.StructureNode(file)
-    buffers = libe57.VectorSourceDestBuffer()
-    arrays = []
-    for field, values in fields.items():
-        prototype.set(field, _node(file, values))
-        # The bindings take int64 for int32, and libe57 refuses an infinity on its way from double to single
-        single = values.dtype == np.float32
-        arrays.append(np.ascontiguousarray(values, np.float32 if single else np.float64))
-        buffers.append(libe57.SourceDestBuffer(file, field, arrays[-1], len(values), True, True))
+    ranges = {_field(column): known.limits[column] for column in head.columns}
+    ranges |= {"cartesianInvalidState": (0, _NO_POINT), "rowIndex": (0, height - 1), "columnIndex": (0, width - 1)}
+    for field, values in _fields(head, marked=marked, width=width if organised else 0).items():
+        prototype.set(field, _node(file, values, ranges.get(field, (0, 0))))
     points = libe57.CompressedVectorNode(file, prototype, libe57.VectorNode(file, True))
     scan.set("points", points)
     e57.data3d.append(scan)
-    writer = points.writer(buffers)
+    _write_points(file, points, (_fields(part, marked=marked, width=width if organised else 0) for part in parts))
+
+
+def _fields(cloud: Cloud, *, marked: bool, width: int) -> dict[str, Column]:
+    """Return the values of a scan by field; `width` is 0 without rows and columns."""
+    valid = cloud.valid
+    fields: dict[str, Column] = {
+        axis: np.where(valid, cloud.points_m[:, k], 0).astype(cloud.points_m.dtype) for k, axis in enumerate(_AXES)
+    }
+    if marked:
+        fields["cartesianInvalidState"] = np.where(valid, 0, _NO_POINT).astype(np.int64)
+    if width:
+        fields["rowIndex"], fields["columnIndex"] = np.divmod(np.arange(len(valid)), width)
+    return fields | {_field(column): values for column, values in cloud.columns.items()}
+
+
+def _field(column: str) -> str:
+    return _OWN_FIELD.get(column, f"{_PREFIX}:{column}")
+
+
+def _write_points(file: Any, points: Any, parts: Iterable[dict[str, Column]]) -> None:
+    """Write the points through buffers that stay: libe57 refuses others for the same points."""
+    writer = None
+    arrays: dict[str, Column] = {}
     try:
-        writer.write(len(cloud.points_m))
+        for fields in parts:
+            if writer is None:
+                buffers = libe57.VectorSourceDestBuffer()
+                for name, values in fields.items():
+                    # The bindings take int64 for int32, and libe57 refuses an infinity on its way to single
+                    arrays[name] = np.empty(_AT_ONCE, np.float32 if values.dtype == np.float32 else np.float64)
+                    buffers.append(libe57.SourceDestBuffer(file, name, arrays[name], _AT_ONCE, True, True))
+                writer = points.writer(buffers)
+            for begin in range(0, fields[_AXES[0]].size, _AT_ONCE):
+                count = fields[_AXES[0]][begin : begin + _AT_ONCE].size
+                for name, values in fields.items():
+                    arrays[name][:count] = values[begin : begin + _AT_ONCE]
+                writer.write(count)
     finally:
-        writer.close()  # one that outlives its file takes the process with it
+        if writer is not None:
+            writer.close()  # one that outlives its file takes the process with it
 
 
-def _node(file: Any, values: Column) -> Any:
-    """What says how one field is stored."""
+def _node(file: Any, values: Column, limits: tuple[float, float]) -> Any:
+    """What says how one field is stored; `limits` are those of its integers."""
     if values.dtype.kind == "f":
         precision = libe57.E57_SINGLE if values.dtype.itemsize == 4 else libe57.E57_DOUBLE
         return libe57.FloatNode(file, 0.0, precision)
-    low, high = int(values.min(initial=0)), int(values.max(initial=0))
+    low, high = min(int(limits[0]), 0), max(int(limits[1]), 0)
     return libe57.IntegerNode(file, low, low, high)
 
 

@@ -77,7 +77,7 @@ def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
         raise RecordingError(f"{path}: is a folder; name a file of a cloud")
     if path.suffix in (".mcap", ".bag", ".db3"):
         raise RecordingError(f"{path}: a recording, not a cloud: `scanwright assemble` makes a cloud of a recording")
-    module = _module(_format(path), path)
+    module = cloud_module(path)
     with of_file(path):
         clouds: tuple[list[Cloud], list[str]] = foreign(f"{path}: damaged", module.read, path)
     return clouds
@@ -163,6 +163,16 @@ def _format(path: Path) -> CloudFormat:
     if name not in all_formats():
         raise RecordingError(f"{path}: '{path.suffix}' is not a format of clouds{suggest(name, all_formats())}")
     return all_formats()[name]
+
+
+def cloud_module(path: Path) -> Any:
+    """Return the module of the format of a file.
+
+    Raises:
+        InstallError: it needs a package that is not installed.
+        RecordingError: the format is unknown.
+    """
+    return _module(_format(path), path)
 
 
 def _module(form: CloudFormat, path: Path) -> Any:

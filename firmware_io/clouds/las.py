@@ -7,17 +7,18 @@ software ignores: it sees the points where they belong, in the world.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import laspy
 import numpy as np
-from jaxtyping import Float64
-from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, with_header
+from scanwright.firmware_io.clouds.streams.parts import Parts, Survey, survey
 from scanwright.firmware_io.foreign import foreign
 
 _HEADER = struct.Struct("<94xHII")  # size of the header, byte of the first point, number of records before it
@@ -36,72 +37,111 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """The cloud of a file, in the frame of its scanner where the file tells it, else in the world."""
     _check_header(path)
     las = foreign(f"{path}: not a LAS file", laspy.read, path)
+    return [_cloud(las.header, las.points)], _notes(path, las.points)
+
+
+def parts(path: Path, rows: int) -> Parts:
+    """Return the cloud of a file in parts of so many points."""
+    _check_header(path)
+
+    def again() -> Iterator[Cloud]:
+        with foreign(f"{path}: not a LAS file", laspy.open, path) as reader:
+            for points in reader.chunk_iterator(rows):
+                yield _cloud(reader.header, points, measured=True)
+
+    with foreign(f"{path}: not a LAS file", laspy.open, path) as reader:
+        notes = _notes(path, foreign(f"{path}: damaged", next, reader.chunk_iterator(rows)))
+    return Parts((again,), tuple(notes))
+
+
+def _notes(path: Path, points: Any) -> list[str]:
+    """Name what is not read of these points."""
+    unread = [
+        name
+        for name in points.point_format.standard_dimension_names
+        if name not in _STANDARD and np.ptp(np.asarray(points[name]).astype(float)) > 0
+    ]
+    return [f"left out of {path}: {', '.join(unread)}"] if unread else []
+
+
+def _cloud(header: laspy.LasHeader, las: Any, *, measured: bool = False) -> Cloud:
+    """Return points as a cloud; `measured`: intensity and time are columns even if all are 0."""
     lines = [
         line
-        for vlr in las.header.vlrs
+        for vlr in header.vlrs
         if vlr.user_id == _OURS
         for line in vlr.record_data_bytes().decode("utf-8", "replace").splitlines()
     ]
     extra = list(las.point_format.extra_dimension_names)
     columns: dict[str, Column] = {}
     for name in extra:
-        values = np.array(las[name]).reshape(len(las.points), -1)
+        values = np.array(las[name]).reshape(len(las), -1)
         names = [name] if values.shape[1] == 1 else [f"{name}_{k}" for k in range(values.shape[1])]
         columns |= dict(zip(names, np.ascontiguousarray(values.T), strict=True))
     columns.pop(_EXACT, None)
-    intensity = np.array(las[_EXACT] if _EXACT in extra else las.intensity)
-    if _EXACT in extra or intensity.any():
+    intensity = np.array(las[_EXACT] if _EXACT in extra else las["intensity"])
+    if _EXACT in extra or measured or intensity.any():
         columns["intensity"] = intensity.astype(COLUMN_TYPES["intensity"])
-    if "gps_time" in las.point_format.dimension_names and np.any(las.gps_time):
-        columns["time_s"] = np.array(las.gps_time, float)
+    if "gps_time" in las.point_format.dimension_names and (measured or np.any(las["gps_time"])):
+        columns["time_s"] = np.array(las["gps_time"], float)
     for name in _COLOURS if "red" in las.point_format.dimension_names else ():
         columns[name] = colour_bytes(np.array(las[name]))
-    unread = [
-        name
-        for name in las.point_format.standard_dimension_names
-        if name not in _STANDARD and np.ptp(np.asarray(las[name]).astype(float)) > 0
-    ]
     world = np.stack([las.x, las.y, las.z], axis=1).astype(float)
     cloud = with_header(Cloud(world, columns), lines)
     points_m = frames.apply(np.linalg.inv(cloud.T_world_cloud), world) if cloud.placed else world
-    notes = [f"left out of {path}: {', '.join(unread)}"] if unread else []
-    return [Cloud(points_m, columns, (1, len(world)), cloud.T_world_cloud, cloud.start_ns)], notes
+    return Cloud(points_m, columns, (1, len(world)), cloud.T_world_cloud, cloud.start_ns)
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a flat cloud; lines about what the file does not hold."""
-    world = frames.apply(cloud.T_world_cloud, cloud.points_m.astype(float))
-    header = laspy.LasHeader(version="1.4", point_format=7 if "red" in cloud.columns else 6)
-    step_m = _step_m(path, world)
+    known = survey([cloud])
+    if known is None:
+        raise RecordingError(f"{path}: no row is a point")
+    return write_parts(path, known, [cloud])
+
+
+def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+    """Write a flat cloud part by part."""
+    names = known.head.columns
+    header = laspy.LasHeader(version="1.4", point_format=7 if "red" in names else 6)
+    step_m = _step_m(path, known)
     header.scales = np.full(3, step_m)
-    header.offsets = np.floor(world.min(axis=0))
-    if lines := headlines(cloud):
+    header.offsets = np.floor(known.low_m)
+    if lines := headlines(known.head):
         header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
+    notes = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
+    if known.head.placed:
+        notes.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
+    exact = "intensity" in names and "intensity" not in known.integers
+    if exact:
+        notes.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
+    if "time_s" in names:
+        notes.append("gps_time is seconds since the first beam, not the time of GPS")
+    types = {name: column.dtype for name, column in names.items() if name not in _STANDARD | set(_OWN_FIELD)}
+    if exact:
+        types[_EXACT] = names["intensity"].dtype
+    header.add_extra_dims([laspy.ExtraBytesParams(name, kind) for name, kind in types.items()])
+    packed = path.suffix.lower() == ".laz"
+    with atomic_write(path, RecordingError) as place, place.open("wb") as stream:
+        what = f"{path}: cannot write"
+        with foreign(what, laspy.open, stream, mode="w", header=header, do_compress=packed, closefd=False) as writer:
+            for part in parts:
+                foreign(what, writer.write_points, _points(header, part, exact=exact))
+    return notes
+
+
+def _points(header: laspy.LasHeader, cloud: Cloud, *, exact: bool) -> laspy.ScaleAwarePointRecord:
+    world = frames.apply(cloud.T_world_cloud, cloud.points_m.astype(float))
     columns = dict(cloud.columns)
     columns |= {name: columns[name].astype(np.uint16) * 257 for name in _COLOURS if name in columns}
-    notes = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
-    if cloud.placed:
-        notes.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
-    if "intensity" in columns and not _is_integer(columns["intensity"]):
+    if exact:
         columns[_EXACT] = columns["intensity"]
         columns["intensity"] = np.clip(np.nan_to_num(columns["intensity"]).round(), 0, 65535)
-        notes.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
-    if "time_s" in columns:
-        notes.append("gps_time is seconds since the first beam, not the time of GPS")
-    header.add_extra_dims(
-        [
-            laspy.ExtraBytesParams(name, column.dtype)
-            for name, column in columns.items()
-            if name not in _STANDARD | set(_OWN_FIELD)
-        ]
-    )
-    las = laspy.LasData(header)
-    las.x, las.y, las.z = world.T
+    points = laspy.ScaleAwarePointRecord.zeros(len(world), header=header)
+    points.x, points.y, points.z = world.T
     for name, column in columns.items():
-        las[_OWN_FIELD.get(name, name)] = column
-    with atomic_write(path, RecordingError) as part, part.open("wb") as stream:
-        foreign(f"{path}: cannot write", las.write, stream, do_compress=path.suffix.lower() == ".laz")
-    return notes
+        points[_OWN_FIELD.get(name, name)] = column
+    return points
 
 
 def _check_header(path: Path) -> None:
@@ -156,15 +196,11 @@ def _check_chunks(path: Path, at: int, points: int) -> None:
         raise RecordingError(f"{path}: {chunks:,} chunks announced for {points:,} points")
 
 
-def _step_m(path: Path, world: Float64[ndarray, "n 3"]) -> float:
+def _step_m(path: Path, known: Survey) -> float:
     """The finest step at which 32 bits reach over all points."""
-    across_m = float(np.ptp(world, axis=0).max()) + 1
+    across_m = float((known.high_m - known.low_m).max()) + 1
     for step_m in _STEPS_M:
         if across_m < step_m * _MOST_STEPS:
             return step_m
     most_km = _STEPS_M[-1] * _MOST_STEPS / 1000
     raise RecordingError(f"{path}: the points are {across_m / 1000:.3g} km apart: LAS holds {most_km:,.0f} km")
-
-
-def _is_integer(intensity: Column) -> bool:
-    return bool(np.all((intensity == np.round(intensity)) & (intensity >= 0) & (intensity <= 65535)))

@@ -6,9 +6,10 @@ fails on older versions and on padding.
 
 from __future__ import annotations
 
-import io
 import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import lzf
@@ -29,6 +30,7 @@ from scanwright.firmware_io.clouds.cloud import (
     pose_matrix,
     pose_numbers,
 )
+from scanwright.firmware_io.clouds.streams.parts import Parts, Survey
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 
@@ -41,22 +43,46 @@ _AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """Read the cloud of a file, whether ascii, binary or binary_compressed; padding (fields named `_`) is skipped."""
-    data = foreign(f"{path}: cannot read", path.read_bytes)
-    header = _header(path, data)
-    fields = [field for field in header.fields if not field.padding]
-    if header.encoding == "ascii":
-        rows = _from_text(path, data, header)
+    header = _header(path)
+    if header.encoding == "binary_compressed":
+        body = foreign(f"{path}: cannot read", path.read_bytes)[header.start :]
+        rows = _from_columns(path, _unpacked_bytes(path, body), header)
     else:
-        body = data[header.start :]
-        if header.encoding == "binary_compressed":
-            body = _unpacked_bytes(path, body)
-        rows = _from_bytes(path, body, header)
-    named = np.empty(header.rows, [(name, kind) for field in fields for name, kind in field.columns()])
+        rows = next(_chunks(path, header, header.rows))
+    return [_cloud(rows, header, header.shape)], []
+
+
+def parts(path: Path, rows: int) -> Parts | None:
+    """Return the cloud of a file in parts of so many rows; None if it has rows and columns, or is compressed as one."""
+    header = _header(path)
+    if header.encoding == "binary_compressed" or header.shape[0] > 1:
+        return None
+    return Parts((lambda: (_cloud(some, header, (1, some.size)) for some in _chunks(path, header, rows)),))
+
+
+def _cloud(rows: NDArray[np.void], header: PcdHeader, shape: tuple[int, int]) -> Cloud:
+    fields = [field for field in header.fields if not field.padding]
+    named = np.empty(rows.size, [(name, kind) for field in fields for name, kind in field.columns()])
     for field in fields:
         for k, (name, _) in enumerate(field.columns()):
-            named[name] = rows[field.key].reshape(header.rows, -1)[:, k]
+            named[name] = rows[field.key].reshape(rows.size, -1)[:, k]
     cloud = cloud_from_rows(_unpacked(named), header.comments)
-    return [Cloud(cloud.points_m, cloud.columns, header.shape, header.T_world_cloud, cloud.start_ns)], []
+    return Cloud(cloud.points_m, cloud.columns, shape, header.T_world_cloud, cloud.start_ns)
+
+
+def _chunks(path: Path, header: PcdHeader, rows: int) -> Iterator[NDArray[np.void]]:
+    """Read the rows of an ascii or binary cloud, so many at a time."""
+    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
+        place = stream.read(header.start).count(b"\n") + 1
+        for begin in range(0, header.rows, rows):
+            count = min(rows, header.rows - begin)
+            if header.encoding == "binary":
+                yield np.fromfile(stream, header.layout, count)
+                continue
+            last = None if begin + count == header.rows else count  # what follows the last row is a fault
+            lines = [line.decode("ascii", "replace") for line in islice(stream, last)]
+            yield _from_text(path, lines, place, count, header)
+            place += len(lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +136,12 @@ class PcdHeader:
         return np.dtype([(field.key, field.kind, (field.count,)) for field in self.fields])
 
 
-def _header(path: Path, data: bytes) -> PcdHeader:
+def _header(path: Path) -> PcdHeader:
     """Read the header; refuse one that announces more rows than the file has bytes for."""
-    end = re.search(rb"^DATA[ \t]+(ascii|binary_compressed|binary)[ \t]*\r?\n", data[:_LONGEST_HEADER], re.MULTILINE)
+    with foreign(f"{path}: cannot read", path.open, "rb") as stream:
+        data = foreign(f"{path}: cannot read", stream.read, _LONGEST_HEADER)
+    size = path.stat().st_size
+    end = re.search(rb"^DATA[ \t]+(ascii|binary_compressed|binary)[ \t]*\r?\n", data, re.MULTILINE)
     if end is None:
         raise RecordingError(f"{path}: not a PCD file: no line DATA ascii, binary or binary_compressed")
     lines = data[: end.start()].decode("ascii", "replace").splitlines()
@@ -148,24 +177,24 @@ def _header(path: Path, data: bytes) -> PcdHeader:
     comments = tuple(line[1:].strip() for line in lines if line.startswith("#"))
     T = pose_matrix([x, y, z, *axis, w])
     header = PcdHeader(tuple(fields), (height, width), end[1].decode(), end.end(), T, comments)
-    if max(field.count for field in fields) > len(data):
+    if max(field.count for field in fields) > size:
         raise RecordingError(f"{path}: COUNT {max(field.count for field in fields)}: more than the bytes of the file")
     least = 2 * sum(field.count for field in fields) if header.encoding == "ascii" else header.layout.itemsize
-    room = (len(data) - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)
+    room = (size - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)
     if not 0 < rows == header.rows or rows * least > room + (header.encoding == "ascii"):
         raise RecordingError(
             f"{path}: POINTS {rows}, HEIGHT {height}, WIDTH {width} of {header.layout.itemsize} bytes each announced, "
-            f"{len(data) - header.start} bytes there"
+            f"{size - header.start} bytes there"
         )
     return header
 
 
-def _from_text(path: Path, data: bytes, header: PcdHeader) -> NDArray[np.void]:
-    lines = data[header.start :].decode("ascii", "replace").splitlines()
-    values = read_numbers(path, lines, data.count(b"\n", 0, header.start) + 1)
-    if values.shape != (header.rows, sum(field.count for field in header.fields)):
-        raise RecordingError(f"{path}: {values.shape[0]} rows of {values.shape[1]} numbers, {header.rows} announced")
-    rows, begin = np.empty(header.rows, header.layout), 0
+def _from_text(path: Path, lines: Sequence[str], place: int, count: int, header: PcdHeader) -> NDArray[np.void]:
+    """Read rows of an ascii cloud; `place` is the number of the first line."""
+    values = read_numbers(path, lines, place)
+    if values.shape != (count, sum(field.count for field in header.fields)):
+        raise RecordingError(f"{path}: {values.shape[0]} rows of {values.shape[1]} numbers, {count} announced")
+    rows, begin = np.empty(count, header.layout), 0
     for field in header.fields:
         part = values[:, begin : begin + field.count]
         if not field.padding:
@@ -175,9 +204,7 @@ def _from_text(path: Path, data: bytes, header: PcdHeader) -> NDArray[np.void]:
     return rows
 
 
-def _from_bytes(path: Path, body: bytes, header: PcdHeader) -> NDArray[np.void]:
-    if header.encoding == "binary":
-        return np.frombuffer(body, header.layout, header.rows)
+def _from_columns(path: Path, body: bytes, header: PcdHeader) -> NDArray[np.void]:
     if len(body) < header.rows * header.layout.itemsize:
         raise RecordingError(f"{path}: {len(body)} bytes unpacked, {header.rows} rows announced")
     rows, begin = np.empty(header.rows, header.layout), 0
@@ -208,17 +235,27 @@ def _integer(path: Path, entries: dict[str, list[str]], key: str, place: int) ->
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud, binary."""
-    rows = _packed(cloud_rows(cloud))
+    return _write(path, cloud, cloud.shape, [cloud])
+
+
+def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+    """Write a flat cloud part by part."""
+    return _write(path, known.head, (1, known.rows), parts)
+
+
+def _write(path: Path, head: Cloud, shape: tuple[int, int], parts: Iterable[Cloud]) -> list[str]:
+    rows = _packed(cloud_rows(head.select(np.empty(0, np.int64))))
     names = list(rows.dtype.names or ())
     pcd = PointCloud.from_points([rows[name] for name in names], names, [rows.dtype[name].type for name in names])
-    x, y, z, i, j, k, w = (float(value) for value in pose_numbers(cloud.T_world_cloud))
-    height, width = cloud.shape
-    pcd.metadata = pcd.metadata.derive(viewpoint=(x, y, z, w, i, j, k), height=height, width=width)
-    data = io.BytesIO()
-    pcd.save(data, Encoding.BINARY)
-    comments = [f"# {line}\n" for line in headlines(cloud) if line.startswith("time_s")]
-    with atomic_write(path, RecordingError) as part:
-        part.write_bytes("".join(comments).encode() + data.getvalue())
+    x, y, z, i, j, k, w = (float(value) for value in pose_numbers(head.T_world_cloud))
+    height, width = shape
+    sizes = {"height": height, "width": width, "points": height * width}
+    pcd.metadata = pcd.metadata.derive(viewpoint=(x, y, z, w, i, j, k), data=Encoding.BINARY, **sizes)
+    comments = [f"# {line}\n" for line in headlines(head) if line.startswith("time_s")]
+    with atomic_write(path, RecordingError) as place, foreign(f"{path}: cannot write", place.open, "wb") as stream:
+        stream.write("".join([*comments, pcd.metadata.compose_header()]).encode())
+        for part in parts:
+            stream.write(np.ascontiguousarray(_packed(cloud_rows(part))).data)
     return []
 
 

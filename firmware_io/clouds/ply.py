@@ -7,7 +7,7 @@ everything but integers of 64 bits.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import islice
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
+from scanwright.firmware_io.clouds.streams.parts import Parts, Survey
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 
@@ -212,11 +213,46 @@ def read_header(path: Path) -> PlyHeader:
     if header.vertex.lists or not {*"xyz"} <= set(header.vertex.properties):
         names = " ".join(header.vertex.properties)[:200]
         raise RecordingError(f"{path}: the properties of vertex are {names}; a cloud has x y z and no lists")
+    if not header.vertex.rows:
+        raise RecordingError(f"{path}: element vertex has 0 rows")
     return header
 
 
 def _key(name: str) -> str:
     return name.lower() if name in ("X", "Y", "Z") else name
+
+
+def parts(path: Path, rows: int) -> Parts | None:
+    """Return the cloud of a file in parts of so many rows; None if it has rows and columns."""
+    header = read_header(path)
+    if header.width:
+        return None
+
+    def again() -> Iterator[Cloud]:
+        return (cloud_from_rows(some, header.comments) for some in _chunks(path, header, rows))
+
+    return Parts((again,), tuple(_notes(path, header)))
+
+
+def _chunks(path: Path, header: PlyHeader, rows: int) -> Iterator[NDArray[np.void]]:
+    """Read the rows of a cloud, so many at a time, without mapping the file: mapped pages count as memory."""
+    vertex, first = header.vertex, header.lines + _rows_before(header)
+    if header.form == "ascii":
+        with path.open(encoding="ascii", errors="replace") as stream:
+            lines = islice(stream, first, first + vertex.rows)
+            for begin in range(0, vertex.rows, rows):
+                count = min(rows, vertex.rows - begin)
+                yield _typed_rows(path, header, islice(lines, count), first + begin + 1, count)
+        return
+    start, fields = _body(path, header)
+    with path.open("rb") as stream:
+        stream.seek(start)
+        for begin in range(0, vertex.rows, rows):
+            yield np.fromfile(stream, fields, min(rows, vertex.rows - begin))
+
+
+def _rows_before(header: PlyHeader) -> int:
+    return sum(element.rows for element in header.elements[: header.elements.index(header.vertex)])
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
@@ -226,21 +262,25 @@ def read_ply(path: Path) -> NDArray[np.void]:
         RecordingError: as for `read_header`; or the file is cut off, or a line of text is not numbers.
     """
     header = read_header(path)
-    vertex, before = header.vertex, header.elements[: header.elements.index(header.vertex)]
-    if not vertex.rows:
-        raise RecordingError(f"{path}: element vertex has 0 rows")
     if header.form == "ascii":
-        return _read_lines(path, header, sum(element.rows for element in before))
+        return next(_chunks(path, header, header.vertex.rows))
+    start, fields = _body(path, header)
+    return np.memmap(path, fields, "r", start, (header.vertex.rows,))
+
+
+def _body(path: Path, header: PlyHeader) -> tuple[int, np.dtype[np.void]]:
+    """Return the byte where the rows of a binary cloud begin, and their type."""
+    vertex = header.vertex
     order = "<" if header.form == "binary_little_endian" else ">"
     fields = vertex.fields(order)
     start, size = header.start, path.stat().st_size
-    for element in before:
+    for element in header.elements[: header.elements.index(vertex)]:
         start = _end_of(path, element, start, order)
     if size < start + vertex.rows * fields.itemsize:
         raise RecordingError(
             f"{path}: {vertex.rows} rows of {fields.itemsize} bytes announced, {size - start} bytes there"
         )
-    return np.memmap(path, fields, "r", start, (vertex.rows,))
+    return start, fields
 
 
 def _end_of(path: Path, element: PlyElement, start: int, order: str) -> int:
@@ -264,19 +304,17 @@ def _end_of(path: Path, element: PlyElement, start: int, order: str) -> int:
         return stream.tell()
 
 
-def _read_lines(path: Path, header: PlyHeader, skipped: int) -> NDArray[np.void]:
-    """Read the rows of a text file, each as its header types it."""
-    fields, first = header.vertex.fields("<"), header.lines + skipped
-    with path.open(encoding="ascii", errors="replace") as stream:
-        lines = islice(stream, first, first + header.vertex.rows)
-        values = read_numbers(path, lines, first + 1)
-    if values.shape != (header.vertex.rows, len(header.vertex.properties)):
+def _typed_rows(path: Path, header: PlyHeader, lines: Iterable[str], place: int, count: int) -> NDArray[np.void]:
+    """Read rows of a text file, each as its header types it; `place` is the number of the first line."""
+    properties, fields = header.vertex.properties, header.vertex.fields("<")
+    values = read_numbers(path, lines, place)
+    if values.shape != (count, len(properties)):
         raise RecordingError(
-            f"{path}: {header.vertex.rows} rows of {len(header.vertex.properties)} numbers announced, "
+            f"{path}: {header.vertex.rows} rows of {len(properties)} numbers announced, "
             f"{values.shape[0]} of {values.shape[1]} there"
         )
-    rows = np.empty(header.vertex.rows, fields)
-    for k, name in enumerate(header.vertex.properties):
+    rows = np.empty(count, fields)
+    for k, name in enumerate(properties):
         with of_file(path):
             rows[name] = as_type(values[:, k], fields[name])
     return rows
@@ -285,20 +323,33 @@ def _read_lines(path: Path, header: PlyHeader, skipped: int) -> NDArray[np.void]
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """Read the cloud of a file; other elements than `vertex` are skipped and named."""
     header = read_header(path)
+    return [cloud_from_rows(read_ply(path), header.comments)], _notes(path, header)
+
+
+def _notes(path: Path, header: PlyHeader) -> list[str]:
     skipped = [
         f"{element.rows:,} of {element.name}"
         for element in header.elements
         if element.rows and element.name != "vertex"
     ]
-    notes = [f"dropped of {path}: {', '.join(skipped)}"] if skipped else []
-    return [cloud_from_rows(read_ply(path), header.comments)], notes
+    return [f"dropped of {path}: {', '.join(skipped)}"] if skipped else []
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud; lines about what the file does not hold."""
-    rows = cloud_rows(cloud)
-    wide = [name for name in rows.dtype.names or () if rows.dtype[name].kind in "iu" and rows.dtype[name].itemsize == 8]
-    kinds = [(name, "<f8" if name in wide else rows.dtype[name].str) for name in rows.dtype.names or ()]
-    with PlyWriter(path, np.dtype(kinds), [*headlines(cloud), "x y z in m"]) as stream:
-        stream.write(rows.astype(kinds))
+    return _write(path, cloud, [cloud])
+
+
+def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+    """Write a flat cloud part by part."""
+    return _write(path, known.head, parts)
+
+
+def _write(path: Path, head: Cloud, parts: Iterable[Cloud]) -> list[str]:
+    fields = cloud_rows(head.select(np.empty(0, np.int64))).dtype
+    wide = [name for name in fields.names or () if fields[name].kind in "iu" and fields[name].itemsize == 8]
+    kinds = [(name, "<f8" if name in wide else fields[name].str) for name in fields.names or ()]
+    with PlyWriter(path, np.dtype(kinds), [*headlines(head), "x y z in m"]) as stream:
+        for part in parts:
+            stream.write(cloud_rows(part).astype(kinds))
     return [f"PLY has no 64-bit integers: {name} is written as double" for name in wide]

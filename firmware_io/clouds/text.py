@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,8 @@ from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, Column, as_type, cloud_rows, headlines, with_header
-from scanwright.firmware_io.foreign import foreign
+from scanwright.firmware_io.clouds.streams.parts import Parts, Survey
+from scanwright.firmware_io.foreign import foreign, of_file
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
 _TYPES = {"|i1", "|u1", *(f"<{kind}{size}" for kind in "iu" for size in (2, 4, 8)), *_DIGITS}
@@ -33,6 +34,7 @@ _ALIASES = {"r": "red", "g": "green", "b": "blue", "a": "alpha", "i": "intensity
 _UNIT = re.compile(r"([xyz])[ _]?[\[(]?(mm|cm|m|meters?|metres?|ft|feet)[\])]?$")
 _PTS = {4: ("intensity",), 6: ("red", "green", "blue"), 7: ("intensity", "red", "green", "blue")}  # Leica, after x y z
 _AXES = ("x", "y", "z")
+_HEAD = 1000  # lines that show the columns of a large file
 _AMBIGUOUS = 6  # numbers without a point, separated by commas: three with a decimal comma, or as many integers
 _DECIMAL_COMMA = "a decimal comma, or a comma between numbers? write decimals with a point"
 
@@ -51,6 +53,57 @@ class _Layout:
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """Read the cloud of a file of three or more numbers a line."""
     lines = foreign(f"{path}: cannot read", read_text, path).splitlines()
+    layout, comments, numeric, every = _survey_lines(path, lines)
+    rows = islice(lines, layout.first, None)
+    values = read_numbers(path, rows, layout.first + 1, layout.separator, None if every else numeric)
+    if layout.announced is not None and layout.announced != len(values):
+        raise RecordingError(f"{path}: line 1 announces {layout.announced} points, {len(values)} are there")
+    cloud = _cloud(path, layout, comments, numeric, values)
+    if not cloud.valid.any():
+        raise RecordingError(f"{path}: none of the {len(values)} lines is a point")
+    return [cloud], _notes(path, layout, numeric)
+
+
+def parts(path: Path, rows: int) -> Parts | None:
+    """Return the cloud of a file in parts of so many lines; None if its comments tell rows and columns.
+
+    Columns are named and typed by the first lines.
+    """
+    with foreign(f"{path}: cannot read", path.open, encoding="utf-8-sig") as stream:
+        lines = [line.rstrip("\n") for line in islice(stream, _HEAD)]
+    layout, comments, numeric, every = _survey_lines(path, lines)
+    if any(line.split()[:1] == ["height"] for line in comments):
+        return None
+
+    def again() -> Iterator[Cloud]:
+        read = 0
+        with foreign(f"{path}: cannot read", path.open, encoding="utf-8-sig") as stream:
+            body = islice(stream, layout.first, None)
+            first: Cloud | None = None
+            for begin in count(layout.first + 1, rows):
+                some = list(islice(body, rows))
+                if not any(line.strip() and not line.startswith(_COMMENTS) for line in some):
+                    break
+                values = read_numbers(path, some, begin, layout.separator, None if every else numeric)
+                read += len(values)
+                cloud = _cloud(path, layout, comments, numeric, values)
+                first = first or cloud
+                yield _like(path, cloud, first)
+        if layout.announced is not None and layout.announced != read:
+            raise RecordingError(f"{path}: line 1 announces {layout.announced} points, {read} are there")
+
+    return Parts((again,), tuple(_notes(path, layout, numeric)))
+
+
+def _like(path: Path, cloud: Cloud, first: Cloud) -> Cloud:
+    """Return a part with its columns as in the first one."""
+    with of_file(path):
+        columns = {name: as_type(values, first.columns[name].dtype) for name, values in cloud.columns.items()}
+    return Cloud(cloud.points_m, columns, cloud.shape, cloud.T_world_cloud, cloud.start_ns)
+
+
+def _survey_lines(path: Path, lines: Sequence[str]) -> tuple[_Layout, list[str], list[int], bool]:
+    """Return layout, comments, the columns that are numbers, and whether all are."""
     comments = [line.lstrip("#/! ") for line in lines if line.startswith(_COMMENTS)]
     layout = _layout(path, lines, comments)
     words = split(lines[layout.first], layout.separator)
@@ -61,10 +114,10 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         if (k := layout.names.index(axis)) not in numeric:
             raise RecordingError(f"{path}: line {layout.first + 1}: {words[k][:40]!a} is not a number")
     every = len(numeric) == layout.count == len(lines[layout.first].strip().split(layout.separator))
-    rows = islice(lines, layout.first, None)
-    values = read_numbers(path, rows, layout.first + 1, layout.separator, None if every else numeric)
-    if layout.announced is not None and layout.announced != len(values):
-        raise RecordingError(f"{path}: line 1 announces {layout.announced} points, {len(values)} are there")
+    return layout, comments, numeric, every
+
+
+def _cloud(path: Path, layout: _Layout, comments: Sequence[str], numeric: Sequence[int], values: Floats) -> Cloud:
     typed = [words[1:] for line in comments if len(words := line.split()) == layout.count + 1 and words[0] == "types"]
     types = typed[0] if typed else ["<f8"] * layout.count
     columns = {layout.names[k]: _typed(path, layout.names[k], values[:, j], types[k]) for j, k in enumerate(numeric)}
@@ -72,10 +125,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
     if any(column.dtype.kind != "f" for column in points):
         raise RecordingError(f"{path}: types: x y z must be floats")
     points_m: NDArray[np.floating] = np.stack(points, axis=1)
-    if not np.isfinite(points_m).any():
-        raise RecordingError(f"{path}: none of the {len(values)} lines is a point")
-    cloud = Cloud(points_m, columns if typed else columns | _colours(columns))
-    return [with_header(cloud, comments)], _notes(path, layout, numeric)
+    return with_header(Cloud(points_m, columns if typed else columns | _colours(columns)), comments)
 
 
 def _notes(path: Path, layout: _Layout, numeric: Sequence[int]) -> list[str]:
@@ -206,10 +256,21 @@ def read_numbers(
 
 def write(path: Path, cloud: Cloud) -> list[str]:
     """Write a cloud."""
-    rows = cloud_rows(cloud)
-    names = rows.dtype.names or ()
-    kinds = [rows.dtype[name].str for name in names]
-    header = [" ".join(names), "types " + " ".join(kinds), *headlines(cloud)]
-    with atomic_write(path, RecordingError) as part:
-        np.savetxt(part, rows, [_DIGITS.get(kind, "%d") for kind in kinds], header="\n".join(header))
+    return _write(path, cloud, [cloud])
+
+
+def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+    """Write a flat cloud part by part."""
+    return _write(path, known.head, parts)
+
+
+def _write(path: Path, head: Cloud, parts: Iterable[Cloud]) -> list[str]:
+    fields = cloud_rows(head.select(np.empty(0, np.int64))).dtype
+    names = fields.names or ()
+    kinds = [fields[name].str for name in names]
+    header = [" ".join(names), "types " + " ".join(kinds), *headlines(head)]
+    with atomic_write(path, RecordingError) as place, foreign(f"{path}: cannot write", place.open, "w") as stream:
+        stream.writelines(f"# {line}\n" for line in header)
+        for part in parts:
+            np.savetxt(stream, cloud_rows(part), [_DIGITS.get(kind, "%d") for kind in kinds])
     return []

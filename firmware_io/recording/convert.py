@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
+from scanwright.firmware_io.clouds.streams.stream import stream
 from scanwright.firmware_io.recording.bag_export import export_bag
 
 
@@ -38,6 +39,8 @@ class Converted:
 def convert(source: Path, target: Path, *, organised: bool = False) -> Converted:
     """Convert a cloud to another format, or a recording to a bag.
 
+    Large clouds without rows and columns are converted in parts, in bounded memory.
+
     Args:
         source: a cloud, or a recording (`.mcap`).
         target: a cloud; or a bag, `.bag` for ROS 1, otherwise a new folder for ROS 2.
@@ -52,6 +55,9 @@ def convert(source: Path, target: Path, *, organised: bool = False) -> Converted
         unknown = tuple(f"dropped {topic}: this ROS has no {kind}" for topic, kind in exported.unknown.items())
         return Converted((target,), None, exported.written, unknown)
     check_target(target)
-    clouds, unread = read_clouds(source)
-    wrote = write_clouds(target, clouds, organised=organised)
+    unread: list[str] = []
+    wrote = None if organised else stream(source, target)
+    if wrote is None:
+        clouds, unread = read_clouds(source)
+        wrote = write_clouds(target, clouds, organised=organised)
     return Converted(wrote.paths, wrote.rows, None, (*unread, *wrote.notes))

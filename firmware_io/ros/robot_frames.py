@@ -85,11 +85,11 @@ def what_changed(before: AngleSet, after: AngleSet) -> list[str]:
     lean_deg, shift_mm = np.degrees(leans_rad[:2]), 1e3 * shift_m[:2]
     most_mm = 1e3 * (2 * _RANGE_M * math.sin(angle_rad / 2) + moved_m)
     return [
-        f"the lidar leans {math.degrees(angle_rad):.3f} deg{lean_sd} from where it was ({before.source}): "
+        f"lidar tilt: {math.degrees(angle_rad):.3f} deg{lean_sd} from the {before.source}: "
         f"{lean_deg[0]:+.3f} about x, {lean_deg[1]:+.3f} about y of the rotation frame",
-        f"its optical centre lies {1e3 * moved_m:.2f} mm{shift_sd} from where it was: "
+        f"optical centre: {1e3 * moved_m:.2f} mm{shift_sd} from the {before.source}: "
         f"{shift_mm[0]:+.2f} along x, {shift_mm[1]:+.2f} along y of the rotation frame",
-        f"a point {_RANGE_M:g} m away lies up to {most_mm:.1f} mm elsewhere",
+        f"effect at {_RANGE_M:g} m: up to {most_mm:.1f} mm",
     ]
 
 

@@ -48,6 +48,11 @@ def register(
     Raises:
         RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no
             covariance.
+
+    Example:
+        >>> import scanwright as sw
+        >>> sw.register(["a.ply", "b.ply"], "merged.ply").complete
+        True
     """
     from scanwright.firmware_io.registration.register_files import register_files
 
@@ -95,6 +100,11 @@ def make_map(
     Raises:
         RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map. Nothing is
             written then.
+
+    Example:
+        >>> import scanwright as sw
+        >>> sw.make_map(["a.ply"], "room.yaml", angles="angles.json").wrote
+        (PosixPath('room.yaml'), PosixPath('room.pgm'))
     """
     from scanwright.firmware_io.mapping.map_files import map_files
 
@@ -110,6 +120,12 @@ def read_cloud(path: str | Path) -> Cloud:
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is unknown, the file does not match its suffix, or it contains several clouds.
+
+    Example:
+        >>> import scanwright as sw
+        >>> cloud = sw.read_cloud("a.ply")
+        >>> cloud.points_m.shape[1], cloud.points_m.dtype.name
+        (3, 'float32')
     """
     clouds, _unread = read_clouds(Path(path))
     if len(clouds) != 1:
@@ -136,6 +152,12 @@ def write_cloud(path: str | Path, cloud: Cloud | np.ndarray[Any, Any], *, organi
     Raises:
         InstallError: the format needs the extra `clouds`, which is not installed.
         RecordingError: the format is unknown or cannot store this, or the file cannot be written.
+
+    Example:
+        >>> import scanwright as sw
+        >>> import numpy as np
+        >>> sw.write_cloud("two.xyz", np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]]))
+        []
     """
     record = cloud if isinstance(cloud, Cloud) else Cloud(np.asarray(cloud) * 1.0)
     return list(write_clouds(Path(path), [record], organised=organised).notes)

@@ -39,6 +39,12 @@ def open_servo(
     Raises:
         ServoSetupError: such settings must change, and `undo_folder` is None; see `set_up_servo`.
         DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
+
+    Example:
+        >>> import scanwright as sw
+        >>> with sw.open_servo(servo_port) as servo:  # such as "/dev/serial/by-id/..."
+        ...     servo.model
+        'MX-64R'
     """
     require_posix()
     from scanwright.firmware_io.servo.servo import open_servo
@@ -72,6 +78,10 @@ def set_up_servo(
 
     Raises:
         DeviceError: no such servo, its torque is on, a setting does not stay, or the file cannot be written.
+
+    Example:
+        >>> import scanwright as sw
+        >>> sw.set_up_servo(servo_port, ".", spins=True)  # None: every setting was right
     """
     require_posix()
     from scanwright.firmware_io.servo.settings import set_up
@@ -94,6 +104,12 @@ def open_lidar(address: str, model: str | None = None) -> LidarDriver:
 
     Raises:
         DeviceError: no such port, it is in use, or it is not a known sensor.
+
+    Example:
+        >>> import scanwright as sw
+        >>> with sw.open_lidar(lidar_port) as lidar:  # such as "192.168.0.10:10940"
+        ...     lidar.model
+        'UTM-30LX'
     """
     require_posix()
     from scanwright.firmware_io.lidar.families import open_lidar
@@ -144,6 +160,12 @@ def scan(
             written, nothing moved.
         DeviceError: no port, or a device fails; both devices are stopped, and what was recorded is intact.
         ScanwrightError: no angle set, no motion, or an unusable file name.
+
+    Example:
+        >>> import scanwright as sw
+        >>> scanned = sw.scan(".", lidar=lidar_port, servo=servo_port, recording="scan.mcap")
+        >>> scanned.assembled.out
+        PosixPath('scan.ply')
     """
     require_posix()
     from scanwright.firmware_io.scan.acquire import acquire
@@ -188,6 +210,12 @@ def simulate(
         SceneError: the mesh is unusable.
         TaskError: the sensor is not in the catalogue.
         DeviceError: the angle set has no motion.
+
+    Example:
+        >>> import scanwright as sw
+        >>> recorded = sw.simulate("angles.json")
+        >>> recorded.range_m.shape == recorded.bearing_rad.shape == recorded.joint_rad.shape
+        True
     """
     from scanwright.firmware_io.emulators.simulated import simulated_recording
     from scanwright.firmware_io.emulators.world import room

@@ -34,6 +34,12 @@ def build(task: TaskLike, out: str | Path = "out", *, progress: Progress = no_pr
         InstallError: the CAD kernel is not installed.
         TaskError: as for `optimise`.
         BuildError: no mount can be built, or the folder cannot be written.
+
+    Example:
+        >>> import scanwright as sw
+        >>> built = sw.build("tilted.toml", "out")
+        >>> built.failed
+        ()
     """
     require_kernel("build")
     loaded = as_task(task)
@@ -55,6 +61,12 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
     Raises:
         InstallError: the CAD kernel is not installed.
         BuildError: a part cannot be made.
+
+    Example:
+        >>> import scanwright as sw
+        >>> made = sw.make_parts("tilted.toml", "out/tilted/angles.json")
+        >>> made["alignment_linkage"].isValid()
+        True
     """
     require_kernel("the making of parts")
     from scanwright.cad.assembly.make import make_parts
@@ -76,6 +88,11 @@ def check(folder: str | Path, *, progress: Progress = no_progress) -> list[Findi
         InstallError: the CAD kernel is not installed.
         TaskError: the folder has no angle set or no task.
         BuildError: a file of the build is missing or was edited, or a part cannot be made.
+
+    Example:
+        >>> import scanwright as sw
+        >>> [finding.message for finding in sw.check("out/tilted") if finding.severity == "error"]
+        []
     """
     require_kernel("check")
     folder = Path(folder)

@@ -54,6 +54,12 @@ def import_bag(
 
     Raises:
         RecordingError: the bag is unreadable, has no such topic, or `out` cannot be written.
+
+    Example:
+        >>> import scanwright as sw
+        >>> summary = sw.import_bag("turn.bag", "again.mcap", scan="/scan", angle="/joint_states", angle_unit="rad")
+        >>> summary.out
+        PosixPath('again.mcap')
     """
     from scanwright.firmware_io.recording.importer import import_bag
 
@@ -69,6 +75,12 @@ def open_recording(path: str | Path) -> Recording:
 
     Raises:
         RecordingError: the file is missing, truncated, without the topics and types of a recording, or empty.
+
+    Example:
+        >>> import scanwright as sw
+        >>> recording = sw.open_recording("turn.mcap")
+        >>> sum(1 for _ in recording.scans()) == len(recording.arrays().range_m)
+        True
     """
     from scanwright.firmware_io.recording.recording import open_recording
 
@@ -98,6 +110,12 @@ def assemble(
         RecordingError: the recording is unreadable, no beam becomes a point, options contradict each other, or `out`
             is no format of clouds. Nothing is written then.
         InstallError: the format needs the extra `clouds`.
+
+    Example:
+        >>> import scanwright as sw
+        >>> summary = sw.assemble("turn.mcap", "angles.json", "cloud.ply")
+        >>> summary.beams == summary.points + sum(summary.left_out.values())
+        True
     """
     from scanwright.firmware_io.assembly.assemble import assemble_recording
     from scanwright.firmware_io.assembly.finish import Finish, finish_clouds, seen_from
@@ -170,6 +188,12 @@ def calibrate(
     Raises:
         RecordingError: a recording is unreadable, they do not determine the mounting errors, or `out` is the file of
             `angles`. Nothing is written then.
+
+    Example:
+        >>> import scanwright as sw
+        >>> result = sw.calibrate(["turn.mcap"], "angles.json", "angles.calibrated.json")
+        >>> result.angles.source
+        'calibration'
     """
     from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 

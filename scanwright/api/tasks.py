@@ -96,6 +96,12 @@ def compare(task: TaskLike, *, progress: Progress = no_progress) -> tuple[Optimu
     Raises:
         TaskError: as for `optimise`.
         BuildError: a file of the build folder is gone or was edited.
+
+    Example:
+        >>> import scanwright as sw
+        >>> optimum, rows = sw.compare("ceiling")
+        >>> rows[0].name, rows[0].turns
+        ('optimum', 1)
     """
     from scanwright.design.evaluation.comparison import compare
     from scanwright.design.search.optimum import find_optimum

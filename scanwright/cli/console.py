@@ -47,6 +47,8 @@ _STYLES: dict[str, dict[str, Any]] = {
 _PRIORITY = -10  # nice value: before every ordinary program, behind the system's own at -20
 _APART_S = 10.0  # between two lines of one step in a file: a log of an hour stays readable
 _MOST_COLUMNS = 100
+_COLUMN = re.compile(r"\S {2,}(?=\S)")
+_MOST_GAPS = 2  # between words: a line with more is the row of a table
 _MOST_INDENT = 20  # of a line that continues another, to the column of its value
 _BAR_CHARACTERS = 24  # leaves 50 of a terminal's 80 for the step and the time that is left
 _SPEED_S = 3600.0  # over which the time that is left is estimated: stages of a build are minutes apart
@@ -117,7 +119,7 @@ def wrapped(line: str, stream: IO[str]) -> str:
 
     The variable `COLUMNS` of the environment wraps lines in a file too.
     """
-    if not (on_terminal(stream) or "COLUMNS" in os.environ):
+    if not (on_terminal(stream) or "COLUMNS" in os.environ) or len(_COLUMN.findall(line)) > _MOST_GAPS:
         return line
     label = re.match(r" *(?:\S+(?: \S+)*  +)?", line)
     indent = len(label[0]) if label and 0 < len(label[0]) <= _MOST_INDENT else 2
@@ -148,9 +150,8 @@ def _print_aside(kind: str, line: str) -> None:
     if line.lstrip().startswith("hint: "):
         line = _SETTING.sub(_as_typed, line)
     text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
-    text = wrapped(f"{kind}: {text}" if kind else text, sys.stderr)
-    if kind:
-        text = styled(f"{kind}:", kind, sys.stderr) + text.removeprefix(f"{kind}:")
+    if kind:  # never wrapped: one line of input that is wrong is one line, and its path can be copied
+        text = styled(f"{kind}:", kind, sys.stderr) + f" {text}"
     print(text, file=sys.stderr, flush=True)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
@@ -14,7 +15,8 @@ from typing import TYPE_CHECKING
 from scanwright.cad.checks.checks_json import read_checks
 from scanwright.cad.files.part_files import PartReport, PartsResult, build_parts, write_files
 from scanwright.cad.kernel import require_kernel
-from scanwright.design.concurrency.processes import Packed, worker_processes
+from scanwright.design.concurrency.processes import Begin, Packed, worker_processes
+from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding, errors_in, sentence
 from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import LoadedTask, load_task
@@ -31,6 +33,9 @@ if TYPE_CHECKING:
     from scanwright.design.search.optimum import Optimum
     from scanwright.design.search.with_parts import Chosen, Workshop
 
+    Failed = dict[tuple[float, ...], str]  # settings [deg] whose parts failed a check, and its message
+    Attempt = tuple[Chosen, Scanner, Packed[Assembly]]
+
 _LOG = logging.getLogger(__name__)
 
 KERNEL = (
@@ -40,6 +45,9 @@ KERNEL = (
     "scanwright.report.page",
 )
 """What brings the CAD kernel and all that works on parts with it: loaded while the search runs, in no third place."""
+
+MOST_FAILED = 3
+"""Other mounts that are made if the parts of the best one fail a check."""
 
 DRAWN = 2
 """Reference mounts beside the scanner in density.png, the best one first: its ratio is drawn."""
@@ -122,9 +130,10 @@ def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_ful
     """Return one line for each finding and each unverified value; unless `in_full`, only a count of these."""
     unverified = [check for check in checks if check.code == "unverified"]
     lines = [f"{each.severity}: {sentence(each)}" for each in (*findings, *(unverified if in_full else ()))]
-    counts = Counter(check.subject for check in unverified) if not in_full else {}
-    todo = "measure yours before you print, report.html lists them"
-    return lines + [f"warning: {name}: unverified values that shape parts: {n}: {todo}" for name, n in counts.items()]
+    if in_full or not unverified:
+        return lines
+    counts = ", ".join(f"{name}: {n}" for name, n in Counter(check.subject for check in unverified).items())
+    return [*lines, f"warning: unverified values shape parts ({counts}): measure yours first, report.html lists them"]
 
 
 def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
@@ -168,7 +177,7 @@ def difference_when_rebuilt(folder: Path, progress: Progress) -> str | None:
 
 
 def setting_built(optimum: Optimum) -> Chosen:
-    """Return the mount of an optimum that a build chooses: the best one with the beams that its parts block.
+    """Return the mount of an optimum that a build tries first: the best one with the beams that its parts block.
 
     Raises:
         InstallError: the CAD kernel is not installed.
@@ -177,33 +186,71 @@ def setting_built(optimum: Optimum) -> Chosen:
     require_kernel("what parts hide")
     from scanwright.cad.assembly.shadow import PartsWorkshop
 
-    return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), no_progress)
+    return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), {}, no_progress)
 
 
-def _chosen(optimum: Optimum, workshop: Workshop, progress: Progress) -> Chosen:
+def _chosen(optimum: Optimum, workshop: Workshop, failed: Failed, progress: Progress) -> Chosen:
     from scanwright.design.objective.self_check import require_counted
     from scanwright.design.search.with_parts import choose_with_parts
 
     task = optimum.loaded.task
-    chosen = choose_with_parts(optimum.problem, optimum.search.best, task.angles, task.limits, workshop, progress)
+    families = optimum.search.best
+    chosen = choose_with_parts(optimum.problem, families, task.angles, task.limits, workshop, progress, failed)
     require_counted(optimum.loaded, chosen.family.angles_rad, chosen.family.score, chosen.shadow)
     return chosen
 
 
 def _chosen_and_made(
-    optimum: Optimum, task_sha256: str, progress: Progress
+    optimum: Optimum, task_sha256: str, failed: Failed, progress: Progress
 ) -> tuple[Chosen, Scanner, Packed[Assembly]]:
-    """Choose the mount, and make the scanner and its parts."""
+    """Choose a mount that is not among those that failed, and make the scanner and its parts."""
     from scanwright.cad.assembly.shadow import PartsWorkshop
     from scanwright.design.search.optimum import angle_set
+    from scanwright.pipeline.alternatives import what_fits
 
     loaded = optimum.loaded
     workshop = PartsWorkshop(loaded.scanner(optimum.angle_set()))
-    chosen = _chosen(optimum, workshop, _at(progress, "shadow"))
+    try:
+        chosen = _chosen(optimum, workshop, failed, _at(progress, "shadow"))
+    except BuildError as error:
+        raise BuildError(f"{error}{what_fits(loaded, optimum.angle_set())}") from error
     angles = angle_set(loaded, chosen.family).model_copy(update={"task_sha256": task_sha256})
     assembly = workshop.assembly(loaded.scanner(angles))
     scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": assembly.layout.deck.t_world_rot}))
     return chosen, scanner, Packed.of(assembly)
+
+
+def _that_passes(
+    begin: Begin, optimum: Optimum, task_sha256: str, first: Attempt, work: Path, progress: Progress
+) -> tuple[Chosen, Scanner, PartsMade]:
+    """Write parts and checks of the first mount, or of the next one if a check fails; if all fail, of the first."""
+    attempt, failed = first, dict[tuple[float, ...], str]()
+    parts, errors = _written_and_checked(begin, attempt, work, progress)
+    while errors and len(failed) < MOST_FAILED:
+        failed[attempt[0].family.angles_deg] = errors[0].message
+        _at(progress, "shadow")(f"a check failed, trying another mount: {errors[0].message}")
+        try:
+            attempt = begin(_chosen_and_made, optimum, task_sha256, failed, progress)()
+        except BuildError:  # there is no other one
+            break
+        parts, errors = _written_and_checked(begin, attempt, work, progress)
+    if errors and attempt is not first:
+        attempt = first
+        parts, errors = _written_and_checked(begin, attempt, work, progress)
+    return attempt[0], attempt[1], parts
+
+
+def _written_and_checked(
+    begin: Begin, attempt: Attempt, work: Path, progress: Progress
+) -> tuple[PartsMade, tuple[Finding, ...]]:
+    """Write parts and checks of a mount, in place of those of another one; returns the checks that failed."""
+    shutil.rmtree(work / "parts", ignore_errors=True)
+    _, scanner, assembly = attempt
+    written = begin(_written, scanner, assembly, work, progress)
+    checked = begin(_checked, scanner, assembly, progress)
+    parts = written()
+    write_files(work, checked())
+    return parts, errors_in(read_checks(work / "checks.json"))
 
 
 def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
@@ -265,15 +312,17 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
 
-        made = begin(_chosen_and_made, optimum, requested.sha256(), progress)
+        made = begin(_chosen_and_made, optimum, requested.sha256(), {}, progress)
         begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
         records.write_task(work, requested)
         records.write_search(work, result)
-        chosen, scanner, assembly = made()
+        chosen, scanner, parts = _that_passes(begin, optimum, requested.sha256(), made(), work, progress)
         best, angles = chosen.family, scanner.angles
-        written = begin(_written, scanner, assembly, work, progress)
-        checked = begin(_checked, scanner, assembly, progress)
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
+        exported, drawn = (
+            begin(_exported, scanner, parts.result, work, progress),
+            begin(_drawn, scanner, parts.result, progress),
+        )
         _at(progress, "pictures")("drawing the density")
         settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {
@@ -281,12 +330,6 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
             for gain in optimum.gains[:DRAWN]
         }
         density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
-        parts = written()
-        exported, drawn = (
-            begin(_exported, scanner, parts.result, work, progress),
-            begin(_drawn, scanner, parts.result, progress),
-        )
-        write_files(work, checked())
         findings, left_out = exported()
         write_files(work, drawn())
         records.write_left_out(work, [*optimum.left_out, *parts.left_out, *left_out])

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.angles import AngleSet, load_angles
 from scanwright.design.arrays import Setting
+from scanwright.design.findings import Finding
 from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
 from scanwright.design.task.task import LoadedTask, load_task, shipped_tasks
 from scanwright.pipeline.manifest import require_as_built
@@ -21,11 +23,13 @@ class BuiltScanner:
         loaded: the task, with the motion that was built.
         angles: the angle set.
         shadow: the beams that the parts block; None if the folder has no `own_body.npz`.
+        checks: of its parts; none if the folder has no `checks.json`.
     """
 
     loaded: LoadedTask
     angles: AngleSet
     shadow: SelfOcclusion | None
+    checks: tuple[Finding, ...] = ()
 
     @property
     def setting_rad(self) -> Setting:
@@ -46,6 +50,7 @@ def open_built(folder: Path) -> BuiltScanner:
         BuildError: a file of the build is gone or was edited, or is not as a build writes it.
     """
     require_as_built(folder)
-    angles, own_body = load_angles(folder / "angles.json"), folder / "own_body.npz"
+    angles, own_body, checks = load_angles(folder / "angles.json"), folder / "own_body.npz", folder / "checks.json"
     loaded = task_as_built(load_task(folder / "task.toml"), angles)
-    return BuiltScanner(loaded, angles, load_self_occlusion(own_body)[0] if own_body.is_file() else None)
+    shadow = load_self_occlusion(own_body)[0] if own_body.is_file() else None
+    return BuiltScanner(loaded, angles, shadow, read_checks(checks) if checks.is_file() else ())

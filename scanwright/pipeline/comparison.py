@@ -8,6 +8,7 @@ from pathlib import Path
 from scanwright.design.evaluation.comparison import ComparisonRow, compare
 from scanwright.design.evaluation.comparison_picture import compare_picture
 from scanwright.design.evaluation.comparison_table import notes, short_table, table, write_csv
+from scanwright.design.findings import Finding, sentence
 from scanwright.design.progress import Progress
 from scanwright.design.search.mounts.gain import gain_lines, verdict
 from scanwright.design.search.optimum import Optimum, find_optimum
@@ -15,14 +16,25 @@ from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.built_scanner import BuiltScanner
 from scanwright.pipeline.folder import report_folder
 
+VIBRATION = "natural_frequency"
+"""Code of the check that a comparison repeats."""
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """The rows of a comparison, and the folder that it was written to."""
+    """A comparison.
+
+    Attributes:
+        optimum: of the task.
+        rows: of the table.
+        folder: that it was written to.
+        vibration: check of a build's natural frequency; None without a build.
+    """
 
     optimum: Optimum
     rows: list[ComparisonRow]
     folder: Path
+    vibration: Finding | None = None
 
     def lines(self, in_full: bool = False) -> list[str]:
         """Return the comparison as lines; all columns and their meaning only `in_full`."""
@@ -31,6 +43,7 @@ class Comparison:
                 *short_table(self.rows),
                 "time of the measurement; beams: geometric mean within the ball; blind: share of the region never seen",
                 *verdict(self.optimum.gains),
+                *self._vibration_lines(),
                 f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
             ]
         return [
@@ -39,8 +52,12 @@ class Comparison:
             *(f"optimum: {line}" for line in gain_lines(self.optimum.gains)),
             *(f"optimum: {line}" for line in self.optimum.preferred_lines()),
             *notes(self.optimum.loaded, self.rows),
+            *self._vibration_lines(),
             f"wrote compare.csv, compare.png and compare.svg to {self.folder}",
         ]
+
+    def _vibration_lines(self) -> list[str]:
+        return [] if self.vibration is None else [f"with parts: {sentence(self.vibration)}"]
 
 
 def write_comparison(
@@ -58,4 +75,5 @@ def write_comparison(
         rows = compare(optimum.loaded, optimum.problem, optimum.search.best[0], optimum.mounts, progress, setting)
         write_csv(folder / "compare.csv", rows)
         compare_picture(folder / "compare.png", rows, f"{loaded.task.name}: {optimum.title}, compared")
-    return Comparison(optimum, rows, target)
+    checks = () if built is None else built.checks
+    return Comparison(optimum, rows, target, next((each for each in checks if each.code == VIBRATION), None))

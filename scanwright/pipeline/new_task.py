@@ -115,13 +115,24 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
 
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
     """Reject a lidar whose weight, off a level axis, needs more than the continuous torque of the servo."""
-    off_m = abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
-    needed = lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * off_m
+    needed = torque_nm(lidar, None)
     if needed > servo.continuous_torque_nm:
         raise TaskError(
-            f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * off_m:.0f} mm off "
-            f"a level axis, need {needed:.2g} N m, and the servo gives {servo.continuous_torque_nm:.2g} N m all day"
+            f"{lidar.name} on {servo.name}: these cannot work together: {lidar.mass_g:g} g, {1000 * _off_m(lidar):.0f} "
+            f"mm off a level axis, need {needed:.2g} N m, and the servo gives {servo.continuous_torque_nm:.2g} N m all "
+            "day"
         )
+
+
+def torque_nm(lidar: Lidar, ring: SlipRing | None) -> float:
+    """Return the torque that a lidar's weight, off a level axis, and the drag of a ring need together."""
+    drag_nm = 0.0 if ring is None or ring.friction_nm is None else ring.friction_nm[1]
+    return lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * _off_m(lidar) + drag_nm
+
+
+def _off_m(lidar: Lidar) -> float:
+    """Return the distance of a lidar's middle from its optical centre."""
+    return abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
@@ -139,7 +150,7 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
         return bool(data_fault(ring, lidar)), ring.bore_mm == 0, ring.max_rpm is None, ring.name
 
     rings = sorted((product for product in products if isinstance(product, SlipRing)), key=order)
-    strong = [ring for ring in rings if ring.friction_nm is None or ring.friction_nm[1] <= servo.continuous_torque_nm]
+    strong = [ring for ring in rings if torque_nm(lidar, ring) <= servo.continuous_torque_nm]
     why = ""
     for ring in (*(strong if servo.position_feedback_deg == 360 else ()), None):
         name = None if ring is None else ring.name

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from scanwright.cad.checks.limits import at_most, horn_check, note, tidy
+from scanwright.cad.checks.table import SHOCK_G
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
 from scanwright.cad.layout.belt.stack import BeltStack
@@ -28,14 +29,14 @@ def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float
     if stack is None:
         return []
     pull = belt_pull(stack, torque)
-    upper, lower = carrier_forces(stack, weight, 1000 * float(rotor.centre_m[2]), pull.shaft_n)
+    upper, lower = carrier_forces(stack, weight.at_g(SHOCK_G), 1000 * float(rotor.centre_m[2]), pull.shaft_n)
     name, limit = stack.carrier.name, stack.carrier.static_load_n
     strand = pull.strand_n + pull.working_n / 2
     what = f"pull of the tighter strand of {stack.belt.name}, pre-load {pull.strand_n:.1f} N"
     on_horn = f"tilt moment on the horn of {scanner.servo.name} by the belt's pull of {pull.shaft_n:.1f} N"
     tension = at_most("belt_tension", strand, stack.belt.working_tension_n, "N", BELT, what)
     return [
-        at_most("bearing_load", max(upper, lower), limit, "N", BEARING, f"load across {name}, weight and belt"),
+        at_most("bearing_load", max(upper, lower), limit, "N", BEARING, f"load across {name}, {SHOCK_G:g} g and belt"),
         note("bearing_axial", weight.along_n, "N", BEARING, f"load along {name}, carried by one of the two"),
         tension,
         horn_check(scanner, pull.horn_nm, on_horn, "choose a servo with a higher radial load"),

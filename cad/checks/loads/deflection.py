@@ -22,6 +22,7 @@ from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.statics.sag import Sag, linkage_sag, with_shaft
+from scanwright.cad.statics.spring import Spring
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
@@ -41,8 +42,10 @@ class BeamError:
 
 def deflection_checks(
     scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]
-) -> list[Finding]:
+) -> tuple[list[Finding], Spring | None]:
     """Check the constant part, which a calibration estimates, and the part that changes over a turn.
+
+    Also returns what lies between hub and lidar as a spring, if it supports the lidar.
 
     Args:
         scanner: angles and products.
@@ -56,7 +59,7 @@ def deflection_checks(
         sag = sag_of(scanner, assembly, bodies, meshes)
     except RuntimeError as error:
         message = f"{ALIGNMENT_LINKAGE}: nothing supports the seat: no equilibrium by finite elements ({error})"
-        return [Finding("deflection", "error", ALIGNMENT_LINKAGE, message, None, tidy(limit), "deg")]
+        return [Finding("deflection", "error", ALIGNMENT_LINKAGE, message, None, tidy(limit), "deg")], None
     constant, turning = split(sag.rotation_rad, sag.shift_m, down)
     errors = split(sag.rotation_error_rad, sag.shift_error_m, down)
     what = "bend of linkage and shaft by gravity, the same in every position: calibrate estimates it"
@@ -64,7 +67,7 @@ def deflection_checks(
     if fixed.severity == "error" and fixed.value is not None and fixed.value <= FAILS_DEG:
         fixed = replace(fixed, severity="warning")
     what = "bend by gravity that changes over a turn, which no calibration corrects"
-    return [fixed, _check("deflection_turning", turning, errors[1], limit, what)]
+    return [fixed, _check("deflection_turning", turning, errors[1], limit, what)], sag.spring
 
 
 def sag_of(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]) -> Sag:

@@ -21,6 +21,7 @@ from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
 from scanwright.cad.parts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.cad.statics.spring import Spring
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
 
@@ -30,13 +31,16 @@ LEAST_ERROR = 0.25  # share of the lean: CalculiX differs by less (`benchmarks.c
 
 def mount_checks(
     scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], meshes: Mapping[str, TriMesh]
-) -> list[Finding]:
-    """Check the lean of a scanner on its mount, if it has one; arguments as for `deflection_checks`."""
+) -> tuple[list[Finding], Spring | None]:
+    """Check the lean of a scanner on its mount, and return the mount as a spring, if it has one.
+
+    Arguments as for `deflection_checks`.
+    """
     if BASE_MOUNT not in assembly.made:
-        return []
+        return [], None
     printer, layout = scanner.printer, assembly.layout
     try:
-        turned, more = mount_sag(
+        turned, more, spring = mount_sag(
             meshes[BASE_MOUNT],
             layout.deck,
             layout.drive.mounted,
@@ -46,7 +50,7 @@ def mount_checks(
         )
     except RuntimeError as error:
         message = f"{BASE_MOUNT}: nothing supports its load: no equilibrium by finite elements ({error})"
-        return [Finding("mount_lean", "error", BASE_MOUNT, message, None, LEAN_DEG, "deg")]
+        return [Finding("mount_lean", "error", BASE_MOUNT, message, None, LEAN_DEG, "deg")], None
     lean = np.degrees(scanner.angles.T_world_rot(0.0)[:3, :3] @ (turned + more))
     value = round(float(np.linalg.norm(lean)), 6)
     error_deg = max(math.degrees(float(np.linalg.norm(more))), LEAST_ERROR * value)
@@ -58,7 +62,7 @@ def mount_checks(
         "x, y and z"
     )
     hint = "add this rotation to the scanner's pose on the robot"
-    return [Finding("mount_lean", severity, BASE_MOUNT, message, tidy(value), LEAN_DEG, "deg", hint)]
+    return [Finding("mount_lean", severity, BASE_MOUNT, message, tidy(value), LEAN_DEG, "deg", hint)], spring
 
 
 def carried(scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial]) -> Carried:

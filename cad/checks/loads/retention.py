@@ -20,7 +20,7 @@ from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, SERVO_CASE, TRIPOD
+from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TRIPOD
 from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
@@ -42,6 +42,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
         scanner = assembly.layout.scanner
         servo = scanner.servo
         kinds = {SERVO_CASE: {servo.front.kind, servo.rear.kind}, LIDAR_BODY: {scanner.lidar.base.kind}}
+        kinds |= {horn: {servo.horn_kind or "tapped"} for horn in (SERVO_HORN, SERVO_OUTPUT)}
         return MOULDED if "self_tapping" in kinds.get(body, ()) else BOUGHT
     process = assembly.parts[body].process
     if process == "printed":

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from scanwright.cad.assembly.scenes import StepScene
 from scanwright.cad.drawings.dimensions import spread
 from scanwright.cad.files.manual.painter import Piece, painted, png_bytes, rod
-from scanwright.cad.files.manual.scenes import StepScene
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.screws import Screw

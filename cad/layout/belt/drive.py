@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from scanwright.cad.layout import names
-from scanwright.cad.layout.belt.loads import belt_shaft_bend
+from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_shaft_bend
 from scanwright.cad.layout.belt.plate import plate_of
 from scanwright.cad.layout.belt.sizing import belt_stack
 from scanwright.cad.layout.belt.stack import (
@@ -82,6 +82,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         records=(stack, tower, plate),
         shaft=names.MAIN_SHAFT,
         bend=belt_shaft_bend(stack),
+        gives=belt_shaft_bend(stack, 1 / SEAT_N_PER_M),
         mounted=mounted,
         servo_pose=(stack.turn(), stack.servo_origin()),
         floor=stack.pulley_top,

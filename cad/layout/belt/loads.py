@@ -14,6 +14,7 @@ from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, Weight
 
 PRELOAD_N = 10.0  # least, of each strand: what a small belt needs to sit in its grooves; assumed
+SEAT_N_PER_M = 10e6  # sideways stiffness of a bearing in a printed seat: assumed
 PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack strand tight
 
 
@@ -64,23 +65,29 @@ def belt_nm_per_rad(stack: BeltStack) -> float:
     return 2 * stack.belt.stiffness_n / (stack.centre / 1000) * (stack.pitch_radius / 1000) ** 2
 
 
-def belt_shaft_bend(stack: BeltStack) -> ShaftBend:
+def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
     """Return how far the shaft gives way at the hub.
 
-    A tube on two rigid supports, its hub beyond the upper one; the belt is two springs against turning.
+    A tube on two supports, its hub beyond the upper one; the belt is two springs against turning.
+
+    Args:
+        stack: its lengths and radii.
+        seat_m_per_n: how far a force moves each support.
     """
     EI = ALUMINIUM_PA * _second_moment(stack)
     span = (stack.upper_middle - stack.lower_middle) / 1000
     over = (stack.hub_bottom - stack.upper_middle) / 1000
     coupled = over * span / (3 * EI) + over**2 / (2 * EI)
     area = math.pi * (stack.tube_diameter**2 - stack.shaft_bore**2) / 4e6
+    carried = np.array([[1 + over / span, over / span], [1 / span, 1 / span]])  # by the supports, of force and moment
     return ShaftBend(
         compliance=np.array(
             [
                 [over**2 * span / (3 * EI) + over**3 / (3 * EI), coupled],
                 [coupled, span / (3 * EI) + over / EI],
             ]
-        ),
+        )
+        + seat_m_per_n * carried @ carried.T,
         twist_rad_per_nm=1 / belt_nm_per_rad(stack) + _twist(stack),
         stretch_m_per_n=over / (ALUMINIUM_PA * area),
     )

@@ -26,6 +26,7 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station
 from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.joints import fixing_of
+from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
@@ -72,6 +73,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         )
     leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
     cage_n_per_m = 0.0 if cage is None else stiffness_n_per_m(stack, cage.ears)
+    bend = partial(shaft_bend, stack, shaft_modulus_pa(scanner, stack), cage_n_per_m)
     height = stack.ring_top if stack.bearing is None else stack.cage_top
     return DriveLayout(
         envelope=envelope,
@@ -79,7 +81,8 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         stations=tuple(_stations(scanner, stack, frame, cage)),
         records=tuple(record for record in (stack, frame, adapter, cage) if record is not None),
         shaft=stack.shaft,
-        bend=shaft_bend(stack, shaft_modulus_pa(scanner, stack), cage_n_per_m),
+        bend=bend(),
+        gives=bend(horn_rad_per_nm=HORN_TILTS_RAD / trusted_moment_nm(scanner)),
         mounted=mounted,
         servo_pose=(np.eye(3), np.array([0.0, 0.0, stack.horn])),
         floor=height,

@@ -19,15 +19,14 @@ from scanwright.cad.layout.loads import (
     METAL_POISSON,
     ShaftBend,
     Weight,
-    rated_moment_nm,
     tilt_sine,
+    trusted_moment_nm,
     weight_of,
 )
 from scanwright.design.catalogue.products import Bearing
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
-UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up
 LINKAGE_OFF_AXIS_MM = 20.0
 JOURNAL_WALL = 1.8  # of the bearing's sleeve between bore and wires
@@ -85,19 +84,14 @@ def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
 
     A horn that its maker does not rate is trusted with little.
     """
-    return _is_rated(scanner, heaviest(scanner, stack).moment_nm)
+    return heaviest(scanner, stack).moment_nm <= trusted_moment_nm(scanner)
 
 
 def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
     """Whether the horn alone bears the heaviest linkage and a bar, of this mass and height, that balances it."""
     weight = heaviest(scanner, stack)
     bar = bar_g / 1000 * STANDARD_GRAVITY_M_S2 * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
-    return _is_rated(scanner, weight.across_n * weight.lever_m + bar)
-
-
-def _is_rated(scanner: Scanner, moment_nm: float) -> bool:
-    rated = rated_moment_nm(scanner)
-    return moment_nm <= (UNRATED_NM if rated is None else rated)
+    return weight.across_n * weight.lever_m + bar <= trusted_moment_nm(scanner)
 
 
 def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: ShaftMetal = ALUMINIUM) -> Supported:
@@ -141,7 +135,9 @@ def hanging(weight: Weight, stack: DirectStack, modulus_pa: float) -> Supported:
     return Supported(weight.moment_nm, 0.0, slope)
 
 
-def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0) -> ShaftBend:
+def shaft_bend(
+    stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0, horn_rad_per_nm: float = 0.0
+) -> ShaftBend:
     """Return how far the beam from horn to hub gives way at the hub.
 
     Round sections or tubes (Timoshenko), clamped in the horn; a spring braces the bearing's sleeve sideways.
@@ -150,6 +146,7 @@ def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_
         stack: its lengths and radii.
         modulus_pa: of elasticity.
         cage_n_per_m: sideways stiffness of the cage that holds the bearing, 0 without one.
+        horn_rad_per_nm: how far a moment tilts the horn.
     """
     length = (stack.hub_bottom - stack.horn) / 1000
     above_horn, thick = stack.slices(1000 * length, stack.waist_diameter)
@@ -163,6 +160,7 @@ def shaft_bend(stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_
     free = np.array(
         [[(bend * lever**2).sum() + shear, (bend * lever).sum()], [(bend * lever).sum(), bend.sum()]]
     )  # of force and moment at the end
+    free += horn_rad_per_nm * np.array([[length**2, length], [length, 1.0]])
     reach = np.array([1.0, (stack.bearing_middle - stack.hub_bottom) / 1000])  # the bearing moves by this
     braced = np.outer(free @ reach, reach @ free) * cage_n_per_m / (1 + cage_n_per_m * float(reach @ free @ reach))
     return ShaftBend(

@@ -21,7 +21,8 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 SHAFT_PLAIN = 12.0  # without a ring, where the heads of the horn's screws leave room
-SHAFT_RUNNING_GAP = 0.4  # least gap between shaft and bore, on the diameter
+SHAFT_LOOSE = 1.0  # likewise at most, where the heads of the horn's screws leave no room for more
+SHAFT_SLIDES = 0.05  # in the bore of a ring, whose set screws hold it, on the diameter
 SHAFT_MIN = 8.0
 COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less only where the heads beside it stand close
 
@@ -87,8 +88,9 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
             f"slip_ring {ring.name}: bore_mm = 0: direct drive needs a ring with a through bore: the shaft from horn "
             f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {_least_bore():.1f}"
         )
-    # half millimetres: bar stock and reamers come in them
-    shaft = math.floor((ring.bore_mm - SHAFT_RUNNING_GAP) * 2) / 2
+    shaft = round(ring.bore_mm - SHAFT_SLIDES, 2)
+    if shaft / 2 > _room_on_horn(scanner.servo) > (ring.bore_mm - SHAFT_LOOSE) / 2:
+        shaft = math.floor(4 * _room_on_horn(scanner.servo)) / 2  # the ring's set screws centre it
     if shaft < SHAFT_MIN:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: a shaft of {shaft:g} mm bends under the lidar; "
@@ -113,7 +115,7 @@ def _room_on_horn(servo: Servo) -> float:
 
 
 def _least_bore() -> float:
-    return SHAFT_MIN + SHAFT_RUNNING_GAP
+    return SHAFT_MIN + SHAFT_SLIDES
 
 
 def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, float]:

@@ -22,7 +22,7 @@ from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
-from scanwright.cad.layout.rotor.linkage import CROSS_SCREW, Ear, LinkageBody
+from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, Ear, LinkageBody
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
@@ -52,7 +52,7 @@ SECTIONS = (
 )
 SCREW = SCREWS["M4"]
 UPRIGHT = 1e-6  # sine of the tilt
-EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_SCREW.head_room + 0.5  # clear of the cross screws
+EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_ROOM + 0.5  # clear of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
 FROM_HUB = 1.0
 TRIM = 5.0  # that the bar can slide either way: a lidar's centre of mass is undocumented

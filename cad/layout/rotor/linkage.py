@@ -31,6 +31,8 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has to hold
+CROSS_WASHER_MM, CROSS_WASHER_THICK = 9.0, 0.8  # ISO 7093: a wide one, the pressure on plastic limits the friction
+CROSS_ROOM = CROSS_WASHER_MM / 2 + 0.2  # radius of the way of washer, head and driver
 CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
@@ -225,7 +227,7 @@ def _cross_azimuths(normal: Array) -> tuple[float, ...]:
 
 
 def cross_seat_mm(stack: Hub) -> float:
-    """Distance from the axis of the faces that the heads of the cross screws bear on."""
+    """Distance from the axis of the washers' faces that the heads of the cross screws bear on."""
     return stack.hub_radius - CROSS_SUNK
 
 

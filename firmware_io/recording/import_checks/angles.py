@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
-from scanwright.design.arrays import Floats, Times
+from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
@@ -20,6 +20,7 @@ _LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are sma
 _STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
 _SIGMAS = 8.0  # of the differences to the neighbours: noise alone never gets there
 _MOVING_RAD_S = math.radians(1.0)  # slower than any sweep
+_RESTS, _CAUGHT_UP = 5, 1.8  # steps of 0, and times the usual speed after them: no servo starts so fast
 _FASTEST = 4.0  # times the usual speed: no servo jumps to it for one sample
 
 
@@ -120,6 +121,11 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
         return
     far = step_rad > max(_LEAST_RAD, _FASTEST * float(np.median(step_rad[moving])))
     jump = far & (speed > _FASTEST * np.median(speed[moving]))
+    if np.mean(moving) > 0.5:  # one that turns, whose angle stays for some samples and then catches up
+        caught_up = (step_rad > max(_LEAST_RAD, _CAUGHT_UP * float(np.median(step_rad[moving])))) & (
+            speed > _CAUGHT_UP * np.median(speed[moving])
+        )
+        jump |= caught_up & (_rests_before(step_rad) >= _RESTS)
     if jump.any():
         worst_rad = float(step_rad[jump].max())
         yield Finding(
@@ -132,6 +138,13 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
             float(np.sum(jump)),
             hint="check the source of the angle around these times",
         )
+
+
+def _rests_before(step_rad: Floats) -> Ints:
+    """Return how many steps of exactly 0 are right before each step, shape (n,)."""
+    number = np.arange(step_rad.size)
+    last_moved = np.maximum.accumulate(np.where(step_rad > 0, number, -1))
+    return number - 1 - np.concatenate([[-1], last_moved[:-1]])
 
 
 def _wrapped(angle_rad: Floats) -> Floats:

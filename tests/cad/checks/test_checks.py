@@ -15,10 +15,9 @@ from scanwright.cad.assembly import masses
 from scanwright.cad.checks import run
 from scanwright.cad.checks.checks_json import checks_text, failure_lines, read_checks
 from scanwright.cad.checks.clearance import together_check, turning_check
-from scanwright.cad.checks.islands import islands_check, islands_of
 from scanwright.cad.checks.limits import at_least, at_most
 from scanwright.cad.checks.loads.mechanics import mechanics_checks
-from scanwright.cad.checks.printing import printing_checks, thin_walls
+from scanwright.cad.checks.printing import islands_check, islands_of, printing_checks, thin_walls
 from scanwright.cad.checks.products import known_errors
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.cad.geometry.inertia import Inertial

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scanners import CAPSULE, RING, ROLLING, TILTED, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.files.bom import _wiring, bom_text, items_of
 from scanwright.cad.files.manual.instructions import instructions_text, screws_in_words
-from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm

@@ -133,7 +133,7 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
 
 def test_a_ring_still_asks_for_a_turned_shaft():
     stack = drive_of(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S")).stack
-    assert stack.cup_bore == 0 and stack.shaft_diameter == 12.0 and stack.shaft == "servo_shaft"
+    assert stack.cup_bore == 0 and stack.shaft_diameter == 12.65 and stack.shaft == "servo_shaft"
 
 
 def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():

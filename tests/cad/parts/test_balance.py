@@ -13,9 +13,9 @@ from scanners import GROUND_AHEAD, ROLLING, bare_linkage, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies, rotor_moment, rotor_of
+from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
 from scanwright.cad.files.manual.instructions import instructions_text
-from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.geometry.inertia import of_line, of_solid
 from scanwright.cad.layout.cables.leads import SAMPLE
 from scanwright.cad.layout.loads import RUBS_NM

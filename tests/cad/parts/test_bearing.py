@@ -272,7 +272,7 @@ def test_all_that_is_out_of_line_leaves_half_of_the_horns_rating(servo, angles):
 
 
 @pytest.mark.parametrize(
-    ("servo", "stall_nm", "length"), [("MX-64R", 6.0, 20.0), ("MX-28", 2.5, 20.0), ("MX-106", 8.4, 32.0)]
+    ("servo", "stall_nm", "length"), [("MX-64R", 6.0, 24.0), ("MX-28", 2.5, 20.0), ("MX-106", 8.4, 32.0)]
 )
 def test_the_waist_is_as_short_as_a_stalled_servo_allows_and_as_thick_as_the_horn_bears(servo, stall_nm, length):
     """A thin one twists under what is out of balance, which changes over a turn; a long one makes a soft cage."""

@@ -13,6 +13,7 @@ from cadquery import Vector
 from scanners import CAPSULE, digest_of, mount_offset_mm, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.checks.printing import thin_walls
 from scanwright.cad.checks.remarks import without_traps
 from scanwright.cad.checks.run import run_checks
@@ -20,7 +21,6 @@ from scanwright.cad.drawings.files import drawing_of
 from scanwright.cad.drawings.write import Words, drawn_on
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
-from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.files.urdf import urdf_text
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.geometry.mesh import mesh_of

@@ -207,12 +207,12 @@ def test_a_capsule_ring_has_no_place_on_a_shaft():
 
 
 def test_a_bore_too_small_for_a_shaft_is_refused():
-    with pytest.raises(BuildError, match=r"bore_mm = 6: a shaft of 5.5 mm .* bore_mm >= 8.4"):
+    with pytest.raises(BuildError, match=r"bore_mm = 6: a shaft of 5.95 mm .* bore_mm >= 8.1"):
         drive_of(with_ring(bore_mm=6.0))
 
 
 def test_a_wide_bore_meets_the_heads_of_the_horn_screws():
-    with pytest.raises(BuildError, match=r"servo_shaft: collar radius = 12.5 mm"):
+    with pytest.raises(BuildError, match=r"servo_shaft: collar radius = 12.675 mm"):
         drive_of(with_ring(bore_mm=25.4, outer_diameter_mm=86.0))
 
 

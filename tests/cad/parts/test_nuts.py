@@ -8,10 +8,10 @@ import pytest
 from scanners import TILTED, bare_linkage, scanner_at
 
 from scanwright.cad import outlines, solids
+from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.checks.remarks import without_traps
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
-from scanwright.cad.files.manual.scenes import scenes_of
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.labels.fit_coupon import fit_coupon
 from scanwright.cad.layout.direct.cage import has_room

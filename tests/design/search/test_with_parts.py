@@ -153,3 +153,16 @@ def test_what_cannot_be_built_is_refused_with_its_reason():
 def test_a_sweep_keeps_its_setting():
     p = problem("URG-04LX")
     assert equivalents(replace(p, sweep=object()), (1.0, 2.0, 3.0, 4.0), AngleRanges()) == [(1.0, 2.0, 3.0, 4.0)]
+
+
+def test_a_setting_whose_parts_failed_a_check_is_not_chosen_again():
+    p = problem()
+    families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0))
+    fixed = AngleRanges(alpha_rot_deg=0, beta_rot_deg=(0, 90), alpha_laser_deg=0, beta_laser_deg=(0, 90))
+    first, second = sorted(families, key=lambda f: f.score.J)
+    failed = {first.angles_deg: "the mount bends"}
+    chosen = choose_with_parts(p, families, fixed, Limits(), ConeRegion(p, 0.1), no_progress, failed)
+    assert chosen.family.angles_deg == second.angles_deg
+    assert any("fail a check: the mount bends" in reason for reason in chosen.refused)
+    with pytest.raises(BuildError, match="the mount bends"):
+        choose_with_parts(p, (first,), fixed, Limits(), ConeRegion(p, 0.1), no_progress, failed)

@@ -70,12 +70,11 @@ def test_the_commands_publish_the_frames():
 def test_what_changed_is_said_in_words():
     lean, shift, most = what_changed(DESIGNED, CALIBRATED)
     assert lean == (
-        "the lidar leans 0.500 deg (sigma 0.0081) from where it was (design): +0.300 about x, -0.400 about y of the "
-        "rotation frame"
+        "lidar tilt: 0.500 deg (sigma 0.0081) from the design: +0.300 about x, -0.400 about y of the rotation frame"
     )
-    assert "lies 5.00 mm (sigma 0.14) from where it was: +3.00 along x, -4.00 along y" in shift
-    assert "10 m away lies up to 92.3 mm elsewhere" in most  # 10 m times 0.5 deg, and 5 mm
-    assert what_changed(DESIGNED, DESIGNED)[0].startswith("the lidar leans 0.000 deg from")
+    assert "5.00 mm (sigma 0.14) from the design: +3.00 along x, -4.00 along y" in shift
+    assert "effect at 10 m: up to 92.3 mm" in most  # 10 m times 0.5 deg, and 5 mm
+    assert what_changed(DESIGNED, DESIGNED)[0].startswith("lidar tilt: 0.000 deg from")
 
 
 @pytest.mark.parametrize(("text", "says"), [("<robot", "no URDF"), ("<robot/>", "no joint 'servo_mount'")])

@@ -41,6 +41,7 @@ FILES = {
     "exploded.glb",
     "assembly.md",
     "bom.csv",
+    "template.pdf",
     "wiring.md",
     "wiring.svg",
     "scanner.urdf",
@@ -57,7 +58,7 @@ FILES = {
     *(f"ros2/meshes/{part}.stl" for part in PARTS),
     *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in PARTS),
     *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),
-    *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon") if part not in METAL),
+    *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon", "test_plate") if part not in METAL),
     *(f"print/plate_1.{kind}" for kind in ("3mf", "png")),
     *(f"assembly/step_{number:02d}.png" for number in range(1, 10)),
 }
@@ -413,14 +414,15 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
 def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     found = [Finding("turn_from_metal", "note", "shaft", "shaft: of metal", hint="have it turned")]
     checks = tuple(Finding("unverified", "note", "UTM", f"UTM: {v} is not verified") for v in ("a = 1", "b = 2"))
-    told = SimpleNamespace(table=list, lines=list)
+    told = SimpleNamespace(table=list, lines=list, hole_lines=lambda **_: [], preferred_lines=list)
     made = Made(told, told, told, tuple(found), ())
-    gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
+    first, *gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
+    assert first == f"wrote 1 files to {tmp_path}"
     assert gathered[0] == "warning: slow"
     assert gathered[1] == "note: shaft: of metal: have it turned"
-    assert gathered[2].startswith("warning: UTM: unverified values that shape parts: 2: measure yours")
-    assert len(gathered) == 4
-    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[:3] == [
+    assert gathered[2].startswith("warning: unverified values shape parts (UTM: 2")
+    assert len(gathered) == 3
+    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[1:] == [
         "note: shaft: of metal: have it turned",
         "note: UTM: a = 1 is not verified",
         "note: UTM: b = 2 is not verified",

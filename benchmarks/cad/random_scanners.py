@@ -1,0 +1,138 @@
+"""Random scanners of all that go together: `python -m benchmarks.cad.random_scanners COUNT [SEED]`.
+
+Every lidar, servo and ring that `benchmarks.cad.combinations` lays out takes its turn, in a random order; attitude,
+printer and modules are random. Each scanner is made and checked in memory as a build does it. One line for each that
+does not pass, then how many passed, were refused (reasons counted), failed loudly (with which checks), and failed
+silently: an exception that is no BuildError, or all checks passed and this script, which reads the solids and records
+itself, still finds a fault. Exit code 1 if one failed silently.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.cad.combinations import TILTED, general, laid_out_at, screws_without_a_hole
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.checks.run import run_checks
+from scanwright.cad.layout.names import TRIPOD_FOOT
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
+from scanwright.design.errors import BuildError
+from scanwright.design.findings import errors_in
+from scanwright.design.progress import no_progress
+from scanwright.design.scanner import Modules, Scanner, scanner_of
+
+FOOT_SHARE = 0.1  # of the scanners that require a tripod foot
+SOLID_MM3 = 1.0  # less than any part
+Products = tuple[str, str, str | None]
+
+
+def members(catalogue: Catalogue) -> list[Products]:
+    """Return every lidar, servo and ring that can be laid out at one attitude at least."""
+
+    def fits(lidar: str, servo: str, ring: str | None) -> bool:
+        for angles in (TILTED, (0.0, 0.0, 0.0, 0.0)):
+            try:
+                laid_out_at(catalogue, angles, lidar, servo, ring)
+            except BuildError:
+                continue
+            return True
+        return False
+
+    lidars, servos, rings = (
+        [one.name for one in catalogue if isinstance(one, kind)] for kind in (Lidar, Servo, SlipRing)
+    )
+    return [each for each in itertools.product(lidars, servos, [None, *rings]) if fits(*each)]
+
+
+def random_scanner(catalogue: Catalogue, products: Products, rng: np.random.Generator) -> Scanner:
+    """Return a scanner of these products: a random axis, and a lidar that does not hang upside down over it."""
+    lidar, servo, ring = products
+    alpha_rot, beta_rot = rng.choice(
+        [(0.0, 0.0), (0.0, 90.0), tuple(rng.uniform(-180, 180, 2) * [1.0, 0.5])], p=[0.25, 0.15, 0.6]
+    )
+    chosen = AngleSet(
+        task="random",
+        angles_deg=Angles(
+            alpha_rot=round(float(alpha_rot), 2),
+            beta_rot=round(float(beta_rot), 2),
+            alpha_laser=round(float(rng.uniform(-89, 89)), 2),
+            beta_laser=round(float(rng.uniform(-89, 89)), 2),
+        ),
+        sensor=lidar,
+        servo=servo,
+        slip_ring=ring,
+        motion={"mode": "spin", "period_s": 10.0}
+        if ring
+        else {"mode": "sweep", "limits_deg": [-90, 90], "period_s": 10.0},
+    )
+    printers = [one.name for one in catalogue if isinstance(one, Printer)]
+    modules = Modules(tripod_foot=bool(rng.random() < FOOT_SHARE))
+    return scanner_of(chosen, str(rng.choice(printers)), catalogue, modules=modules)
+
+
+def silent_faults(scanner: Scanner, assembly: Assembly) -> Iterator[str]:
+    """Yield what no check has reported, from solids and records."""
+    for name, solid in assembly.made.items():
+        if not solid.isValid() or len(solid.Solids()) != 1 or solid.Volume() < SOLID_MM3:
+            yield f"{name} is no valid solid"
+    if scanner.modules.tripod_foot and TRIPOD_FOOT not in assembly.made:
+        yield f"{TRIPOD_FOOT} is required and missing"
+    yield from screws_without_a_hole(assembly.layout)
+
+
+def main(count: int, seed: int = 0) -> None:
+    """Print the lines."""
+    catalogue, rng = load_catalogue(), np.random.default_rng(seed)
+    known = members(catalogue)
+    print(f"{len(known)} combinations", flush=True)
+    order = [known[i] for _ in range(count // len(known) + 1) for i in rng.permutation(len(known))][:count]
+    outcomes, refused, failed = Counter[str](), Counter[str](), Counter[str]()
+    for number, products in enumerate(order, start=1):
+        scanner = random_scanner(catalogue, products, rng)
+        angles = scanner.angles.angles_deg
+        at = f"({angles.alpha_rot:g}, {angles.beta_rot:g}, {angles.alpha_laser:g}, {angles.beta_laser:g})"
+        outcome, words = _outcome(scanner, refused, failed)
+        outcomes[outcome] += 1
+        if outcome != "passed":
+            print(
+                f"{number} {' '.join(map(str, products))} at {at} on {scanner.printer.name}: {outcome}: {words}",
+                flush=True,
+            )
+    print(f"{count} scanners: {dict(outcomes)}")
+    for title, counts in (("refused", refused), ("failed", failed)):
+        for reason, n in counts.most_common():
+            print(f"  {title} {n}: {reason}")
+    sys.exit(bool(outcomes["silent"]))
+
+
+def _outcome(scanner: Scanner, refused: Counter[str], failed: Counter[str]) -> tuple[str, str]:
+    """Make and check one scanner."""
+    try:
+        assembly = make_parts(scanner)
+        checks = run_checks(scanner, assembly, no_progress)[0]
+    except BuildError as error:
+        refused[general(str(error), scanner.lidar.name)] += 1
+        return "refused", str(error)
+    except Exception as error:  # any other one is what is looked for
+        return "silent", f"{type(error).__name__}: {error}"
+    errors = errors_in(checks)
+    failed.update({check.code for check in errors})
+    if errors:
+        return "loud", "; ".join(check.message for check in errors)
+    faults = list(silent_faults(scanner, assembly))
+    return ("silent", "; ".join(faults)) if faults else ("passed", "")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))

@@ -1,0 +1,156 @@
+"""Whether a driver reaches every screw in a straight line in the step of assembly that closes its joint: by rays.
+
+A test of solids cannot see it: the driver is no part. What turns may stand at any angle of the axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.scenes import StepScene, scenes_of
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.names import FIXED_CABLES, LIDAR_CABLE, ROTOR_LEADS
+from scanwright.design.arrays import Array
+from scanwright.design.findings import Finding
+from scanwright.design.frames import Rz
+from scanwright.design.scene import ray_caster
+
+# of a hexagon key: radius over its corners with some play, and length of its long arm (ISO 2936)
+KEYS_MM = {
+    "M1.6": (1.2, 46.5),
+    "M2": (1.2, 46.5),
+    "M2.5": (1.4, 52.0),
+    "M3": (1.6, 58.5),
+    "M4": (1.9, 66.0),
+    "M5": (2.4, 74.0),
+    "M6": (3.0, 85.0),
+}
+BY_HAND_MM = (3.0, 0.0)  # a screw of another size has a knob
+RAYS = 12  # around the one along the screw's axis
+OVER_HEAD_MM = 0.2
+STEPS = 72  # angles of the axis
+
+
+@dataclass(frozen=True)
+class Body:
+    """A stiff body that may be in the way; most are never near a driver, and need no tree of their triangles."""
+
+    mesh: TriMesh
+
+    @cached_property
+    def scene(self) -> ray_caster.Scene:
+        """Its triangles, ready to be hit."""
+        return ray_caster.build_scene(self.mesh.vertices[self.mesh.faces] / 1000)
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Low and high corner [mm]."""
+        return self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+
+    def reach_mm(self, starts: Array, directions: Array, length: float) -> Array:
+        """Return how far the nearest ray of each screw gets, infinity beyond a length; shape (..., screws)."""
+        rays = np.broadcast_to(directions, starts.shape)
+        ends = np.stack([starts, starts + length * rays])
+        axes = (0, *range(1, ends.ndim - 1))
+        low, high = self.box
+        if (ends.min(axis=axes) > high).any() or (ends.max(axis=axes) < low).any():
+            return np.full(starts.shape[:-2], np.inf)
+        hits = ray_caster.cast(self.scene, starts.reshape(-1, 3) / 1000, rays.reshape(-1, 3))
+        nearest = 1000 * hits.range_m.reshape(starts.shape[:-1]).min(axis=-1)
+        return np.where(nearest < length, nearest, np.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """A screw that no driver reaches: its number in the joint, the body in the way, and how far that is off [mm]."""
+
+    screw: int
+    body: str
+    after_mm: float
+
+
+def access_checks(assembly: Assembly) -> list[Finding]:
+    """Return an error for each joint with a screw that no driver reaches, or one finding that there is none."""
+    bodies = _bodies(assembly)
+    scenes = scenes_of(assembly, assembly.layout.joints)
+    found = [
+        _error(number, scene, joint, blocked)
+        for number, scene in enumerate(scenes, start=1)
+        for joint, _ in scene.joints
+        if (
+            blocked := blocked_screws(
+                joint,
+                {name: bodies[name] for name in (*scene.there, *scene.comes) if name in bodies},
+                assembly.turning(),
+            )
+        )
+    ]
+    count = sum(joint.count for scene in scenes for joint, _ in scene.joints)
+    message = f"screws: a driver reaches all {count} of them in a straight line, in the step that needs it"
+    return found or [Finding("driver_access", "ok", "screws", message, 0.0, 0.0)]
+
+
+def blocked_screws(joint: Joint, present: Mapping[str, Body], turning: frozenset[str]) -> list[Blocked]:
+    """Return the screws of a joint that no driver reaches.
+
+    Args:
+        joint: its screws are driven from their heads' side.
+        present: bodies that are there, by name.
+        turning: names of those that turn about the axis.
+    """
+    starts, back = driver_rays(joint)
+    length = KEYS_MM.get(joint.screw.name, BY_HAND_MM)[1]
+    moves = joint.part in turning
+    nearest = {
+        name: each.reach_mm(starts, back, length) for name, each in present.items() if (name in turning) == moves
+    }
+    others = {name: each for name, each in present.items() if (name in turning) != moves}
+    if any(np.isfinite(each.reach_mm(starts, back, length)).any() for each in others.values()):
+        turns = np.stack([Rz(2 * math.pi * k / STEPS) for k in range(STEPS)])[:, None, None]
+        at_starts, at_back = ((turns @ rays[..., None])[..., 0] for rays in (starts, back))
+        at = {name: each.reach_mm(at_starts, at_back, length) for name, each in others.items()}
+        best = np.min(list(at.values()), axis=0).argmax(axis=0)
+        nearest |= {name: reach[best, np.arange(joint.count)] for name, reach in at.items()}
+    blocked = []
+    for screw in range(joint.count):
+        body = min(nearest, key=lambda name: float(nearest[name][screw]), default="")
+        if body and math.isfinite(nearest[body][screw]):
+            blocked.append(Blocked(screw + 1, body, float(nearest[body][screw])))
+    return blocked
+
+
+def driver_rays(joint: Joint) -> tuple[Array, Array]:
+    """Return starts [mm] of rays on a driver's axis and rim, shape (screws, rays, 3), and directions (screws, 1, 3)."""
+    radius = KEYS_MM.get(joint.screw.name, BY_HAND_MM)[0]
+    over = OVER_HEAD_MM + (0.0 if joint.fixing == "grub" else joint.screw.head_height)
+    turn = 2 * math.pi * np.arange(RAYS) / RAYS
+    starts, back = [], -np.array([axis.along for axis in joint.axes])
+    for axis, along in zip(joint.axes, back, strict=True):
+        across = np.linalg.svd(along[None])[2][1:]
+        rim = radius * (np.cos(turn)[:, None] * across[0] + np.sin(turn)[:, None] * across[1])
+        starts.append(axis.start + over * along + np.concatenate([np.zeros((1, 3)), rim]))
+    return np.stack(starts), back[:, None]
+
+
+def _bodies(assembly: Assembly) -> dict[str, Body]:
+    """Return everything that is stiff, by name: a cable can be held aside."""
+    names = (*assembly.made, *assembly.bought)
+    soft = {name for name in names if assembly.thing(name) in (ROTOR_LEADS, FIXED_CABLES)}
+    soft |= {name for name in names if name.startswith(LIDAR_CABLE)}
+    return {name: Body(assembly.mesh(name)) for name in names if name not in soft}
+
+
+def _error(number: int, scene: StepScene, joint: Joint, blocked: Sequence[Blocked]) -> Finding:
+    first = min(blocked, key=lambda each: each.after_mm)
+    message = (
+        f"{joint.part} on {joint.onto}: step {number} ({scene.step.title}): no straight line for the key of "
+        f"{len(blocked)} of {joint.count} {joint.screw.name}: {first.body} is in the way, {first.after_mm:.0f} mm away"
+    )
+    return Finding("driver_access", "error", joint.part, message, float(len(blocked)), 0.0)

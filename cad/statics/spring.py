@@ -1,0 +1,87 @@
+"""A printed part between two rigid bodies as one spring with a mass: six displacements, by finite elements.
+
+Displacements and loads are six numbers at the origin of the rotation frame: a rotation [rad] before a shift [m], a
+moment [N m] before a force [N]. One origin for all springs: compliances of springs in a row simply add up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanwright.cad.layout.loads import ShaftBend
+from scanwright.cad.statics import elastic
+from scanwright.cad.statics.rigid import rigid, shared
+from scanwright.design.arrays import Array
+
+MOMENT_FIRST, FORCE_LAST = np.eye(6)[:3], np.eye(6)[3:]  # of six unit loads, shape (3, 6)
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """What lies between two rigid bodies.
+
+    With q the displacement of the first body and e that of the second one against it, the kinetic energy of the spring
+    is that of the mass matrix ((rigid, coupled), (coupled.T, own)) for the speeds of (q, e): Guyan's reduction.
+
+    Attributes:
+        compliance: displacement of the second body against the first one by a load on it, shape (6, 6).
+        rigid: mass matrix if it moves as a rigid body, shape (6, 6).
+        coupled: of rigid movement and deformation, shape (6, 6).
+        own: of its deformation, shape (6, 6).
+    """
+
+    compliance: Array
+    rigid: Array
+    coupled: Array
+    own: Array
+
+
+def of_shaft(bend: ShaftBend, end_mm: float) -> Spring:
+    """Return the massless spring of a shaft whose upper end has a height."""
+    end = np.array([0.0, 0.0, end_mm / 1000])
+    columns = []
+    for moment, force in zip(MOMENT_FIRST.T, FORCE_LAST.T, strict=True):
+        at_end = moment - np.cross(end, force)
+        rotation = bend.rotation_of(force, at_end)
+        columns.append(np.concatenate([rotation, bend.shift_of(force, at_end) - np.cross(rotation, end)]))
+    nothing = np.zeros((6, 6))
+    return Spring(np.stack(columns, axis=1), nothing, nothing, nothing)
+
+
+def wrenches(model: elastic.Model, at: elastic.Places, points: Array, origin: Array) -> Array:
+    """Return the loads of 1 N m and 1 N about an origin on a rigid seat of points (p, 3) [mm], shape (n, 3, 6)."""
+    moments = 1000 * MOMENT_FIRST + np.cross(origin, FORCE_LAST, axisb=0, axisc=0)
+    return elastic.pull(model, at, shared(points, FORCE_LAST, moments))
+
+
+def spring_of(
+    model: elastic.Model, density_g_cm3: float, seat: tuple[elastic.Places, Array, Array], R: Array, origin: Array
+) -> Spring:
+    """Return a part as a spring.
+
+    Args:
+        model: its cells.
+        density_g_cm3: of its material.
+        seat: points of the second body's seat in it, the same in the grid's frame (p, 3) [mm], and the displacements
+            [mm] of all nodes by `wrenches`, shape (n, 3, 6).
+        R: grid's frame in the rotation frame, shape (3, 3).
+        origin: of the rotation frame, in the grid's frame [mm], shape (3,).
+    """
+    at, points, moved = seat
+    shift, rotation = rigid(points, elastic.moved(model, at, moved))
+    shift = (shift + np.cross(rotation, origin, axisa=0, axisc=0)) / 1000
+    compliance = np.concatenate([rotation, shift])
+    kg, middles, shares = elastic.lumps(model, density_g_cm3)
+    turned = np.cross(np.eye(3), (middles - origin)[:, None] / 1000).transpose(0, 2, 1)
+    as_one = np.concatenate([turned, np.tile(np.eye(3), (len(kg), 1, 1))], axis=2)
+    bent = np.einsum("ca,caik->cik", shares, moved[model.nodes]) / 1000 @ np.linalg.inv(compliance)
+    turn = np.kron(np.eye(2), R)
+
+    def mass(one: Array, other: Array) -> Array:
+        return turn @ np.einsum("c,cik,cil->kl", kg, one, other) @ turn.T
+
+    return Spring(
+        turn @ (compliance + compliance.T) / 2 @ turn.T, mass(as_one, as_one), mass(as_one, bent), mass(bent, bent)
+    )

@@ -1,0 +1,1 @@
+"""Clouds of any size: read, surveyed and written part by part."""

@@ -1,0 +1,86 @@
+"""A cloud in parts, and what must be known of all of them before the first is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scanwright.design import frames
+from scanwright.design.arrays import Vector
+from scanwright.firmware_io.clouds.cloud import Cloud
+
+Again = Callable[[], Iterator[Cloud]]
+"""Reads the parts of a cloud from the first one on; all have the same columns, pose and start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The clouds of a file, in parts.
+
+    Attributes:
+        clouds: of the file, in its order.
+        notes: what is not read.
+    """
+
+    clouds: tuple[Again, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Survey:
+    """All parts of a cloud, without its points.
+
+    Attributes:
+        head: columns, pose and start, and no point.
+        rows: with a point.
+        low_m: lowest corner in the world, shape (3,).
+        high_m: highest corner in the world, shape (3,).
+        limits: column -> smallest and largest finite value; (0, 0) if there is none.
+        integers: columns of integers from 0 to 65535.
+    """
+
+    head: Cloud
+    rows: int
+    low_m: Vector
+    high_m: Vector
+    limits: dict[str, tuple[float, float]]
+    integers: frozenset[str]
+
+
+def survey(parts: Iterable[Cloud]) -> Survey | None:
+    """Return the survey of the parts of a cloud; None if no row is a point."""
+    merged: Survey | None = None
+    for part in parts:
+        flat = part.flat()
+        if len(flat.points_m):
+            merged = _of(flat) if merged is None else _both(merged, _of(flat))
+    return merged
+
+
+def _of(cloud: Cloud) -> Survey:
+    world_m = frames.apply(cloud.T_world_cloud, cloud.points_m.astype(float))
+    limits, integers = {}, set()
+    for name, values in cloud.columns.items():
+        known = values[np.isfinite(values)]
+        limits[name] = (known.min().item(), known.max().item()) if known.size else (0, 0)
+        if known.size == values.size and limits[name][0] >= 0 and limits[name][1] <= 65535:
+            integers |= {name} if np.all(values == np.round(values)) else set()
+    head = cloud.select(np.empty(0, np.int64))
+    low_m, high_m = world_m.min(axis=0), world_m.max(axis=0)
+    return Survey(head, len(cloud.points_m), low_m, high_m, limits, frozenset(integers))
+
+
+def _both(one: Survey, other: Survey) -> Survey:
+    limits = {
+        name: (min(a, other.limits[name][0]), max(b, other.limits[name][1])) for name, (a, b) in one.limits.items()
+    }
+    return replace(
+        one,
+        rows=one.rows + other.rows,
+        low_m=np.minimum(one.low_m, other.low_m),
+        high_m=np.maximum(one.high_m, other.high_m),
+        limits=limits,
+        integers=one.integers & other.integers,
+    )

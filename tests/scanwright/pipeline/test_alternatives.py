@@ -1,0 +1,52 @@
+"""What a refused scanner could be built with instead: everything that is named can be laid out, and turns its lidar."""
+
+import re
+
+import pytest
+
+from scanwright.cad.layout.placement import placement_of
+from scanwright.design.angles import Angles, AngleSet
+from scanwright.design.catalogue.servo import Servo
+from scanwright.design.errors import BuildError
+from scanwright.design.task.task import load_task
+from scanwright.pipeline.alternatives import what_fits
+
+TASK = """
+name = "heavy"
+sensor = "{sensor}"
+servo = "XM540-W270"
+slip_ring = "UH1256-02-0610-06S"
+[motion]
+mode = "spin"
+period_s = 10.0
+[density]
+ball_radius_deg = 2.0
+[[weight]]
+shape = "all"
+"""
+
+
+def refused(tmp_path, sensor, **angles):
+    path = tmp_path / "heavy.toml"
+    path.write_text(TASK.format(sensor=sensor))
+    loaded = load_task(path)
+    at = Angles(**{"alpha_rot": 0, "beta_rot": 0, "alpha_laser": 60, "beta_laser": 0} | angles)
+    task = loaded.task
+    angle_set = AngleSet(task="heavy", angles_deg=at, sensor=sensor, servo=task.servo, slip_ring=task.slip_ring)
+    with pytest.raises(BuildError):
+        placement_of(loaded.scanner(angle_set))
+    return loaded, angle_set
+
+
+def test_every_servo_and_ring_that_is_named_can_be_laid_out_and_is_strong_enough(tmp_path):
+    loaded, angles = refused(tmp_path, "LMS 200")
+    named = re.split(", or ", what_fits(loaded, angles).split(" with ")[1])
+    assert 1 <= len(named) <= 3 and len(set(named)) == len(named)
+    for servo, ring in (pair.split(" and ") for pair in named):
+        placement_of(loaded.scanner(angles.model_copy(update={"servo": servo, "slip_ring": ring})))
+        assert loaded.products.get(servo, Servo).continuous_torque_nm > 1.0  # 4.5 kg
+
+
+def test_a_lidar_that_nothing_holds_is_said_to_be_so(tmp_path):
+    loaded, angles = refused(tmp_path, "LMS111")
+    assert what_fits(loaded, angles).startswith("; no servo and slip ring of the catalogue fit LMS111")
