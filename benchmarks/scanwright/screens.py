@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PIL import Image
+from playwright.sync_api import ViewportSize
 
 from scanwright.design.angles import load_angles
 from scanwright.design.task.task import load_task
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).parents[2] / "docs/pictures"
 CHROMIUM = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # as root, no graphics card
-WIDE, PHONE = {"width": 1100, "height": 760}, {"width": 390, "height": 760}
+WIDE, PHONE = ViewportSize(width=1100, height=760), ViewportSize(width=390, height=760)
 PATIENCE_S = 300.0
 GAP, COLOURS = 24, 256
 

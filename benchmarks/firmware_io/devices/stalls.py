@@ -159,7 +159,7 @@ def random_stalls(
 ) -> list[tuple[float, float]]:
     """When and how long [s]: 0.05 to 10 s, as often short as long, `apart_s` after each other."""
     length_s = np.exp(rng.uniform(np.log(0.05), np.log(10.0), count))
-    after_s = np.exp(rng.uniform(*np.log(apart_s), count))
+    after_s = np.exp(rng.uniform(np.log(apart_s[0]), np.log(apart_s[1]), count))
     begin_s = first_s + np.cumsum(length_s + after_s) - length_s
     return list(zip(begin_s.tolist(), length_s.tolist(), strict=True))
 
