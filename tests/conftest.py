@@ -20,6 +20,7 @@ if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and 
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.pop("COLUMNS", None)  # results would be wrapped, also in files
 
+sys.path.insert(0, str(Path(__file__).parent / "house" / "virtual"))
 sys.path.insert(0, str(Path(__file__).parent / "house"))
 sys.path.insert(0, str(Path(__file__).parent / "house" / "virtual"))
 import checked_arrays

@@ -18,11 +18,13 @@ from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
 from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
 from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
+from scanwright.firmware_io.lidar.sick.values import Kind
 from scanwright.firmware_io.samples import Scan
 
 _SCAN_S = 1.0  # 15 scans of the slowest
 _READY_S = 30.0  # a motor that was off takes ten seconds
 _CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
+_ECHOES = {0: "first echo", 1: "all echoes", 2: "last echo"}  # of FREchoFilter; telegram listing 8014631
 _STLMS_READY = 7  # state of STlms; telegram listing 8014631
 
 
@@ -51,6 +53,7 @@ class SickLidar(LineDriver):
         self.dropped = 0
         self._measuring = False
         self._bad_scans = 0
+        self._filter_warning = ""
         self._started: tuple[bool, int] | None = None
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
         self._dialogue = ColaDialogue(address)
@@ -80,14 +83,18 @@ class SickLidar(LineDriver):
         return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
-        """Hours that it has run, in tenths, and how often it was switched on, where it counts them.
+        """Return the hours that it has run, how often it was switched on, and its filters, as far as it tells them.
 
         Raises:
             DeviceError: it does not answer, or is gone.
         """
         hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
         age = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
-        return (*age, *([] if starts is None else [f"it was switched on {starts:,} times"]))
+        switched = [] if starts is None else [f"it was switched on {starts:,} times"]
+        echo, averaged = self._values("FREchoFilter", "u8"), self._averaged_scans()
+        echoes = [f"echo filter: {_ECHOES.get(echo[0], echo[0])}"] if echo else []
+        means = {None: [], 0: ["mean filter: off"]}
+        return (*age, *switched, *echoes, *means.get(averaged, [f"mean filter: {averaged} scans"]))
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`, at the rate and resolution of the catalogue.
@@ -107,6 +114,9 @@ class SickLidar(LineDriver):
     def _begin(self, intensity: bool, skip: int, patience_s: float) -> None:
         self._login()
         set_rate(self._dialogue, self._product)
+        averaged = self._averaged_scans()
+        smeared = f"its mean filter averages {averaged} scans, which smears a turning scan: switch it off in SOPAS"
+        self._filter_warning = smeared if averaged else ""
         # channels, intensity, its resolution, unit, encoders, position, name, comment, time of day
         wanted = self._dialogue.writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
         self._dialogue.ask(wanted.number("u16", skip + 1))
@@ -190,12 +200,22 @@ class SickLidar(LineDriver):
         return self._dialogue.checked("SerialNumber", reply.text).strip()
 
     def _counter(self, name: str) -> int | None:
-        """None from a sensor that does not count this, or tells it to others only."""
+        """Return a count; None from a sensor that does not count this, or tells it to others only."""
+        values = self._values(name, "u32")
+        return values[0] if values else None
+
+    def _averaged_scans(self) -> int | None:
+        """Return of how many scans the mean filter makes one, 0 if it is off; None from a sensor without it."""
+        values = self._values("LFPmeanfilter", "u8", "u16")
+        return values[0] and values[1] if values else None
+
+    def _values(self, name: str, *kinds: Kind) -> list[int]:
+        """Return the first values of a variable; none from a sensor that refuses to tell it."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
         except RefusedError:
-            return None
-        return self._dialogue.checked(name, reply.number, "u32")
+            return []
+        return [self._dialogue.checked(name, reply.number, kind) for kind in kinds]
 
     def _login(self) -> None:
         out = self._dialogue.writer("sMN SetAccessMode").number("u8", _CLIENT).number("u32", _PASSWORD)
@@ -251,13 +271,14 @@ class SickLidar(LineDriver):
             angle_min_rad=float(np.radians(start_deg)),
             angle_increment_rad=self._step_rad(step_deg),
             time_increment_s=scan.beam_us / 1e6,
-            scan_time_s=(skip + 1) / scan.scan_rate_hz,
+            scan_time_s=1 / scan.scan_rate_hz,
             range_min_m=self._product.range_min_mm / 1e3,
             range_max_m=self._product.range_max_mm / 1e3,
             range_m=first.range_m(),
             intensity=intensity.astype(np.float32),
         )
-        warning = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
+        dirty = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
+        warning = dirty or self._filter_warning
         return TimedScan(turn, arrival_ns, moment.uncertainty_ns, warning)
 
     def _step_rad(self, step_deg: float) -> float:

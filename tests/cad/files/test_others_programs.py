@@ -46,7 +46,9 @@ def test_freecad_is_believed_because_it_sees_a_shell_that_is_open(made, tmp_path
     assert not (shape.valid and shape.solids == 1 and abs(shape.volume_mm3) > 0) or shape.strict
 
 
-@pytest.mark.parametrize("setting", samples(SETTINGS, ("lying", "upright")))  # the others: a minute of CalculiX each
+@pytest.mark.parametrize(
+    "setting", samples(SETTINGS, ("lying",))
+)  # it has a mount too; the others: a minute of CalculiX each
 def test_the_stated_error_of_a_bend_covers_what_calculix_finds(made, parts_of, tmp_path, setting):
     needs("gmsh", "ccx")
     scanner, assembly = made.scanner, made.result.assembly

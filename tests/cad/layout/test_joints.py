@@ -192,7 +192,6 @@ DAILY = (  # every way to hold something, and every part that takes a screw, onc
     "small, without a ring",
     "printed throughout, inserts",
     "as it ships",
-    "a belt",
     "a belt on a tripod, nuts M5",
 )
 

@@ -117,8 +117,9 @@ def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
 def test_it_tells_its_hours_where_it_counts_them(dialects):
     """The numbers 4F4 and A7 are those of a sensor in the notes of a driver: 126.8 hours, 167 times."""
     with emulator(dialects=dialects, run_tenth_h=0x4F4, starts=0xA7) as sensor, open_sick(sensor.address) as lidar:
-        assert lidar.condition() == ("it has run for 126.8 h", "it was switched on 167 times")
-        sensor.machine.refusals = [3, 1]  # it knows no such variable, or this level may not read it
+        filters = ("echo filter: last echo", "mean filter: off")
+        assert lidar.condition() == ("it has run for 126.8 h", "it was switched on 167 times", *filters)
+        sensor.machine.refusals = [3, 1, 3, 3]  # it knows no such variable, or this level may not read it
         assert lidar.condition() == ()
         lidar.start()
         check(lidar.read().scan, "LMS111")
@@ -197,6 +198,14 @@ def test_a_sensor_of_unknown_name_wants_its_model():
             open_sick(sensor.address)
         with open_sick(sensor.address, "LMS111") as lidar:
             assert lidar.model == "LMS111"
+
+
+def test_a_mean_filter_is_reported_and_a_scan_warns_of_it():
+    with emulator() as sensor, open_sick(sensor.address) as lidar:
+        sensor.machine.filters = {"LFPmeanfilter": [1, 3, 0], "FREchoFilter": [0]}
+        assert lidar.condition()[2:] == ("echo filter: first echo", "mean filter: 3 scans")
+        lidar.start()
+        assert lidar.read().warning.startswith("its mean filter averages 3 scans, which smears a turning scan")
 
 
 def test_skipped_turns_are_not_missing():
