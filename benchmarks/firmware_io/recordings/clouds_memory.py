@@ -1,6 +1,6 @@
 """Peak memory of converting large clouds against their size: it must not grow.
 
-    python -m benchmarks.firmware_io.clouds_memory 2 20 [200] [FORMAT ...]       # million points
+    python -m benchmarks.firmware_io.recordings.clouds_memory 2 20 [200] [FORMAT ...]       # million points
 
 For each size a cloud of x y z, intensity and time is made, then converted to each format and back to PLY, each in a
 process of its own. Needs 60 bytes of disk a point.
