@@ -83,11 +83,8 @@ def load_triangles(
     """
     if not 0 < unit_m < np.inf:
         raise SceneError(f"{path}: unit_m = {unit_m}: the length of one unit of the file, such as 0.001 for mm")
-    stated_m: float | None
-    if path.suffix.lower() == SUFFIX:
-        triangles, stated_m = urdf_triangles(path, posture), 1.0
-    else:
-        triangles, stated_m = mesh_file(path)
+    urdf = path.suffix.lower() == SUFFIX
+    triangles, stated_m = (urdf_triangles(path, posture), 1.0) if urdf else mesh_file(path)
     if stated_m and not np.isclose(stated_m, unit_m):
         raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file states that one unit is {stated_m:g} m")
     return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)

@@ -50,7 +50,15 @@ def urdf_triangles(path: Path, posture: Posture = AS_IT_IS) -> Float[ndarray, "t
     Raises:
         SceneError: the file is no URDF, a mesh is missing, or the posture names what the robot does not have.
     """
-    robot = _robot(path)
+    try:
+        return _triangles(path, _robot(path), posture)
+    except SceneError:
+        raise
+    except ValueError as error:
+        raise SceneError(f"{path}: {error}") from error
+
+
+def _triangles(path: Path, robot: ElementTree.Element, posture: Posture) -> Float[ndarray, "t 3 3"]:
     links = {link.get("name", ""): link for link in robot.iter("link")}
     T_root = dict(_link_poses(path, robot, links, posture))
     for name in (posture.frame, *posture.omit):
@@ -111,7 +119,8 @@ def _value(joint: ElementTree.Element, named: Mapping[str, ElementTree.Element],
     mimic = joint.find("mimic")
     if mimic is not None and name not in posture.joint_deg and name not in posture.joint_mm:
         leader = named.get(mimic.get("joint", ""))
-        led = 0.0 if leader is None or leader is joint else _value(leader, named, posture)
+        others = {key: each for key, each in named.items() if each is not joint}  # joints may mimic in a circle
+        led = 0.0 if leader is None or leader is joint else _value(leader, others, posture)
         return float(mimic.get("multiplier", 1)) * led + float(mimic.get("offset", 0))
     return math.radians(posture.joint_deg.get(name, 0.0)) + posture.joint_mm.get(name, 0.0) / 1000
 

@@ -51,9 +51,11 @@ def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"],
     usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
     limit = max(_LEAST_RAD, _STEPS * usual, _SIGMAS * 1.4826 * float(np.median(off[inner])))
     wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)
-    lone_rad = _off_both_lines(time_ns, position_rad)
+    rest = np.flatnonzero(~wrong)
+    lone_rad = _off_both_lines(time_ns[rest], position_rad[rest])
     lone = lone_rad > max(_LEAST_RAD, _SIGMAS * 1.4826 * float(np.median(lone_rad)))
-    return wrong | lone, np.where(lone, np.maximum(off, lone_rad), off)
+    wrong[rest[lone]], off[rest[lone]] = True, lone_rad[lone]
+    return wrong, off
 
 
 def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:

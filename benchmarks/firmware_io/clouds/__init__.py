@@ -1,1 +1,0 @@
-"""Conversion of clouds: speed and memory."""
