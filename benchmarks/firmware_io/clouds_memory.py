@@ -1,6 +1,6 @@
 """Peak memory of converting large clouds against their size: it must not grow.
 
-    python -m benchmarks.firmware_io.clouds_memory 2 20 [200]       # million points
+    python -m benchmarks.firmware_io.clouds_memory 2 20 [200] [FORMAT ...]       # million points
 
 For each size a cloud of x y z, intensity and time is made, then converted to each format and back to PLY, each in a
 process of its own. Needs 60 bytes of disk a point.
@@ -51,14 +51,14 @@ def converted(source: Path, target: Path) -> tuple[int, float, float]:
     return int(rows), float(peak_mb), time.monotonic() - began_s
 
 
-def main(sizes: list[int]) -> None:
+def main(sizes: list[int], formats: list[str]) -> None:
     """Print a line for each conversion."""
     print(f"{'points':>12}  {'from':4} {'to':4} {'file MB':>8} {'peak MB':>8} {'s':>7}")
     for millions in sizes:
         with TemporaryDirectory() as folder:
             source = Path(folder) / "in.ply"
             make(source, millions)
-            for name in FORMATS:
+            for name in formats:
                 there, back = Path(folder) / f"there.{name}", Path(folder) / "back.ply"
                 for one, other in ((source, there), (there, back)):
                     rows, peak_mb, seconds = converted(one, other)
@@ -69,4 +69,8 @@ def main(sizes: list[int]) -> None:
 
 
 if __name__ == "__main__":
-    main([int(word) for word in sys.argv[1:]] or [2, 20])
+    words = sys.argv[1:]
+    main(
+        [int(word) for word in words if word.isdigit()] or [2, 20],
+        [word for word in words if word in FORMATS] or [*FORMATS],
+    )

@@ -83,6 +83,7 @@ def load_triangles(
     """
     if not 0 < unit_m < np.inf:
         raise SceneError(f"{path}: unit_m = {unit_m}: the length of one unit of the file, such as 0.001 for mm")
+    stated_m: float | None
     if path.suffix.lower() == SUFFIX:
         triangles, stated_m = urdf_triangles(path, posture), 1.0
     else:

@@ -23,6 +23,7 @@ COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring":
     ("red", "green", "blue", "alpha"), "|u1"
 )
 """What the columns of our own clouds hold. Others keep the type of their file."""
+_OTHER_LETTERS = re.compile(r"[^A-Za-z0-9_.-]")
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
 _ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
 _COLUMN_KINDS = {"f4", "f8", *(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
@@ -135,15 +136,16 @@ def as_type(values: Column, kind: np.dtype[Any] | str) -> Column:
 
 
 def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
-    """The cloud as one structured array, little endian: x y z, then its columns."""
+    """The cloud as one structured array, little endian: x y z, then its columns, in names that headers can hold."""
     real = "<f4" if cloud.points_m.dtype == np.float32 else "<f8"
     kinds = [(axis, real) for axis in "xyz"]
-    kinds += [(name, column.dtype.newbyteorder("<").str) for name, column in cloud.columns.items()]
+    names = {name: _OTHER_LETTERS.sub("_", name) for name in cloud.columns}  # LAS and E57 have spaces and colons
+    kinds += [(names[name], column.dtype.newbyteorder("<").str) for name, column in cloud.columns.items()]
     rows = np.empty(len(cloud.points_m), kinds)
     for k, axis in enumerate("xyz"):
         rows[axis] = cloud.points_m[:, k]
     for name, column in cloud.columns.items():
-        rows[name] = column
+        rows[names[name]] = column
     return rows
 
 

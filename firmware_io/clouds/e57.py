@@ -39,6 +39,7 @@ _AT_ONCE = 100_000  # points
 _NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
 _COLOURS = {"red": "colorRed", "green": "colorGreen", "blue": "colorBlue"}
 _OWN_FIELD = {"intensity": "intensity", "time_s": "timeStamp", **_COLOURS}
+_NORMALS = {f"n{axis.lower()}": f"nor:normal{axis}" for axis in "XYZ"}  # extension of libE57Format
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _STRUCTURE = {"cartesianInvalidState", "sphericalInvalidState", "rowIndex", "columnIndex"}
@@ -70,7 +71,9 @@ def parts(path: Path, rows: int) -> Parts:
                 yield _flat_cloud(header, values_of)
 
     with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
-        return Parts(tuple(partial(again, number) for number in range(e57.scan_count)))
+        fields = {name for number in range(e57.scan_count) for name in e57.get_header(number).point_fields}
+        notes = ("rows and columns of a file of this size are not kept",) if "rowIndex" in fields else ()
+        return Parts(tuple(partial(again, number) for number in range(e57.scan_count)), notes)
 
 
 def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
@@ -123,9 +126,9 @@ def _flat_cloud(header: Any, values_of: dict[str, Column]) -> Cloud:
     for name in ("cartesianInvalidState", "sphericalInvalidState"):
         if name in values_of:
             points[values_of[name] != 0] = np.nan
-    back = {own: name for name, own in _OWN_FIELD.items()}
+    back = {own: name for name, own in (_OWN_FIELD | _NORMALS).items()}
     columns = {
-        back.get(name, name.removeprefix(f"{_PREFIX}:")): values
+        back.get(name) or name.removeprefix(f"{_PREFIX}:").replace(":", "_"): values
         for name, values in values_of.items()
         if name not in _STRUCTURE
     }

@@ -38,9 +38,9 @@ def optimise(
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        from scanwright.cli.results.angles import Optimised
+        from scanwright.cli.results.angles import Optimised, PlaneResult
 
-        plane_facts = [plane.facts() for plane in planes]
+        plane_facts = [PlaneResult(**plane.facts()) for plane in planes]
         show_json(Optimised(**optimum.facts(), planes=plane_facts, warnings=optimum.asked.warnings()))
     else:
         scan = (f"one full scan, {plane.words()}" for plane in planes)

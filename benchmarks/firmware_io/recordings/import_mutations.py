@@ -1,11 +1,12 @@
 """Do the import checks report every fault that matters? Random faults in good recordings.
 
-    python -m benchmarks.firmware_io.recordings.import_mutations 400 [FIRST_SEED] [corrected]
+    python -m benchmarks.firmware_io.recordings.import_mutations 400 [FIRST_SEED] [corrected] [small]
 
 Each sample is a good recording of a random scanner with one random fault in its headers, clocks or angles. It is
 imported, and the place of every beam at 5 m is compared with the truth. A sample is wrong if more than 1 % of its beams
 are off by more than 5 mm; it must then have a warning, or be refused. The rest must have none. With `corrected` each
-reported sample is imported again with the corrections that its hints offer, and judged again.
+reported sample is imported again with the corrections that its hints offer, and judged again. With `small` faults have
+a hundredth to one times the smallest size of the others: it prints below which error each kind can be missed.
 
 Left out are faults that a recording cannot show: the wrong sense of an angle or of the beams with limits to match, a
 wrong angle_max that nothing uses, and offsets between clocks below 15 ms, as the transport of messages hides them.
@@ -107,8 +108,14 @@ def good(rng: Generator) -> Fake:
     )
 
 
+class Small(Generator):
+    """Draws small faults."""
+
+
 def _size(rng: Generator, low: float, high: float) -> float:
     """A random size of a random sign, evenly by its logarithm."""
+    if isinstance(rng, Small):
+        low, high = low / 100, low
     return float(np.exp(rng.uniform(np.log(low), np.log(high))) * rng.choice([-1, 1]))
 
 
@@ -322,9 +329,9 @@ def _imported(one: Fake, bag: Path, corrections: Corrections) -> tuple[ImportSum
     return summary, math.inf if false_points else float(np.quantile(errors_mm(one, out), 1 - WRONG_SHARE))
 
 
-def sample(seed: int, folder: Path, *, corrected: bool = False) -> Sample:
+def sample(seed: int, folder: Path, *, corrected: bool = False, small: bool = False) -> Sample:
     """Make, import and judge one recording, and what its hints make of it."""
-    rng = np.random.default_rng(seed)
+    rng = (Small if small else Generator)(np.random.PCG64(seed))
     fault = list(FAULTS)[seed % len(FAULTS)]
     one = FAULTS[fault](good(rng), rng)
     bag = folder / "in.bag"
@@ -342,12 +349,12 @@ def sample(seed: int, folder: Path, *, corrected: bool = False) -> Sample:
     return Sample(fault, seed, error_mm, codes, names, _imported(one, bag, offer)[1])
 
 
-def main(count: int, first: int, *, corrected: bool) -> int:
+def main(count: int, first: int, *, corrected: bool, small: bool) -> int:
     """Judge `count` recordings from a first seed on; print what was missed and what was reported though harmless."""
     with TemporaryDirectory() as folder:
-        samples = [sample(seed, Path(folder), corrected=corrected) for seed in range(first, first + count)]
+        samples = [sample(seed, Path(folder), corrected=corrected, small=small) for seed in range(first, first + count)]
     for one in samples:
-        if one.missed or one.false_alarm:
+        if (one.missed and not small) or one.false_alarm:
             what = "missed" if one.missed else "false alarm"
             print(f"{what:12} {one.fault:24} seed {one.seed}: {one.error_mm:8.1f} mm {', '.join(one.codes)}")
     wrong = sum(one.error_mm > WRONG_MM for one in samples)
@@ -355,6 +362,10 @@ def main(count: int, first: int, *, corrected: bool) -> int:
     print(f"{count} recordings, {wrong} wrong by more than {WRONG_MM:g} mm at {AT_M:g} m: {missed} not reported")
     print(f"{count - wrong} harmless: {alarms} reported ({alarms / max(count - wrong, 1):.1%})")
     print(", ".join(f"{fault} {n}" for fault, n in Counter(one.fault for one in samples if one.codes).items()))
+    for fault in FAULTS if small else ():
+        errors = [one.error_mm for one in samples if one.fault == fault and one.missed]
+        if errors:
+            print(f"{fault:24} {len(errors)} missed, up to {max(errors):.1f} mm")
     for fault in FAULTS if corrected else ():
         some = [one for one in samples if one.fault == fault and one.offered and one.error_mm > WRONG_MM]
         if some:
@@ -367,5 +378,6 @@ def main(count: int, first: int, *, corrected: bool) -> int:
 
 
 if __name__ == "__main__":
-    numbers = [int(word) for word in sys.argv[1:] if word != "corrected"]
-    sys.exit(main(*(*numbers, *(324, 0)[len(numbers) :]), corrected="corrected" in sys.argv))
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    modes = {mode: mode in sys.argv for mode in ("corrected", "small")}
+    sys.exit(main(*(*numbers, *(324, 0)[len(numbers) :]), **modes))

@@ -19,8 +19,8 @@ from scanwright.firmware_io.samples import Scan
 
 AT_M = 5.0  # range at which a finding states its cost
 _LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
-_SPAN_STEPS = 1.6  # headers of real bags state n - 1 or n steps between angle_min and angle_max
-_TIME_ERROR = 0.1  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
+_WRONG_MM = 5.0  # at that range, of the last beam
+_TIME_ERROR = 0.03  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
 _TURN_ERROR = 0.03  # how near to an integer the turns between two scans are that a driver dropped
 _SAME_RANGE = 0.01  # share of the beams with the longest range: no scene puts so many at one distance
 _FEWEST = 20  # beams
@@ -55,11 +55,13 @@ class Headers:
     @classmethod
     def of(cls, rows: Iterable[tuple[float, ...]]) -> Headers:
         """Make the record of the row of each scan: `header_of` or `header_of_scan`."""
-        *columns, unequal, longest_m, count = map(np.array, zip(*rows, strict=True))
+        stamp_ns, beams, step, span, increment, period, range_max, unequal, longest_m, count = map(
+            np.array, zip(*rows, strict=True)
+        )
         longest: Counter[float] = Counter()
         for far_m, beams in zip(longest_m.tolist(), count.tolist(), strict=True):
             longest[far_m] += beams
-        return cls(*columns, longest=+longest, unequal_intensities=int(np.sum(unequal)))
+        return cls(stamp_ns, beams, step, span, increment, period, range_max, +longest, int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
         """Return the headers as they are after corrections."""
@@ -74,10 +76,12 @@ class Headers:
 
     @property
     def bearings_disagree(self) -> Bool[ndarray, " n"]:
-        """Which scans span another angle than angle_max - angle_min, shape (n,)."""
-        step = np.where(self.step_rad == 0, np.nan, self.step_rad)
-        within = np.abs(self.span_rad / step - (self.beams - 1)) <= _SPAN_STEPS
-        return (self.beams > 1) & ~within
+        """Which scans span another angle than angle_max - angle_min, shape (n,).
+
+        That is n - 1 steps of n beams, or n in the headers of some drivers.
+        """
+        off_rad = [np.abs(self.span_rad - self.step_rad * (self.beams - k)) for k in (0, 1)]
+        return (self.beams > 1) & (1000 * AT_M * np.minimum(*off_rad) > _WRONG_MM)
 
     def judged(self) -> Headers:
         """Return the headers by which times are judged.

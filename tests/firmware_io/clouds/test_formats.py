@@ -362,3 +362,11 @@ def test_rubbish_is_one_line(tmp_path, suffix):
 def test_an_unknown_format_is_one_line(tmp_path):
     with pytest.raises(RecordingError, match=r"'\.plyy' is not a format of clouds; did you mean 'ply'"):
         write_clouds(tmp_path / "c.plyy", [some_cloud()])
+
+
+@pytest.mark.parametrize("suffix", ["ply", "pcd", "xyz"])
+def test_names_that_a_header_cannot_hold_are_spelt_without_spaces_and_colons(tmp_path, suffix):
+    columns = {"Amplitude Ratio": np.ones(3, np.float32), "nor:normalX": np.zeros(3, np.float32)}
+    write_clouds(tmp_path / f"a.{suffix}", [Cloud(np.eye(3, dtype=np.float32), columns)])
+    ((cloud,), _) = read_clouds(tmp_path / f"a.{suffix}")
+    assert list(cloud.columns) == ["Amplitude_Ratio", "nor_normalX"]

@@ -110,7 +110,7 @@ def test_only_large_flat_clouds_of_these_formats_are_streamed(sources, tmp_path,
     write_clouds(tmp_path / "grid.pcd", [organised])
     assert stream(tmp_path / "grid.pcd", tmp_path / "out.ply", least_bytes=0) is None
     monkeypatch.setattr(streaming, "STREAM_BYTES", 0)
-    assert convert(sources / "in.ply", tmp_path / "out.laz")[-1].startswith("wrote 2,500 rows")
+    assert convert(sources / "in.ply", tmp_path / "out.laz").rows == 2500
 
 
 def test_a_survey_is_that_of_all_parts():
