@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.layout.drive import DriveLayout
 from scanwright.design.catalogue.holes import Hole, what_holds
 from scanwright.design.catalogue.measuring import how_to_measure
 from scanwright.design.catalogue.product_base import Product
@@ -21,12 +20,6 @@ SHAPING = {
     "servo.holes": "the screws of the servo's case",
 }
 SHOWN_CHARS = 60  # of a value in a message; a longer one is cut
-
-
-def products_of(scanner: Scanner, drive: DriveLayout) -> list[Product]:
-    """Return every product that shapes parts, each once."""
-    products: list[Product | None] = [scanner.lidar, scanner.servo, scanner.slip_ring, *drive.products, scanner.printer]
-    return list({product.name: product for product in products if product is not None}.values())
 
 
 def known_errors(products: Iterable[Product]) -> list[Finding]:

@@ -21,8 +21,9 @@ from scanwright.cad.checks.loads.mount import mount_checks
 from scanwright.cad.checks.loads.retention import retention_checks
 from scanwright.cad.checks.loads.vibration import vibration_checks
 from scanwright.cad.checks.printing import printing_checks
-from scanwright.cad.checks.products import known_errors, module_checks, products_of, unverified
+from scanwright.cad.checks.products import known_errors, module_checks, unverified
 from scanwright.cad.checks.wiring import wiring_checks
+from scanwright.cad.layout.drive import products_of
 from scanwright.design.findings import Finding
 from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner

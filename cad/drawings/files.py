@@ -10,9 +10,11 @@ from scanwright.cad.drawings.part import Part, azimuth_deg, part_of, planes_acro
 from scanwright.cad.drawings.patterns import number
 from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
+from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
 from scanwright.cad.parts.part_spec import Process
 from scanwright.cad.parts.tolerances import OnSheet
+from scanwright.design.catalogue.measuring import measure_first
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.scanner import Scanner
 
@@ -60,11 +62,8 @@ def drawing_of(
         ("made by", "scanwright"),
     )
     notes = _notes(scanner, part, spec.sheet, MADE[spec.process], _making(spec.process, scanner.printer, part))
-    for product in (scanner.lidar, scanner.servo, scanner.slip_ring):
-        fields = [field.partition(".")[2] for field in spec.shaped_by if product and field.startswith(product.kind)]
-        open_ = [field for field in (product.unverified() if product else ()) if field in fields]
-        if product is not None and open_:
-            notes.append(f"Not verified, measure yours first: {', '.join(open_)} of {product.name}.")
+    products = products_of(scanner, assembly.layout.drive)
+    notes += [words for product in products if (words := measure_first(product, *spec.values_of(product)))]
     return sheet_of(part, Title(cells, tuple(notes)), f"{name} {config_hash}")
 
 

@@ -15,10 +15,9 @@ from dataclasses import dataclass, fields, replace
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.print_settings import print_words
-from scanwright.cad.checks.products import products_of
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
-from scanwright.cad.layout.drive import DriveLayout
+from scanwright.cad.layout.drive import DriveLayout, products_of
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.catalogue.lidar import Lidar

@@ -21,10 +21,12 @@ from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import Screw, Thread
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
+from scanwright.design.scanner import Scanner
 
 Body = Literal["base", "rotor", "horn"]
 Point = tuple[float, float, float]
@@ -247,3 +249,9 @@ def towards(points: Array, azimuth: float) -> tuple[Array, Array]:
     """Points (n, 3) turned about the axis by an azimuth [rad], and the unit vector at that azimuth."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
+
+
+def products_of(scanner: Scanner, drive: DriveLayout) -> list[Product]:
+    """Return every product that shapes parts, each once."""
+    products: list[Product | None] = [scanner.lidar, scanner.servo, scanner.slip_ring, *drive.products, scanner.printer]
+    return list({product.name: product for product in products if product is not None}.values())

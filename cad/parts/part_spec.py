@@ -12,6 +12,7 @@ from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
 from scanwright.cad.parts.tolerances import OnSheet
+from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Printer
 
 Process = Literal["printed", "turned", "sawn"]
@@ -137,6 +138,11 @@ class PartSpec:
     def metal(self) -> bool:
         """Whether no printer makes it."""
         return self.process != "printed"
+
+    def values_of(self, product: Product) -> tuple[str, ...]:
+        """Return the fields of a product that shape this part, or something that comes with it."""
+        kind = f"{product.kind}."
+        return tuple(field.removeprefix(kind) for field in (*self.shaped_by, *self.shapes) if field.startswith(kind))
 
     def density_g_cm3(self, printer: Printer) -> float:
         """Of its material."""

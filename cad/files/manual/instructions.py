@@ -9,9 +9,9 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import print_words
 from scanwright.cad.assembly.scenes import StepScene, scenes_of
 from scanwright.cad.checks.loads.retention import material_of
-from scanwright.cad.checks.products import products_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.joints import DECK_MM, Joint
 from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TEST_PLATE
 from scanwright.cad.layout.tightening import hold_of
@@ -194,4 +194,14 @@ def _words(assembly: Assembly, scene: StepScene) -> str:
     for joint, mark in scene.joints:
         screws = f"**{screws_in_words(assembly, joint)}**"
         text = text.replace(mark, f"{screws} {mark}", 1) if mark else f"{text} {screws}"
+    text += "".join(f" {sentence}" for sentence in _fits_to_measure(assembly, scene))
     return " ".join(re.sub(r"\{.*?\}", "", text).split())
+
+
+def _fits_to_measure(assembly: Assembly, scene: StepScene) -> Iterator[str]:
+    """Yield what to measure before the new parts of a step fit their devices; the screws state theirs themselves."""
+    parts = [assembly.parts[name] for name in (scene.thing, *scene.step.brings) if name in assembly.made]
+    for product in products_of(assembly.layout.scanner, assembly.layout.drive):
+        fields = {field for part in parts for field in part.values_of(product)} - {"holes", *HORN_FIELDS}
+        if sentence := measure_first(product, *fields):
+            yield sentence

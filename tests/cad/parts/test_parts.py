@@ -13,8 +13,9 @@ import trimesh
 from quick_tests import samples
 from scanners import GROUND_AHEAD, UPRIGHT, mount_offset_mm, scanner_at
 
-from scanwright.cad.checks.products import products_of, unverified
+from scanwright.cad.checks.products import unverified
 from scanwright.cad.layout.deck import FOOT_THICKNESS
+from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 
 # name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo; hundreds more: `python -m benchmarks.cad.parts`
