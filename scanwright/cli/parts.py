@@ -97,7 +97,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     Prints the failed checks and the warnings; with -v, all checks.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import CheckEntry, Checked
+    from scanwright.cli.results.of_commands import Checked, CheckEntry
     from scanwright.pipeline.build import finding_lines
 
     checks = api.check(out, progress=ConsoleProgress())
