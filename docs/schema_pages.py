@@ -11,7 +11,7 @@ _TYPES = {"number": "number", "integer": "integer", "string": "text", "boolean":
 
 
 def write_schema_pages(folder: Path) -> None:
-    """Write task-file.md, catalogue.md and json.md into a folder."""
+    """Write task-file.md, catalogue.md, devices.md and json.md into a folder."""
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.products import Bearing, Belt, Printer
     from scanwright.design.catalogue.servo import Servo
@@ -40,7 +40,29 @@ def write_schema_pages(folder: Path) -> None:
     for kind in kinds:
         catalogue += _sections(kind.model_json_schema(), kind.__name__, shown)
     (folder / "catalogue.md").write_text("\n".join(catalogue), encoding="utf-8")
+    _write_sketches(folder)
     (folder / "json.md").write_text("\n".join(_json_page()), encoding="utf-8")
+
+
+def _write_sketches(folder: Path) -> None:
+    """Write devices.md with a sketch of every product that has dimensions."""
+    from scanwright.cad.drawings.devices.sketch import sketch_svg
+    from scanwright.design.catalogue.catalogue import load_catalogue
+    from scanwright.design.catalogue.products import Belt, Multibeam
+
+    page = [
+        "# Sketches of the products",
+        "",
+        "Drawn from the records of the catalogue, in the frame of each device. `scanwright catalogue NAME --sketch "
+        "FILE.svg` draws the same. A `?` marks values that no source verifies.",
+    ]
+    (folder / "sketches").mkdir(exist_ok=True)
+    for product in load_catalogue():
+        if not isinstance(product, Belt | Multibeam):
+            file = f"sketches/{product.name.lower().replace(' ', '-')}.svg"
+            (folder / file).write_bytes(sketch_svg(product))
+            page += ["", f"## {product.name}", "", f"![{product.name} with its dimensions]({file})"]
+    (folder / "devices.md").write_text("\n".join([*page, ""]), encoding="utf-8")
 
 
 def _json_page() -> Iterator[str]:

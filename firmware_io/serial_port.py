@@ -59,6 +59,15 @@ def latency_timer(port: str) -> Path | None:
     return file if file.is_file() else None
 
 
+def latency_ms(port: str) -> int:
+    """Return for how long a USB adapter gathers bytes before it hands them over; 0 for a port without such a timer."""
+    timer = latency_timer(port)
+    try:
+        return 0 if timer is None else int(timer.read_text())
+    except (OSError, ValueError):
+        return 0
+
+
 def _why_not_opened(port: str, error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:

@@ -12,7 +12,7 @@ DIALECT = {
     r"|\bwhere (?:it|they|that|there|this|one|none) (?:is|are|was|does|do|has|have|had|can)\b",
     "things that stand or lie": r"\b(?:stands?|stood|standing)\b(?! still)|\b(?:lies|lay|lying)\b",
     "things that take": r"\btakes? (?:it|them|that|this|what|both|away)\b",
-    "things that ask": r"\b(?:asks|asked)\b(?! (?:you|a|for your|five|before)\b)",
+    "things that ask": r"\b(?:asks|asked)\b(?! (?:you|a|for your|six|before)\b)",
     "things that want": r"(?<!you )\bwant(?:s|ed)?\b",
     "hold, bear": r"\b(?:held|bears?|borne)\b",
     "looks": r"\b(?:a|flat|second|one|two|of|first|other|another) looks?\b|\blooked at\b",

@@ -28,7 +28,7 @@ ELSEWHERE = {  # beginnings of lines: why they do not run here, and the file tha
     "pip install .": ("network", ".ci/run", "uv pip install --quiet --python"),
     "scanwright optimise": ("seconds", "tests/scanwright/cli/test_cli.py", '"optimise"'),
     "scanwright build": ("minutes", "tests/scanwright/pipeline/test_links.py", "build"),
-    "scanwright emulate": ("a server", "tests/firmware_io/scan/test_acquire.py", '"emulate"'),
+    "scanwright emulate": ("a server", "tests/firmware_io/scan/test_real_time.py", '"emulate"'),
     "scanwright scan": ("needs emulators and a build", "tests/firmware_io/scan/test_acquire.py", '"scan"'),
     "scanwright servo-setup": ("needs a servo", "tests/firmware_io/servo/test_consent.py", '"servo-setup"'),
 }

@@ -28,6 +28,7 @@ from scanwright.design.task.task import Limits, LoadedTask
 LOOKS = ((120, 1000), (1215, 30))  # quadrature nodes, and how many of the settings are looked at again
 GENERATIONS = 40
 POPULATION = 15  # of the evolution, times the angles that are free
+MOST_LOST = 1e-3  # of J, if the task states no tolerance
 MOST_GENERATIONS = 100_000  # of the evolution against a random task, which ends by its processor time
 
 
@@ -39,17 +40,25 @@ class Contest:
         best: of the search.
         rivals: best setting [deg] and score of each kind of rival.
         once: whether no two families have the same J.
+        tolerance: of J, as the task states it.
     """
 
     best: Family
     rivals: dict[str, tuple[Array, Score]]
     once: bool
+    tolerance: float
 
     @property
     def beaten_by(self) -> float:
         """How far the best rival lies below the optimum, beyond both stated errors; at most 0 where none does."""
         own = self.best.score
         return max((own.J - own.J_error - rival.J - rival.J_error for _, rival in self.rivals.values()), default=0.0)
+
+    @property
+    def verdict(self) -> str:
+        """BEATEN if a rival is better by more than the tolerance of J, which the search promises."""
+        word = "BEATEN" if self.beaten_by > self.tolerance else "unbeaten within its tolerance"
+        return f"{word}, by {self.beaten_by:.1e}" if self.beaten_by > 0 else "unbeaten"
 
 
 def contest(
@@ -91,7 +100,7 @@ def contest(
     if at_evolved is not None:
         rivals[f"differential evolution, {evolved.nfev:,} settings"] = (setting, at_evolved)
     J_found = np.sort([family.score.J for family in found.best])
-    return Contest(found.best[0], rivals, once=bool((np.diff(J_found) > EQUAL).all()))
+    return Contest(found.best[0], rivals, bool((np.diff(J_found) > EQUAL).all()), min(problem.tolerance, MOST_LOST))
 
 
 def best_of(required: Requirements, settings_deg: Array) -> tuple[Array, Score]:
@@ -113,9 +122,8 @@ def print_contest(loaded: LoadedTask, draws: int, seed: int) -> None:
         return
     result = contest(problem_of(loaded), ranges, draws, GENERATIONS, seed)
     best = result.best
-    verdict = "BEATEN" if result.beaten_by > 0 else "unbeaten"
     once = "each family once" if result.once else "A FAMILY TWICE"
-    print(f"{loaded.task.name}: {verdict}, {once}")
+    print(f"{loaded.task.name}: {result.verdict}, {once}")
     print(f"  {best.angles_deg}: J = {best.score.J:.6f} +- {error_words(best.score.J, best.score.J_error)} {best.word}")
     for name, (setting, rival) in result.rivals.items():
         print(
@@ -137,12 +145,11 @@ def print_evolution(tasks: range, seed: int, budget_s: float) -> None:
             refused += 1
             print(f"task {i} refused: {error}", flush=True)
             continue
-        beaten += result.beaten_by > 0
-        word = f"BEATEN by {result.beaten_by:.1e}" if result.beaten_by > 0 else "unbeaten"
+        beaten += result.beaten_by > result.tolerance
         best, task = result.best.score, loaded.task
         print(
             f"task {i}, {task.motion.mode}, {task.density.objective}: "
-            f"{best.J:.5f} +- {error_words(best.J, best.J_error)} {word} {list(result.rivals)}",
+            f"{best.J:.5f} +- {error_words(best.J, best.J_error)} {result.verdict} {list(result.rivals)}",
             flush=True,
         )
         if result.beaten_by > 0:

@@ -29,6 +29,7 @@ from scanwright.design.catalogue.products import Multibeam
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.comparison import compare, ready_made
 from scanwright.design.evaluation.comparison_table import notes, table
+from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.evaluation.evaluation import Lever, evaluate
 from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.evaluation.poles import Pole
@@ -41,14 +42,16 @@ from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.colours import bands_to
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.first_screen import cards
 from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
-from scanwright.report.room_picture import room_picture
+from scanwright.report.room import room_about, room_scene
+from scanwright.serving.density_room import density_colours
 from scanwright.studio.panel.facts import Judge
-from scanwright.studio.panel.panel_html import facts_html, kept_html, scale_html
+from scanwright.studio.panel.panel_html import facts_html, kept_html
 from scanwright.studio.state import Setting
-from scanwright.studio.view.coloured_sphere import density_colours, edges, hexagons, highest_density
+from scanwright.studio.view.coloured_sphere import edges, hexagons, highest_density
 
 TOLERANCE = 0.1  # of J: what is shown of it is looked at, not how exact it is
 FULL = 25  # one of so many tasks
@@ -131,7 +134,7 @@ def _compare_fully(drawn: RandomTask, _: Path) -> None:
     "\n".join([*table(rows), *notes(drawn.loaded, rows)])
 
 
-def _report(drawn: RandomTask, folder: Path, picture: bool) -> None:
+def _report(drawn: RandomTask, _: Path, picture: bool) -> None:
     loaded, shadow = drawn.loaded, _shadow(drawn)
     angles = loaded.angle_set(drawn.angles_deg)
     problem, setting = problem_as_built(loaded, angles), mounting_rad(angles)
@@ -141,9 +144,8 @@ def _report(drawn: RandomTask, folder: Path, picture: bool) -> None:
     planes, axes = np.column_stack([mounts[:, 2:], J, mounts[:, :2]]), np.column_stack([mounts[:, :2], J])
     tuned = [mount.gain.mount for mount in found.as_built.mounts]
     sphere = density_sphere(problem, angles, tuned, axes, loaded.task.angles.step_deg, shadow)
-    json.dumps(sphere.data())
+    json.dumps(room_scene(room_about(loaded.task), np.zeros(3), np.array(sphere.middle), sphere.below))
     if picture:
-        room_picture(loaded.task, folder, problem, setting, sphere, [], shadow)
         landscape(planes[:, :3], PLANE, angles, "J")
         landscape(axes, AXIS, angles, "J")
     cards(angles, found, on_planes(loaded, problem, setting, shadow), None)
@@ -158,13 +160,12 @@ def _studio(drawn: RandomTask, _: Path) -> None:
     setting = Setting.within_bounds(drawn.angles_deg)
     quick, exact = judge.quick(setting), judge.exact(setting)
     settled = judge.settled(exact)
-    log = judge.problem.objective.name == "log"
     for facts in (quick, exact, settled):
-        facts_html(facts, log)
+        facts_html(facts)
     kept_html({"A": settled, "B": quick})
     highest = highest_density(judge.problem, setting.angles_rad)
-    scale_html(highest)
-    density_colours(judge.problem, setting.angles_rad, hexagons().directions, highest)
+    density = mean_density_at(judge.problem, setting.angles_rad, hexagons().directions)
+    density_colours(density, bands_to(highest))
     edges(judge.problem.field)
 
 

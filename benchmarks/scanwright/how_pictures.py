@@ -6,11 +6,13 @@ uv run python -m benchmarks.scanwright.how_pictures
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 import scanwright as sw
 from scanwright.design.arrays import Array
@@ -24,7 +26,7 @@ STEP_DEG = 0.5
 INK = "#222222"
 BLUE = "#2f5d8a"
 DPI = 120  # 6.5 inches wide: text of 13 points is 11 pixels high on a phone
-TEXT = {"font.size": 13, "axes.titlesize": 14}
+TEXT: dict[Any, Any] = {"font.size": 13, "axes.titlesize": 14}
 
 
 def main() -> None:
@@ -111,7 +113,7 @@ def search_steps(optimum: sw.Optimum) -> Figure:
     return figure
 
 
-def _density_map(axis: Axes, problem: Problem, angles_rad: Array) -> object:
+def _density_map(axis: Axes, problem: Problem, angles_rad: Array) -> AxesImage:
     """Draw the mean density over all directions, and the outline of the region."""
     theta = np.arange(STEP_DEG / 2, 180, STEP_DEG)
     phi = np.arange(-180 + STEP_DEG / 2, 180, STEP_DEG)

@@ -7,7 +7,8 @@
 
 Moves: a client of the page's own websocket moves a slider, waits for the facts and the colours of the room that
 answer it, and moves on a thirtieth of a second later, as a hand does. Times are from the message that leaves to the
-last one that arrives, unpacked: what a browser adds is its drawing.
+last one that arrives, unpacked: what a browser adds is its drawing. The goal is 60 ms at the 95th percentile. Then J at
+20 random settings is compared with `evaluate`.
 
 Rebuild: the client drags two sliders for a third of a second and lets go; times are from the last message of the hand
 to the arrival of the half of the scanner that turns (linkage, shaft, lidar), and of the half that stands.
@@ -37,6 +38,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
+import scanwright as sw
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.task.task import load_task
 from scanwright.firmware_io.samples import Scan
@@ -121,13 +123,24 @@ def moves(task: Path, count: int) -> None:
                 began = time.perf_counter()
                 studio.judge.quick(studio.setting)
                 compute.append(time.perf_counter() - began)
+            equal = [_shows_what_evaluate_prints(studio, task, rng) for _ in range(20)]
         studio.close()
     ms = 1e3 * np.array(answered)
     print(
         f"{task}: {len(ms)} moves, from slider to facts and colours: median {np.median(ms):.0f} ms, "
         f"95th percentile {np.percentile(ms, 95):.0f} ms, worst {ms.max():.0f} ms; "
-        f"of these J, gaps and period {1e3 * np.median(compute):.0f} ms"
+        f"of these J, gaps and period {1e3 * np.median(compute):.0f} ms; "
+        f"J is that of evaluate at {sum(equal)} of {len(equal)} random settings"
     )
+
+
+def _shows_what_evaluate_prints(studio: Studio, task: Path, rng: np.random.Generator) -> bool:
+    setting = Setting.within_bounds(rng.uniform(-1, 1, 4) * (180.0, 90.0, 90.0, 90.0))
+    studio.move(setting)
+    studio.judging.settled(60)
+    facts = studio.facts
+    assert facts is not None and facts.exact and facts.setting == setting
+    return facts.J == sw.evaluate(task, setting.angles_deg).score.J
 
 
 def rebuild(task: Path, count: int) -> None:

@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.scenes import StepScene, scenes_of
+from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import FIXED_CABLES, LIDAR_CABLE, ROTOR_LEADS
 from scanwright.design.arrays import Array
@@ -34,6 +36,35 @@ BY_HAND_MM = (3.0, 0.0)  # a screw of another size has a knob
 RAYS = 12  # around the one along the screw's axis
 OVER_HEAD_MM = 0.2
 STEPS = 72  # angles of the axis
+
+
+@dataclass(frozen=True)
+class Body:
+    """A stiff body that may be in the way; most are never near a driver, and need no tree of their triangles."""
+
+    mesh: TriMesh
+
+    @cached_property
+    def scene(self) -> ray_caster.Scene:
+        """Its triangles, ready to be hit."""
+        return ray_caster.build_scene(self.mesh.vertices[self.mesh.faces] / 1000)
+
+    @cached_property
+    def box(self) -> tuple[Array, Array]:
+        """Low and high corner [mm]."""
+        return self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
+
+    def reach_mm(self, starts: Array, directions: Array, length: float) -> Array:
+        """Return how far the nearest ray of each screw gets, infinity beyond a length; shape (..., screws)."""
+        rays = np.broadcast_to(directions, starts.shape)
+        ends = np.stack([starts, starts + length * rays])
+        axes = (0, *range(1, ends.ndim - 1))
+        low, high = self.box
+        if (ends.min(axis=axes) > high).any() or (ends.max(axis=axes) < low).any():
+            return np.full(starts.shape[:-2], np.inf)
+        hits = ray_caster.cast(self.scene, starts.reshape(-1, 3) / 1000, rays.reshape(-1, 3))
+        nearest = 1000 * hits.range_m.reshape(starts.shape[:-1]).min(axis=-1)
+        return np.where(nearest < length, nearest, np.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +97,7 @@ def access_checks(assembly: Assembly) -> list[Finding]:
     return found or [Finding("driver_access", "ok", "screws", message, 0.0, 0.0)]
 
 
-def blocked_screws(joint: Joint, present: Mapping[str, ray_caster.Scene], turning: frozenset[str]) -> list[Blocked]:
+def blocked_screws(joint: Joint, present: Mapping[str, Body], turning: frozenset[str]) -> list[Blocked]:
     """Return the screws of a joint that no driver reaches.
 
     Args:
@@ -77,21 +108,20 @@ def blocked_screws(joint: Joint, present: Mapping[str, ray_caster.Scene], turnin
     starts, back = driver_rays(joint)
     length = KEYS_MM.get(joint.screw.name, BY_HAND_MM)[1]
     moves = joint.part in turning
-    nearest = {name: _reach_mm(scene, starts, back) for name, scene in present.items() if (name in turning) == moves}
-    others = {name: scene for name, scene in present.items() if (name in turning) != moves}
-    if any((_reach_mm(scene, starts, back) < length).any() for scene in others.values()):
+    nearest = {
+        name: each.reach_mm(starts, back, length) for name, each in present.items() if (name in turning) == moves
+    }
+    others = {name: each for name, each in present.items() if (name in turning) != moves}
+    if any(np.isfinite(each.reach_mm(starts, back, length)).any() for each in others.values()):
         turns = np.stack([Rz(2 * math.pi * k / STEPS) for k in range(STEPS)])[:, None, None]
-        rays = np.broadcast_to(back, starts.shape)[..., None]
-        at = {
-            name: _reach_mm(scene, (turns @ starts[..., None])[..., 0], (turns @ rays)[..., 0])
-            for name, scene in others.items()
-        }
+        at_starts, at_back = ((turns @ rays[..., None])[..., 0] for rays in (starts, back))
+        at = {name: each.reach_mm(at_starts, at_back, length) for name, each in others.items()}
         best = np.min(list(at.values()), axis=0).argmax(axis=0)
         nearest |= {name: reach[best, np.arange(joint.count)] for name, reach in at.items()}
     blocked = []
     for screw in range(joint.count):
         body = min(nearest, key=lambda name: float(nearest[name][screw]), default="")
-        if body and nearest[body][screw] < length:
+        if body and math.isfinite(nearest[body][screw]):
             blocked.append(Blocked(screw + 1, body, float(nearest[body][screw])))
     return blocked
 
@@ -109,22 +139,12 @@ def driver_rays(joint: Joint) -> tuple[Array, Array]:
     return np.stack(starts), back[:, None]
 
 
-def _reach_mm(scene: ray_caster.Scene, starts: Array, directions: Array) -> Array:
-    """Return how far the nearest ray of each screw gets, shape of starts without the last two axes."""
-    rays = np.broadcast_to(directions, starts.shape)
-    hits = ray_caster.cast(scene, starts.reshape(-1, 3) / 1000, rays.reshape(-1, 3))
-    return 1000 * hits.range_m.reshape(starts.shape[:-1]).min(axis=-1)
-
-
-def _bodies(assembly: Assembly) -> dict[str, ray_caster.Scene]:
-    """Return everything that is stiff and closed, by name: a cable can be held aside."""
-    soft = {ROTOR_LEADS, FIXED_CABLES}
-    stiff = [name for name in (*assembly.made, *assembly.bought) if assembly.thing(name) not in soft]
-    return {
-        name: ray_caster.build_scene(assembly.mesh(name).vertices[assembly.mesh(name).faces] / 1000)
-        for name in stiff
-        if not name.startswith(LIDAR_CABLE)
-    }
+def _bodies(assembly: Assembly) -> dict[str, Body]:
+    """Return everything that is stiff, by name: a cable can be held aside."""
+    names = (*assembly.made, *assembly.bought)
+    soft = {name for name in names if assembly.thing(name) in (ROTOR_LEADS, FIXED_CABLES)}
+    soft |= {name for name in names if name.startswith(LIDAR_CABLE)}
+    return {name: Body(assembly.mesh(name)) for name in names if name not in soft}
 
 
 def _error(number: int, scene: StepScene, joint: Joint, blocked: Sequence[Blocked]) -> Finding:

@@ -31,7 +31,7 @@ def drawing_files(
     for name in assembly.made:
         sheet = drawing_of(name, scanner, assembly, masses_g[name], config_hash)
         shown = list(drawn_on(sheet))
-        files[f"drawings/{name}.pdf"] = pdf_bytes(sheet, shown)
+        files[f"drawings/{name}.pdf"] = pdf_bytes([(sheet, shown)])
         files[f"drawings/{name}.svg"] = svg_bytes(sheet, shown)
         files[f"drawings/{name}.dxf"] = dxf_bytes(sheet)
     return files

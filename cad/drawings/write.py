@@ -94,15 +94,26 @@ def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
     return "\n".join([*lines, "</svg>", ""]).encode("utf-8")
 
 
-def pdf_bytes(sheet: Sheet, shown: Drawn) -> bytes:
-    """Return the same page in Helvetica, one of the fonts that every reader has."""
+def pdf_bytes(pages: Sequence[tuple[Sheet, Drawn]]) -> bytes:
+    """Return a file of the same pages in Helvetica, one of the fonts that every reader has.
+
+    Args:
+        pages: one or more sheets, each with what is `drawn_on` it; the file has the name of the first.
+    """
     file = io.BytesIO()
     # not compressed: what a compressor makes of it depends on its version
-    canvas = Canvas(
-        file, pagesize=(sheet.size[0] * POINTS_PER_MM, sheet.size[1] * POINTS_PER_MM), invariant=1, pageCompression=0
-    )
-    canvas.setTitle(sheet.name)
+    canvas = Canvas(file, invariant=1, pageCompression=0)
+    canvas.setTitle(pages[0][0].name)
     canvas.setCreator("scanwright")
+    for sheet, shown in pages:
+        canvas.setPageSize((sheet.size[0] * POINTS_PER_MM, sheet.size[1] * POINTS_PER_MM))
+        _draw_page(canvas, shown)
+        canvas.showPage()
+    canvas.save()
+    return file.getvalue()
+
+
+def _draw_page(canvas: Canvas, shown: Drawn) -> None:
     canvas.scale(POINTS_PER_MM, POINTS_PER_MM)
     canvas.setLineCap(1)
     write = {"left": canvas.drawString, "middle": canvas.drawCentredString, "right": canvas.drawRightString}
@@ -122,9 +133,6 @@ def pdf_bytes(sheet: Sheet, shown: Drawn) -> bytes:
         canvas.setLineWidth(WIDTHS[item.layer])
         canvas.setDash(list(DASHES.get(item.layer, ())))
         canvas.drawPath(outline, stroke=int(not item.filled), fill=int(item.filled))
-    canvas.showPage()
-    canvas.save()
-    return file.getvalue()
 
 
 def dxf_bytes(sheet: Sheet) -> bytes:

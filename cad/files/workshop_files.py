@@ -7,6 +7,7 @@ from pathlib import Path
 
 from scanwright.cad.assembly.print_settings import slicer_settings
 from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.drawings.devices.template import template_pdf
 from scanwright.cad.files.bom import bom_text, items_of
 from scanwright.cad.files.glb_scenes import scene_files
 from scanwright.cad.files.manual.instructions import step_files
@@ -17,7 +18,9 @@ from scanwright.cad.files.wiring import wiring_files
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
 from scanwright.cad.labels.fit_coupon import fit_coupon
-from scanwright.cad.layout.names import FIT_COUPON
+from scanwright.cad.labels.test_plate import make_test_plate
+from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
+from scanwright.cad.layout.screw_patterns import screw_patterns
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.progress import Progress
@@ -54,12 +57,17 @@ def export_scanner(
     printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}
     progress("making the fit coupon")
     coupon = checked_mesh(fit_coupon(scanner, assembly.layout.stack), FIT_COUPON)
+    patterns = screw_patterns(joints, assembly.layout.stack.R())
+    first = {FIT_COUPON: coupon}
+    if (plate := make_test_plate(scanner, patterns)) is not None:
+        first[TEST_PLATE] = checked_mesh(plate, TEST_PLATE)
+    tried = {name: on_bed(mesh, print_pose(mesh, scanner.printer.bed_mm)) for name, mesh in first.items()}
     settings = slicer_settings(scanner.printer)
-    lying = on_bed(coupon, print_pose(coupon, scanner.printer.bed_mm))
     files = {
         f"print/{part}.3mf": threemf_bytes({part: mesh}, part, f"{about}, as it lies on the bed", settings)
-        for part, mesh in (printed | {FIT_COUPON: lying}).items()
+        for part, mesh in (printed | tried).items()
     }
+    files["template.pdf"] = template_pdf(scanner, patterns)
     plates = plates_of(printed, scanner.printer.bed_mm)
     files |= plate_files(plates, scanner.printer.bed_mm, about, settings)
     progress("writing assembly.glb and exploded.glb")

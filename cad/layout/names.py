@@ -23,6 +23,7 @@ SHAFT_PULLEY = "shaft_pulley"
 SHAFT_RING = "shaft_ring"
 SLIP_RING_ADAPTER = "slip_ring_adapter"
 SUB_PLATE = "sub_plate"
+TEST_PLATE = "test_plate"
 TRIPOD_FOOT = "tripod_foot"
 
 # bought products, and what they are screwed to

@@ -48,7 +48,8 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
         f"{screws(SERVO_HORN)}"
     )
-    check, rows = "the index groove stands over the middle of the +Y face", ()
+    check = "the index groove stands over the middle of the +Y face"
+    rows: tuple[Row, ...] = ()
     if stack.bearing is not None:
         words += (
             " Loosen them by a quarter turn, put an indicator on the upper end of the shaft and turn the servo once: "

@@ -65,7 +65,7 @@ def linkage_sag(
     coarse, fine = (_on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3) for edge in EDGES)
     # what is left of an error that falls with the edge: the elements gain more, corners and edges no less
     errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse[:2], fine[:2], strict=True)]
-    return Sag(*fine[:2], *errors, fine[2])
+    return Sag(fine[0], fine[1], errors[0], errors[1], fine[2])
 
 
 def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:

@@ -19,7 +19,7 @@ from scanwright.design.frames import cross_matrix
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class SpringRow:
     """Bodies on springs: stiffness and mass of the springs' deformations, shape (6 n, 6 n)."""
 
     stiffness: Array
@@ -42,7 +42,7 @@ class Row:
         return np.asarray(np.linalg.solve(dynamic, np.tile(load, count)).reshape(count, 6).sum(axis=0))
 
 
-def row_of(springs: Sequence[Spring], masses: Sequence[Array]) -> Row:
+def row_of(springs: Sequence[Spring], masses: Sequence[Array]) -> SpringRow:
     """Return the bodies with these mass matrices (6, 6) on these springs."""
     count = len(springs)
     mass = np.zeros((count, 6, count, 6))
@@ -53,7 +53,7 @@ def row_of(springs: Sequence[Spring], masses: Sequence[Array]) -> Row:
         mass[i, :, :i] += spring.coupled.T[:, None]
         mass[i, :, i] += spring.own
     stiffness = block_diag(*(np.linalg.inv(spring.compliance) for spring in springs))
-    return Row(stiffness, mass.reshape(6 * count, -1))
+    return SpringRow(stiffness, mass.reshape(6 * count, -1))
 
 
 def mass_matrix(body: Inertial) -> Array:

@@ -46,8 +46,10 @@ class Servo(Product):
     horn_first_hole_deg: float = Field(ge=0, lt=360, description="of one hole from +y, position at its centre")
     horn_screw: Literal["M2", "M2.5", "M3"]
     horn_thread_depth_mm: float = Field(gt=0)
-    horn_kind: Literal["tapped", "self_tapping"] = Field(
-        default="tapped", exclude=True, description="of its holes: threads in metal, or plain ones in plastic"
+    horn_kind: Literal["tapped", "self_tapping"] | None = Field(
+        default=None,
+        exclude=True,
+        description="of its holes: threads in metal (also if unset), or plain ones in plastic",
     )
     holes: tuple[Hole, ...] = Field(description="of the case; those of the horn are stated by the horn_ fields")
     usb_ids: tuple[UsbId, ...] | None = Field(

@@ -92,10 +92,10 @@ def _counted(
         raise TaskError("weight: masks leave too little of the regions to count beams in: widen them") from error
     near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, task.density.ball_radius_deg / 60))
     cost = near + PER_LAYER * (len(task.weight) + len(task.mask)) / max(count.weighted, 1e-3)
-    needed = points * (SURE * count.J_error / (AIM * NEAR)) ** 2 if np.isfinite(count.J_error) else np.inf
-    more = 2 ** int(min(np.ceil(np.log2(max(needed, 1.0))), np.log2(MOST_WORK / cost)))  # as a net has points
-    if more > points:
-        points = more
+    while SURE * count.J_error > NEAR and 2 * points * cost <= MOST_WORK:
+        # the error of a net falls nearly as the number of its points, which is a power of two
+        times = min(SURE * count.J_error / (AIM * NEAR), MOST_WORK / cost / points)
+        points *= 2 ** max(1, int(np.log2(times)))
         count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
     return count.J, SURE * count.J_error, points
 

@@ -83,7 +83,7 @@ class Effort:
     Attributes:
         fineness: of the nodes or directions that coarse J is taken from, 1 as `coarse_landscape` says.
         margin: what coarse J may be off by: planes whose bound is further above the best stay a bound.
-        rounds: in which the best setting is refined, at most `len(refinement.REFINE_ROUNDS)`.
+        rounds: of refinement: 0 none, 1 a rough one, 2 a rough and a fine one.
     """
 
     fineness: float = 1.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import chain, count
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +11,6 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import NODES, Problem
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_within
@@ -19,14 +18,25 @@ from scanwright.design.progress import Progress, no_progress
 from scanwright.design.search.coarse import Landscape
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.grid_classes import Folded
-from scanwright.design.search.refinement import INDIFFERENT, REFINE_ROUNDS, allowed_setting, refined_setting
+from scanwright.design.search.refinement import (
+    INDIFFERENT,
+    NARROW,
+    VALLEY_J,
+    VALLEY_RAD,
+    WIDE,
+    Descent,
+    allowed_setting,
+    buildable_setting,
+    descended,
+    same_valley,
+    walked,
+)
 from scanwright.design.task.angle_ranges import AngleRanges
 
 FAMILIES = 10
 EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only
 SINGLE = 2e-6  # rounding of a landscape's lowest values, which are made in single precision
-VALLEY_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one answer
-VALLEY_J = 2e-2
+MOST_WALKS = 0, 1, 16  # from each minimum, by the rounds of refinement
 NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
 PIECE = 128  # planes whose J are made together
 MOST_TRIES = 80  # for local minima, before the list is left shorter
@@ -206,57 +216,59 @@ def refine_candidates(
     ranges: AngleRanges,
     candidates: list[Candidate],
     required: Requirements,
-    rounds: int = len(REFINE_ROUNDS),
+    rounds: int = 2,
     progress: Progress = no_progress,
 ) -> tuple[Family, ...]:
-    """Refine the minima, the winner in so many rounds, the others in one; valleys of better ones are dropped."""
-    done = count(1)
-    different = {
-        tuple(candidate.angles_deg): (candidate.score, candidate)
-        for candidate in candidates
-        if candidate.score is not None
-    }
-    ordered = sorted(different.values(), key=lambda pair: pair[0].J)
+    """Refine the minima: in one round by a walk each, in two as long as walks pay, and the best of them finely.
 
-    def minimum(k: int) -> tuple[Setting, Score | None]:
-        candidate = ordered[k][1]
-        its_rounds = REFINE_ROUNDS[: min(rounds, 1) if k else rounds]
-        refined = refined_setting(ranges, candidate.angles_deg, candidate.every_axis, its_rounds, required)
-        allowed = allowed_setting(refined, candidate.angles_deg, required)
-        ready = next(done)
-        progress("refining the minima", ready / max(ready, len(apart)))
-        return allowed
+    No two are in one valley; settings on slopes follow as they are.
+    """
+    minima = list({tuple(each.angles_deg): each for each in candidates if each.score is not None}.values())
+    starts = [(candidate.angles_deg, candidate.every_axis) for candidate in minima]
+    apart: list[Descent] = []
+    for descent in descended(ranges, starts, required, MOST_WALKS[rounds], progress):
+        if not any(same_valley(descent.angles_deg, descent.J, better.angles_deg, better.J) for better in apart):
+            apart.append(descent)
 
-    # all at once, but those that are in the winner's valley already
-    apart = [
-        k
-        for k, (exact, each) in enumerate(ordered)
-        if k == 0 or not _same_valley(each.angles_deg, exact.J, ordered[0][1])
-    ]
-    pieces = in_chunks(lambda some: [minimum(k) for k in apart[some]], len(apart), smallest=1)
-    at_once = dict(zip(apart, chain.from_iterable(pieces), strict=True))
+    def finished(descent: Descent, nodes: int = WIDE.nodes) -> Family:
+        return _finished(ranges, descent, minima[descent.start], required, nodes)
+
+    parts = in_chunks(lambda some: [finished(descent) for descent in apart[some]], len(apart), smallest=1)
+    ready = list(chain.from_iterable(parts))
+    if rounds > 1:  # which is the best, only exact scores tell
+        k = min(range(len(ready)), key=lambda k: ready[k].score.J)
+        narrow = finished(walked(ranges, apart[k], NARROW, required), NARROW.nodes)
+        ready[k] = min(narrow, ready[k], key=lambda family: family.score.J)
     families: list[Family] = []
-    for k, (exact, candidate) in enumerate(ordered):
-        if len(families) == FAMILIES:
-            break
-        if not any(_same_valley(candidate.angles_deg, exact.J, better) for better in families):
-            refined, again = at_once.get(k) or minimum(k)
-            # the rounder angles of the grid are as good
-            if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not ranges.tolerance_deg):
-                families.append(_family(candidate.angles_deg, exact, candidate))
-            elif not any(_same_valley(refined, again.J, better) for better in families):
-                families.append(_family(refined, again, candidate))
+    for family in sorted(ready, key=lambda family: family.score.J):
+        if _is_apart(family.angles_deg, family.score.J, families):
+            families.append(family)
     for candidate in candidates:
-        if len(families) == FAMILIES:
-            break
-        if candidate.score is None and not any(
-            _same_valley(candidate.angles_deg, candidate.J_coarse, x) for x in families
-        ):
+        if candidate.score is None and _is_apart(candidate.angles_deg, candidate.J_coarse, families):
             result = required.score(candidate.angles_deg)
             families += [] if result is None else [_family(candidate.angles_deg, result, candidate)]
     if ranges.tolerance_deg:
         return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
     return tuple(sorted(families, key=lambda family: family.score.J))
+
+
+def _is_apart(angles_deg: Array | tuple[float, ...], J: float, families: list[Family]) -> bool:
+    """Whether a setting is in no valley of the families, and these are not enough."""
+    known = any(same_valley(np.array(angles_deg), J, np.array(x.angles_deg), x.score.J) for x in families)
+    return not known and len(families) < FAMILIES
+
+
+def _finished(
+    ranges: AngleRanges, descent: Descent, candidate: Candidate, required: Requirements, nodes: int
+) -> Family:
+    """A refined candidate, rounded and scored exactly; or itself, as rounder angles are better if J is as low."""
+    exact = candidate.score
+    assert exact is not None
+    refined = buildable_setting(ranges, descent, nodes, required, candidate.angles_deg)
+    refined, again = allowed_setting(refined, candidate.angles_deg, required)
+    if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not ranges.tolerance_deg):
+        return _family(candidate.angles_deg, exact, candidate)
+    return _family(refined, again, candidate)
 
 
 def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:
@@ -276,11 +288,3 @@ def _family(angles_deg: Array, exact: Score, candidate: Candidate) -> Family:
 def _four(angles_deg: Array) -> tuple[float, float, float, float]:
     alpha_rot, beta_rot, alpha_laser, beta_laser = (float(angle) for angle in angles_deg)
     return alpha_rot, beta_rot, alpha_laser, beta_laser
-
-
-def _same_valley(angles_deg: Array, J: float, better: Family | Candidate) -> bool:
-    """Whether a setting has nearly the axis and nearly the J of a better one: the scan plane is then indifferent."""
-    assert better.score is not None
-    u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]
-    v = R_world_rot(*np.radians(better.angles_deg[:2]))[:, 2]
-    return bool(abs(u @ v) >= np.cos(VALLEY_RAD) and abs(J - better.score.J) <= VALLEY_J)

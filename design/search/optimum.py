@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
@@ -30,7 +31,7 @@ from scanwright.design.task.task import LoadedTask
 SQUARE_DEGREES = 41_253  # on the whole sphere
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Optimum:
     """What a task comes to.
 
@@ -39,14 +40,17 @@ class Optimum:
         loaded: the same; where it asks for the shortest period, with the one that was found.
         problem: its numbers.
         search: the best families and how they were found.
-        mounts: the reference mounts, tuned to the task.
     """
 
     asked: LoadedTask
     loaded: LoadedTask
     problem: Problem
     search: SearchResult
-    mounts: tuple[TunedMount, ...]
+
+    @cached_property
+    def mounts(self) -> tuple[TunedMount, ...]:
+        """The reference mounts, tuned to the task."""
+        return reference_mounts(self.problem, self.loaded.task)
 
     @property
     def title(self) -> str:
@@ -222,8 +226,7 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
         result = search(problem, loaded.task.angles, progress, loaded.task.limits)
     best = result.best[0]
     require_counted(found, best.angles_rad, best.score)
-    progress("tuning the reference mounts")
-    return Optimum(loaded, found, problem, result, reference_mounts(problem, found.task))
+    return Optimum(loaded, found, problem, result)
 
 
 def directions_left_out(problem: Problem) -> list[LeftOut]:

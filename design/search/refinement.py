@@ -11,24 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
+from functools import partial
+from itertools import chain, product
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from scanwright.design.arrays import Array, Rotation, Setting, Vector
+from scanwright.design.concurrency.parallel import in_chunks
+from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_off
+from scanwright.design.progress import Progress
 from scanwright.design.search.constraints import Requirements
 from scanwright.design.sphere.regions import frames_about
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 
 STEP = 2  # values that one step takes
-REFINE_ROUNDS = ((0.5, 243), (0.1, 1215))  # reach in grid steps, quadrature nodes
 FINEST_DEG = 0.01
 STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
+LITTLE, LUCK = 1e-3, 0.25  # of J: less is not worth a walk; what is left of a gain after a walk that gains less
 NEARLY_DEG, INDIFFERENT = 0.25, 1e-4  # to an angle of the grid; of J: about its error, 0.01 % of the beams
+VALLEY_RAD, VALLEY_J = np.radians(12.5), 2e-2  # nearer axes with nearly the same J are one answer
 PAIRS = slice(0, 2), slice(2, 4)  # of the axis, and of the scan plane
 
 
@@ -41,50 +46,135 @@ class Enough:
     values: int
 
 
-ROUGH = Enough(0.1, 1e-4, 30)  # deg, J, values an angle: of all that are not built, as far as their errors reach
-FINE = Enough(0.005, 1e-7, 30)
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A simplex: its first step in steps of the grid, the quadrature nodes of J, and its end (deg, J, values an angle).
 
-
-def refined_setting(
-    ranges: AngleRanges,
-    angles_deg: Setting,
-    any_axis: bool,
-    rounds: tuple[tuple[float, int], ...],
-    required: Requirements,
-) -> Setting:
-    """The nearest minimum of J that keeps the constraints, rounded to 0.01 deg.
-
-    Angles that the task fixes stay, and an axis that is any.
+    Attributes:
+        reach: the first step along each coordinate, in steps of the grid.
+        nodes: of the quadrature.
+        enough: when it ends, with the values an angle.
     """
+
+    reach: float
+    nodes: int
+    enough: Enough
+
+
+WIDE = Walk(0.5, 243, Enough(0.1, 1e-4, 60))
+SHRUNK = 1.0, 0.3, 0.1  # the reach of one walk after another
+NARROW = Walk(0.1, 1215, Enough(0.005, 1e-7, 30))
+
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """How far a setting of the grid has been refined.
+
+    Attributes:
+        start: number of the setting among those that were given.
+        any_axis: whether its axis is any, and stays.
+        angles_deg: the setting that its walks have come to.
+        J: of that, on the nodes of the walks; with a tolerance of the mounting the highest within it.
+        gain: by how much the next walk may lower J.
+    """
+
+    start: int
+    any_axis: bool
+    angles_deg: Setting
+    J: float = np.inf
+    gain: float = np.inf
+
+
+def descended(
+    ranges: AngleRanges, starts: list[tuple[Setting, bool]], required: Requirements, most: int, progress: Progress
+) -> list[Descent]:
+    """Walk from settings [deg], of which the axis may be any, at most so many times each; the lowest J first.
+
+    A valley may be long and narrower than the grid: a simplex ends far from its minimum, and one that is turned goes
+    on. It lowers J by about as much as the last one did, so those go on which that would make the best.
+    """
+    descents = [Descent(k, any_axis, angles_deg) for k, (angles_deg, any_axis) in enumerate(starts)]
+    for number in range(most):
+        lowest = min(descent.J for descent in descents)
+        open_ = [d for d in descents if not number or (d.gain > LITTLE and d.J - d.gain < lowest)]
+        if not open_:
+            break
+        walks = in_chunks(partial(_walks, ranges, required, number, open_), len(open_), smallest=1)
+        further = {descent.start: descent for descent in chain.from_iterable(walks)}
+        descents = [further.get(descent.start, descent) for descent in descents]
+        progress("refining the minima", (number + 1) / most)
+    return sorted(descents, key=lambda descent: descent.J)
+
+
+def walked(ranges: AngleRanges, descent: Descent, walk: Walk, required: Requirements, number: int = 0) -> Descent:
+    """The lowest setting that a simplex reaches: angles that the task fixes stay, and an axis that is any.
+
+    The first one has its sides along the coordinates, those of a higher number are turned.
+    """
+    free, limits = _free(ranges, descent.any_axis)
+    # a count of lines that is not whole takes ten times as long and moves no minimum, but it decides the lowest count
+    exact_count = required.limits.min_density is not None
+    easier = required if exact_count else replace(required, problem=required.problem.without_seam())
+    chart = _Chart(descent.angles_deg, free, limits, on_spheres=required.problem.sweep is None)
+
+    def J(moved: Array) -> float:
+        return _J_of(easier, ranges, chart.setting(moved), walk.nodes)
+
+    sides = np.eye(free.sum())
+    if number:
+        sides = np.linalg.qr(np.random.default_rng(number).normal(size=sides.shape))[0]
+    sides *= walk.reach * ranges.step_deg * SHRUNK[number % len(SHRUNK)]
+    corners, values = _first_simplex(J, chart, sides)
+    most = replace(walk.enough, values=walk.enough.values * len(sides) - len(values))
+    lowest, value = lowest_by_simplex(J, corners, values, chart.bounds, most)
+    # a walk without luck does not tell that the next one has none
+    gain = max(float(values[0]) - value, descent.gain * LUCK if number else 0.0)
+    return replace(descent, angles_deg=chart.setting(lowest), J=value, gain=gain)
+
+
+def _walks(
+    ranges: AngleRanges, required: Requirements, number: int, descents: list[Descent], some: slice
+) -> list[Descent]:
+    return [walked(ranges, descent, WIDE, required, number) for descent in descents[some]]
+
+
+def same_valley(angles_deg: Setting, J: float, other_deg: Setting, other_J: float) -> bool:
+    """Whether two settings have nearly the same axis and nearly the same J: the scan plane is then indifferent."""
+    if not abs(J - other_J) <= VALLEY_J:
+        return False
+    u, v = (R_world_rot(*np.radians(each[:2]))[:, 2] for each in (angles_deg, other_deg))
+    return bool(abs(u @ v) >= np.cos(VALLEY_RAD))
+
+
+def buildable_setting(
+    ranges: AngleRanges, descent: Descent, nodes: int, required: Requirements, otherwise: Setting
+) -> Setting:
+    """A refined setting, with angles of the grid if J is as low there, rounded to 0.01 deg within the constraints."""
+    free, limits = _free(ranges, descent.any_axis)
+    if not free.any():
+        return descent.angles_deg
+
+    def J(setting: Setting) -> float:
+        return _J_of(required, ranges, setting, nodes)
+
+    angles = _on_the_grid(descent.angles_deg, free, limits, ranges.step_deg, J)
+    return _rounded(angles, free, limits, nodes, required, otherwise)
+
+
+def _free(ranges: AngleRanges, any_axis: bool) -> tuple[Bool[ndarray, " 4"], Float[ndarray, "4 2"]]:
+    """Which angles may move, and the limits of each."""
     limits = np.array([ranges.limits(name) for name in NAMES])
     free = limits[:, 1] > limits[:, 0]
     free[:2] &= not any_axis
-    angles = angles_deg.copy()
-    if not free.any() or not rounds:
-        return angles
+    return free, limits
 
-    def J_of(setting: Setting, nodes: int, required: Requirements = required) -> float:
-        designed = required.J(setting, nodes)
-        if not ranges.tolerance_deg or not np.isfinite(designed):
-            return designed
-        off_rad = np.radians(ranges.tolerance_deg)
-        return max(designed, worst_off(required.problem, np.radians(setting), off_rad, nodes))
 
-    exact_count = required.limits.min_density is not None
-    easier = required if exact_count else replace(required, problem=required.problem.without_seam())
-    for reach, nodes in rounds:  # a second, narrower simplex: the first often stops short in a flat valley
-        chart = _Chart(angles, free, limits, on_spheres=required.problem.sweep is None)
-
-        def J(moved: Array, chart: _Chart = chart, nodes: int = nodes) -> float:
-            return J_of(chart.setting(moved), nodes, easier)
-
-        corners, values = _first_simplex(J, chart, reach * ranges.step_deg)
-        enough = FINE if len(rounds) > 1 else ROUGH
-        most = replace(enough, values=enough.values * int(free.sum()) - len(values))
-        angles = chart.setting(lowest_by_simplex(J, corners, values, chart.bounds, most))
-    finest = rounds[-1][1]
-    angles = _on_the_grid(angles, free, limits, ranges.step_deg, lambda setting: J_of(setting, finest))
-    return _rounded(angles, free, limits, finest, required, angles_deg)
+def _J_of(required: Requirements, ranges: AngleRanges, angles_deg: Setting, nodes: int) -> float:
+    """J of a setting, or the highest within the tolerance of the mounting; inf where the setting is refused."""
+    designed = required.J(angles_deg, nodes)
+    if not ranges.tolerance_deg or not np.isfinite(designed):
+        return designed
+    return max(designed, worst_off(required.problem, np.radians(angles_deg), np.radians(ranges.tolerance_deg), nodes))
 
 
 def allowed_setting(refined: Setting, candidate: Setting, required: Requirements) -> tuple[Setting, Score | None]:
@@ -103,8 +193,8 @@ def lowest_by_simplex(
     values: Float[ndarray, " corners"],
     bounds: Float[ndarray, "n 2"],
     enough: Enough,
-) -> Float[ndarray, " n"]:
-    """The lowest corner of a simplex that reflects, expands and contracts (Nelder and Mead 1965), shape (n,).
+) -> tuple[Float[ndarray, " n"], float]:
+    """The lowest corner of a simplex that reflects, expands and contracts (Nelder and Mead 1965), and its value.
 
     Args:
         value: what is minimised; inf where a point is refused.
@@ -127,7 +217,7 @@ def lowest_by_simplex(
         corners, values = corners[order], values[order]
         small = np.abs(corners[1:] - corners[0]).max() <= enough.size
         if left < STEP or (small and not values[-1] - values[0] > enough.spread):
-            return corners[0]
+            return corners[0], float(values[0])
         middle = corners[:-1].mean(axis=0)
         away = middle - corners[-1]
         result, low = tried(middle + away)
@@ -211,14 +301,14 @@ def _walked(frame: Rotation, moved_rad: Array) -> Vector:
     return np.cos(away) * start + np.sin(away) * along
 
 
-def _first_simplex(J: Callable[[Array], float], chart: _Chart, step: float) -> tuple[Array, Array]:
-    """The origin and a step along each coordinate, (free + 1, free): to the side of the lower J; with their J."""
-    start = chart.origin
-    corners = [(start, J(start))]
-    for i, (low, high) in enumerate(chart.bounds):
-        sides = [np.where(np.arange(len(start)) == i, start + sign * step, start) for sign in (1, -1)]
-        allowed = [side for side in sides if low <= side[i] <= high] or [np.clip(sides[0], *chart.bounds.T)]
-        corners.append(min(((side, J(side)) for side in allowed), key=lambda pair: pair[1]))
+def _first_simplex(J: Callable[[Array], float], chart: _Chart, sides: Float[ndarray, "n n"]) -> tuple[Array, Array]:
+    """The origin and a step along each side, forwards or back to the lower J, (n + 1, n); with their J."""
+    low, high = chart.bounds.T
+    corners = [(chart.origin, J(chart.origin))]
+    for side in sides:
+        ends = [chart.origin + side, chart.origin - side]
+        allowed = [end for end in ends if (low <= end).all() and (end <= high).all()] or [np.clip(ends[0], low, high)]
+        corners.append(min(((end, J(end)) for end in allowed), key=lambda pair: pair[1]))
     return np.array([point for point, _ in corners]), np.array([value for _, value in corners])
 
 

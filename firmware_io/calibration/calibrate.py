@@ -42,9 +42,10 @@ class Calibration:
     out: Path
     frames: tuple[str, ...] = ()
 
-    def lines(self) -> list[str]:
-        """The same in words."""
-        return [*lines(self.record), f"wrote {self.out} and {report_path(self.out).name}", *self.frames]
+    def lines(self, in_full: bool = False) -> list[str]:
+        """Return the same as lines; the commands that publish the frames only `in_full`."""
+        frames = self.frames if in_full else [line for line in self.frames if not line.startswith((" ", "as "))]
+        return [*lines(self.record), f"wrote {self.out} and {report_path(self.out).name}", *frames]
 
 
 def calibrate_recordings(

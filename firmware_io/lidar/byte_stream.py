@@ -37,6 +37,8 @@ class SerialStream:
 
     def __init__(self, port: str) -> None:
         self._port = open_serial_port(port, FIRST_BAUD)
+        with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):  # not every driver can
+            self._port.set_low_latency_mode(True)  # an FTDI adapter gathers bytes for 16 ms otherwise
         self._port.reset_input_buffer()
 
     @property

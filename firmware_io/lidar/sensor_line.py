@@ -16,6 +16,7 @@ from typing import Self, TypeVar
 
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
+from scanwright.firmware_io.serial_port import latency_ms
 
 _POLL_S = 0.05  # between two tries to connect
 _LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
@@ -108,6 +109,10 @@ class SensorLine:
                 return
         raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
+    def widened(self, uncertainty_ns: float) -> int:
+        """Return the standard uncertainty of a time made of arrivals, with that of an adapter which gathers bytes."""
+        return round(math.hypot(uncertainty_ns, self._gathers_ns / math.sqrt(12)))
+
     def close(self) -> None:
         """Let go of the port; what is closed stays so."""
         self.stream.close()
@@ -124,6 +129,7 @@ class SensorLine:
 
     def _open(self, address: str) -> None:
         self.stream = open_stream(address)
+        self._gathers_ns = 1_000_000 * latency_ms(address)
         self._read_ns = time.monotonic_ns()  # when the last read returned
 
     def _look(self, timeout_s: float) -> bytes:

@@ -118,7 +118,9 @@ class TurnQueue:
         return None
 
 
-def timed_scan(turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, *, intensity: bool) -> TimedScan:
+def timed_scan(
+    turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, uncertainty_ns: int, *, intensity: bool
+) -> TimedScan:
     """A turn on the host's clock; its even grid is the one from its first to its last beam."""
     since_ns = (turn.sensor_ns - turn.sensor_ns[0]) * line.rate
     offset_ns = np.maximum.accumulate(np.rint(since_ns)).astype(np.int64)
@@ -137,7 +139,7 @@ def timed_scan(turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, *
         beam_bearing_rad=bearing_rad,
         beam_offset_ns=offset_ns,
     )
-    return TimedScan(scan, arrival_ns, line.uncertainty_ns)
+    return TimedScan(scan, arrival_ns, uncertainty_ns)
 
 
 def _joined(parts: list[Points]) -> Points:

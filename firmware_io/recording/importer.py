@@ -275,7 +275,8 @@ def _write(
         raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
         scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
         if hasattr(laser_scan, "echoes"):
-            scan = with_all_echoes(scan, *laser_scan.echoes, echoes)
+            range_m, intensity = laser_scan.echoes
+            scan = with_all_echoes(scan, range_m, intensity, echoes)
         scan = without_far(scan, corrections)
         if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from scanwright.design.errors import DeviceError
-from scanwright.firmware_io.serial_port import latency_timer
+from scanwright.firmware_io.serial_port import latency_ms, latency_timer
 from scanwright.firmware_io.servo.bus.registers import ControlTable, Register, Setting
 from scanwright.firmware_io.servo.bus.unit import ServoUnit
 
@@ -123,16 +123,12 @@ def settable(table: ControlTable) -> dict[str, Register]:
 
 def slow_adapter(port: str) -> str | None:
     """What to do about a USB adapter that gathers bytes before it hands them over; None where there is none."""
-    timer = latency_timer(port)
-    try:
-        latency_ms = 0 if timer is None else int(timer.read_text())
-    except (OSError, ValueError):
-        return None
-    if latency_ms <= 1:
+    gathers_ms = latency_ms(port)
+    if gathers_ms <= 1:
         return None
     return (
-        f"the USB adapter gathers bytes for {latency_ms} ms, so angles are late and few: as root, "
-        f'echo 1 > {timer}, or permanently a udev rule with ATTR{{latency_timer}}="1"'
+        f"the USB adapter gathers bytes for {gathers_ms} ms, so angles are late and few: as root, "
+        f'echo 1 > {latency_timer(port)}, or permanently a udev rule with ATTR{{latency_timer}}="1"'
     )
 
 

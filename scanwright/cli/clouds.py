@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, show_result
+from scanwright.cli.console import ConsoleProgress, Verbosity, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
@@ -108,14 +108,14 @@ def calibrate(
 ) -> None:
     """Estimate mounting errors from recordings.
 
-    Needs static scenes with walls in several directions, and no targets. If own_body.npz is next to the angle set,
-    beams that hit the scanner itself are dropped; if scanner.urdf is there, scanner.calibrated.urdf is written next to
-    the calibrated angle set.
+    Needs static scenes with walls in several directions, and no targets. With -v, prints the frames for ROS 2 as well.
+    If own_body.npz is next to the angle set, beams that hit the scanner itself are dropped; if scanner.urdf is there,
+    scanner.calibrated.urdf is written next to the calibrated angle set.
     """
     from scanwright import api
 
     result = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
-    show_result(result.lines, result.record, as_json)
+    show_result(lambda: result.lines(verbosity() is Verbosity.VERBOSE), result.record, as_json)
 
 
 @app.command(example="register a.ply b.ply -o merged.ply", no="a cloud could not be aligned")

@@ -38,9 +38,9 @@ def optimise(
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        from scanwright.cli.results.angles import Optimised
+        from scanwright.cli.results.angles import Optimised, PlaneResult
 
-        plane_facts = [plane.facts() for plane in planes]
+        plane_facts = [PlaneResult(**plane.facts()) for plane in planes]
         show_json(Optimised(**optimum.facts(), planes=plane_facts, warnings=optimum.asked.warnings()))
     else:
         scan = (f"one full scan, {plane.words()}" for plane in planes)
@@ -184,9 +184,12 @@ def catalogue(
     min_range_m: Annotated[float | None, Option(metavar="M", help="Minimum range, practical if known.")] = None,
     max_mass_g: Annotated[float | None, Option(metavar="G", help="Maximum mass in grams.")] = None,
     max_price_usd: Annotated[float | None, Option(metavar="USD", help="Maximum price.")] = None,
+    sketch: Annotated[Path | None, Option(metavar="FILE.svg", help="Draw NAME with its dimensions.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """List lidars, servos, slip rings and other products."""
+    if sketch is not None and name is None:
+        raise typer.BadParameter("draws one product, with its NAME before the option", param_hint="--sketch")
     from scanwright.cli.results.of_commands import Products
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.table import chosen, table_lines
@@ -204,7 +207,14 @@ def catalogue(
         )
     )
     record = Products([product.facts() for product in listed])
+    if sketch is not None:
+        require_kernel("catalogue --sketch")
+        from scanwright.cad.drawings.devices.sketch import sketch_svg
+
+        sketch.write_bytes(sketch_svg(listed[0]))
     show_result(lambda: listed[0].lines() if name else table_lines(listed), record, as_json)
+    if sketch is not None:
+        hint(f"wrote {sketch}")
 
 
 @app.command(example="schema > task.schema.json")

@@ -121,17 +121,17 @@ def _prompted(
         question = "3. How many metres over the ground is the scanner?"
         height_m = _until(question, None, _number, lambda height: checked(height_m=height))
     if robot is None:
-        print("   Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
+        print("4. Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
         print("   or a file with its mesh (STL, OBJ, PLY), or none")
         robot = _until("  ", "none", str, lambda what: checked(robot=what))
     if not see:
-        print("4. What must it see? One or more, separated by spaces. Numbers are optional:")
+        print("5. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
         print("   wall:3:4         3 m ahead, 4 m wide                around:30:30  all around, 30 deg up and down")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")
         see = _until("  ", "ground ceiling", str.split, lambda regions: checked(see=regions))
     if scan_s is None:
-        question = "5. How many seconds may one full scan take? Longer is denser"
+        question = "6. How many seconds may one full scan take? Longer is denser"
         scan_s = _until(question, "10", _number, lambda seconds: checked(scan_s=seconds))
     return lidar, servo, height_m, robot, see, scan_s
 

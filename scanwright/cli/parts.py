@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from typer import Argument, Option
 
 from scanwright.cad.checks.checks_json import entries_of, failure_lines
+from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, BuildFolder, Out, TaskFile
 from scanwright.cli.console import (
     ConsoleProgress,
@@ -42,7 +43,7 @@ def build(
 
     Writes everything into DIR/<task>/; does nothing if the build is current.
     """
-    from scanwright.cli.results.of_commands import Built, Rebuilt
+    from scanwright.cli.results.of_commands import Built, Check, Rebuilt
 
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
@@ -60,7 +61,9 @@ def build(
         print_note("; ".join(("stopped", *notes_of(stop))))
         raise typer.Exit(130) from None
     _print_failed_checks(built.checks)
-    record = Built(built.folder, built.files, built.warnings, built.misfits, entries_of(built.checks))
+    record = Built(
+        built.folder, built.files, built.warnings, built.misfits, [Check(**entry) for entry in entries_of(built.checks)]
+    )
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
     _warn_of_misfits(built.misfits)
     report = built.folder / "report.html"
@@ -90,7 +93,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     Prints the failed checks and the warnings; with -v, all checks.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Checked
+    from scanwright.cli.results.of_commands import Check, Checked
     from scanwright.pipeline.build import finding_lines
 
     checks = api.check(out, progress=ConsoleProgress())
@@ -104,8 +107,37 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
         named = ("unverified", "known_error")  # a line sums them up
         warnings = [each for each in checks if each.severity == "warning" and each.code not in named]
         lines += finding_lines(warnings, checks, in_full=False)
-    show_result(lambda: lines, Checked(loaded.task.name, entries_of(checks)), as_json)
+    show_result(lambda: lines, Checked(loaded.task.name, [Check(**entry) for entry in entries_of(checks)]), as_json)
     raise typer.Exit(1 if errors_in(checks) else 0)
+
+
+Axis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+@app.command(example="measure lidar.step --kind lidar --out my_lidar.toml")
+def measure(
+    model: Annotated[Path, Argument(metavar="FILE", help="Maker's model of the device: STEP or STL.")],
+    kind: Annotated[Literal["lidar", "servo"], Option(metavar="KIND", help="lidar or servo.")] = "lidar",
+    up: Annotated[Axis, Option(metavar="AXIS", help="Axis of the model up from the base, or out of the horn.")] = "+z",
+    front: Annotated[Axis, Option(metavar="AXIS", help="Axis of the model that is the device's +x.")] = "+x",
+    unit: Annotated[Literal["mm", "cm", "m", "inch"] | None, Option(help="Unit of an STL file [default: mm].")] = None,
+    out: Annotated[Path | None, Option(metavar="FILE.toml", help="Proposal [default: name of the model].")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Propose a product file from a maker's model.
+
+    Writes holes, body, window and horn, all marked unverified, and a picture of the same name.
+    """
+    require_kernel("measure")
+    from scanwright.cad.measure.files import measure_files
+    from scanwright.cli.results.of_commands import MeasuredModel
+
+    out = out or Path(model.with_suffix(".toml").name)
+    measured = measure_files(model, out, kind, up=up, front=front, unit=unit, progress=ConsoleProgress())
+    proposal = measured.proposal
+    record = MeasuredModel(proposal.values, proposal.notes, measured.toml, measured.picture)
+    show_result(measured.lines, record, as_json)
+    hint(f"next: compare {out} with the device and {measured.picture}, and add what the data sheet states")
 
 
 @app.command(example="study fleet --plan")

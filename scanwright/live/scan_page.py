@@ -6,6 +6,7 @@ seconds, so that the first scan is already seen.
 
 from __future__ import annotations
 
+import logging
 import signal
 import sys
 import time
@@ -16,13 +17,20 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
+from typing import TYPE_CHECKING
 
-from scanwright.design.angles import angles_in_use
+import numpy as np
+
+from scanwright.design.angles import AngleSet, angles_in_use
 from scanwright.design.errors import ScanwrightError
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.scan.live_feed import UNWATCHED, Feed, Placing, Viewer, growing
 from scanwright.firmware_io.scan.scan_end import LOST
 
+if TYPE_CHECKING:
+    from scanwright.live.cloud_view import CloudView
+
+_LOG = logging.getLogger(__name__)
 ALONE_S = 10.0  # without a visitor; a page that is reloaded returns sooner
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
 _CLOSED_S = 1.0  # for the page to end if no browser is connected
@@ -97,6 +105,8 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
             telling.send("seen")
 
         Thread(target=tell_of_visitor, name="visitor", daemon=True).start()
+        if (folder / "task.toml").is_file():
+            Thread(target=_expect, args=(view, folder, in_use.angles), name="expected", daemon=True).start()
         for growth in growing(receiving, placing):
             view.add(growth)
         if view.end is None:  # the scan program went away
@@ -104,3 +114,28 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
         view.tell("this page ends when you close it")
         if gate.visitors:
             wait_until_alone(gate, ALONE_S)
+
+
+def _expect(view: CloudView, folder: Path, angles: AngleSet) -> None:
+    """Show the density that a full scan has where the task looks."""
+    from scanwright.design.evaluation.coverage import mean_density_at
+    from scanwright.design.self_occlusion import load_self_occlusion
+    from scanwright.design.task.task import load_task
+    from scanwright.report.answer import mounting_rad, problem_as_built
+    from scanwright.report.colours import bands_to
+    from scanwright.report.density_sphere import DENSEST
+    from scanwright.report.room import room_about
+    from scanwright.serving.density_room import room_tiles
+
+    own_body = folder / "own_body.npz"
+    try:
+        loaded = load_task(folder / "task.toml")
+        problem = problem_as_built(loaded, angles)
+        tiles = room_tiles(room_about(loaded.task))
+        tiles = tiles.where(problem.field.weight_at(tiles.directions) > 0)
+        shadow = load_self_occlusion(own_body)[0] if own_body.is_file() else None
+        density = mean_density_at(problem, mounting_rad(angles), tiles.directions, shadow)
+    except ScanwrightError as error:
+        _LOG.warning("live: no expected density: %s", error)
+        return
+    view.expect(tiles, density, bands_to(float(np.quantile(density, DENSEST))))

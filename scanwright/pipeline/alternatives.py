@@ -27,7 +27,9 @@ def what_fits(loaded: LoadedTask, angles: AngleSet) -> str:
 def _layouts(loaded: LoadedTask, angles: AngleSet) -> Iterator[str]:
     """Yield servo and ring in words: other rings first, then other servos with the same ring, then the rest."""
     servos = [each for each in loaded.products if isinstance(each, Servo)]
-    rings = [each for each in loaded.products if isinstance(each, SlipRing)] if angles.slip_ring is not None else [None]
+    rings: list[SlipRing | None] = [None]
+    if angles.slip_ring is not None:
+        rings = [each for each in loaded.products if isinstance(each, SlipRing)]
     pairs = [
         (servo, ring)
         for servo in servos

@@ -228,6 +228,7 @@ def _that_passes(
     parts, errors = _written_and_checked(begin, attempt, work, progress)
     while errors and len(failed) < MOST_FAILED:
         failed[attempt[0].family.angles_deg] = errors[0].message
+        _at(progress, "shadow")(f"a check failed, trying another mount: {errors[0].message}")
         try:
             attempt = begin(_chosen_and_made, optimum, task_sha256, failed, progress)()
         except BuildError:  # there is no other one

@@ -6,6 +6,7 @@ Pictures become data addresses, so that the page needs no other file.
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import json
 from base64 import b64encode
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from scanwright.design.arrays import Array
@@ -76,3 +78,13 @@ def png_uri(image: Image.Image) -> str:
     stream = io.BytesIO()
     image.save(stream, format="PNG")
     return data_uri(stream.getvalue())
+
+
+def packed(text: str) -> str:
+    """Return a text compressed, in base64: `inflated` in stage.js reads it."""
+    return b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+
+
+def numbers(values: ArrayLike, kind: str) -> str:
+    """Return an array of numbers of a kind, in base64."""
+    return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -1,18 +1,15 @@
-"""The sphere of the report: densities and J over the axis directions, each one picture to be wrapped about a ball.
+"""The maps of the report: densities and J over the axis directions, each one picture of all directions.
 
-A picture is unrolled: theta from up to down, phi from -180 to 180 deg, so that its middle is ahead; the density maps of
-a build have the same colours.
+A map is unrolled: theta from up to down, phi from -180 to 180 deg, so that its middle is ahead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import Normalize, to_hex
+from matplotlib.colors import Normalize
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
@@ -26,10 +23,10 @@ from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.report.answer import mounting_rad
 from scanwright.report.build_files import png_uri
+from scanwright.report.colours import Bands, bands_to, ramp
 
 STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
-FEWEST, MOST_BANDS = 5, 8  # beams at the lowest edge of a band, and bands
-DENSEST = 0.98  # of the sphere is not denser than the highest edge or twice of it: the rest lies about the axis
+DENSEST = 0.995  # of the sphere is not denser than the highest edge or twice of it: the rest lies about the axis
 WORST = 0.9  # quantile of the axes: the worst ones would use most of the shades
 # the palette: shades of the map, then what is no shade
 SHADES = 250
@@ -37,37 +34,9 @@ OUTLINE, HALO, MASKED, HATCH, NOTHING = range(SHADES, SHADES + 5)
 PLAIN = [(17, 17, 17), (255, 255, 255), (221, 221, 221), (119, 119, 119), (255, 255, 255)]
 HATCH_CELLS = 12  # period of the hatching
 MOST_LEVELS = 8  # of the weight with an outline each
-AZIMUTH_DEG, STEEPEST_DEG = 25.0, 50.0  # of the camera: a ball looks round from the side
-UPRIGHT = 0.05  # a middle less far from the vertical has no yaw
 NOWHERE = 1e-3  # a mean direction shorter than this is none
 
 Indices = NDArray[np.uint8]
-
-
-@dataclass(frozen=True, slots=True)
-class Bands:
-    """Bands of beam density whose edges double, so that a step of colour is the same ratio everywhere.
-
-    Attributes:
-        edges: beams, rising; what is below the first one is a band too.
-    """
-
-    edges: tuple[int, ...]
-
-    def __call__(self, density: ArrayLike) -> Array:
-        """Return the band of each density as a share of the colour scale, 0 for the lowest, 1 for the highest."""
-        return np.searchsorted(self.edges, density, side="right") / len(self.edges)
-
-    def key(self) -> list[tuple[str, str]]:
-        """Return the colour of each band and the fewest beams in it, the lowest first."""
-        words = [f"<{self.edges[0]}", *map(str, self.edges)]
-        return [(to_hex(colormaps["cividis"](i / len(self.edges))), word) for i, word in enumerate(words)]
-
-
-def bands_to(highest: float) -> Bands:
-    """Return the bands up to a density: the edges are `FEWEST` times powers of 2."""
-    top = max(0, int(np.log2(max(highest, FEWEST) / FEWEST)))
-    return Bands(tuple(FEWEST * 2**power for power in range(max(0, top - MOST_BANDS + 2), top + 1)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,11 +73,6 @@ class DensitySphere:
     axis_world: tuple[float, ...]
     middle: tuple[float, ...]
     below: float
-
-    def data(self) -> dict[str, Any]:
-        """Return what the page needs besides the pictures, ready for JSON."""
-        views = [{"title": view.title, "low": view.low, "high": view.high} for view in self.maps]
-        return {"axis": list(self.axis_world), "look_deg": list(_look(*self.middle)), "views": views}
 
 
 def density_sphere(
@@ -152,14 +116,6 @@ def density_sphere(
     middle *= (length > NOWHERE) / max(length, NOWHERE)
     below = float(counts[directions[:, 2] < 0].sum() / max(float(counts.sum()), 1e-12))
     return DensitySphere(tuple(maps), bands, axis, tuple(middle.round(6).tolist()), below)
-
-
-def _look(x: float, y: float, z: float) -> tuple[float, float]:
-    """Return yaw and pitch [deg] of the camera of the ball, to the side of a direction."""
-    across = float(np.hypot(x, y))
-    yaw = np.degrees(np.arctan2(y, x)) if across > UPRIGHT else 0.0
-    pitch = np.clip(np.degrees(np.arctan2(z, across)), -STEEPEST_DEG, STEEPEST_DEG)
-    return round(float(yaw)) + AZIMUTH_DEG, float(round(float(pitch)))
 
 
 def _directions() -> tuple[Array, tuple[int, int]]:
@@ -228,5 +184,4 @@ def _png(indices: Indices) -> str:
 
 
 def _palette() -> list[int]:
-    shades = colormaps["cividis"](np.linspace(0, 1, SHADES))[:, :3]
-    return [int(value) for value in (shades * 255).round().ravel()] + [value for colour in PLAIN for value in colour]
+    return [*ramp(np.linspace(0, 1, SHADES)).ravel().tolist(), *(value for colour in PLAIN for value in colour)]

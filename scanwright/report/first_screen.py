@@ -74,6 +74,13 @@ def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList 
         parts: parts list; None if unknown.
     """
     todo = _before_making(findings)
+    if "template.pdf" in files:
+        text = (
+            "Print template.pdf at 100 %, measure its 100 mm scale, and lay it on each device: do the screws meet the "
+            "holes? Then try the test plate on lidar and servo."
+        )
+        plates = tuple(name for name in ("template.pdf", "print/test_plate.3mf") if name in files)
+        todo.append(ToDo("Try the hole patterns on your devices", text, plates))
     if "print/fit_coupon.3mf" in files:
         text = "It shows which clearance your printer needs. Write the result into the printer's catalogue file."
         todo.append(ToDo("Print the fit coupon", text, ("print/fit_coupon.3mf",)))

@@ -40,3 +40,10 @@ window.addEventListener("beforeprint", () => {
   opened.forEach((details) => (details.open = true));
 });
 window.addEventListener("afterprint", () => opened.forEach((details) => (details.open = false)));
+
+// Drawings are inflated when they are first looked at.
+for (const details of document.querySelectorAll("details:has([data-packed])")) {
+  details.addEventListener("toggle", async () => {
+    for (const image of details.querySelectorAll("[data-packed]:not([src])")) image.src = await inflated(image.dataset.packed);
+  });
+}

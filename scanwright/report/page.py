@@ -5,6 +5,7 @@ If a file is missing, the page names it and omits what needs it; only `angles.js
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterable
 from functools import partial
@@ -15,38 +16,35 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
 from scanwright.cad.checks.checks_json import read_checks
-from scanwright.design.angles import load_angles
+from scanwright.design.angles import AngleSet, load_angles
 from scanwright.design.arrays import Array
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.objective.holes import percent
-from scanwright.design.self_occlusion import load_self_occlusion
-from scanwright.design.task.task import load_task
+from scanwright.design.objective.problem import Problem
+from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
+from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
-from scanwright.report.build_files import read, read_columns, read_json, read_picture, read_text
+from scanwright.report.build_files import packed, read, read_columns, read_json, read_picture, read_text
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
-from scanwright.report.density_sphere import density_sphere
+from scanwright.report.colours import COLOUR_STOPS
+from scanwright.report.density_sphere import DensitySphere, density_sphere
 from scanwright.report.first_screen import cards, count, motion_in_words, title, to_do
 from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
-from scanwright.report.parts_list import read_parts
-from scanwright.report.room_picture import room_picture
-from scanwright.report.scanner_scene import LARGEST_BYTES, about_centre, load_glb, placed_bodies, scanner_scene
+from scanwright.report.parts_list import price, read_parts
+from scanwright.report.room import cloud_scene, one_scan, room_about, room_scene
+from scanwright.report.scanner_scene import LARGEST_BYTES, load_glb, placed_bodies, robot_bodies, scanner_scene
 
 REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
 PLANES_CSV = ("alpha_laser_deg", "beta_laser_deg", "J", "alpha_rot_deg", "beta_rot_deg")
 AXES_CSV = ("alpha_rot_deg", "beta_rot_deg", "J")
-DIRECTIONS = {
-    "ahead": (1.1, 0, 0),
-    "behind": (-1.1, 0, 0),
-    "left": (0, 1.1, 0),
-    "right": (0, -1.1, 0),
-    "up": (0, 0, 1.1),
-    "down": (0, 0, -1.1),
-}  # of the world, around the ball
+RAYS = 90_000  # of the cloud of one scan: it shares the 3 MB of a page with the scanner and the drawings
+SPREAD_PERCENT = 1, 99  # of the heights, to which the colours reach
+CEILING_M = 1.2  # above the scanner, from which the cloud is cut away: it would hide the room
 
 
 def report_html(folder: Path, begin: Begin = in_turn) -> str:
@@ -71,8 +69,8 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "angles": angles,
         "motion": motion_in_words(angles.motion),
         "off_deg": OFF_DEG,
-        "directions": DIRECTIONS,
         "parts": parts,
+        "price": price,
         "planes": planes,
         "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
         "axes": axes,
@@ -85,7 +83,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "steps": read(folder / "assembly.md", partial(_steps, folder)),
         "wiring": read(folder / "wiring.svg", read_picture),
         "wiring_words": read(folder / "wiring.md", _wiring_words),
-        "drawings": {path.stem: read_picture(path) for path in sorted((folder / "drawings").glob("*.svg"))},
+        "drawings": {path.stem: packed(read_picture(path)) for path in sorted((folder / "drawings").glob("*.svg"))},
         "sheets": [name for name in files if name.startswith("drawings/") and name.endswith(".pdf")],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
         "manifest": read(folder / "manifest.json", _manifest),
@@ -93,6 +91,9 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         **on_task(),
         **on_bodies(),
     }
+    scenes = facts.pop("task_scene"), facts["scanner"] if isinstance(facts["scanner"], dict) else None
+    facts["scene"] = {key: value for scene in scenes if scene for key, value in scene.items()}
+    facts["packed_scene"] = packed(json.dumps(facts["scene"] | {"stops": COLOUR_STOPS}))
     try:
         return _environment().get_template("page.html.j2").render(facts)
     except UndefinedError as error:
@@ -125,10 +126,8 @@ def _on_task(folder: Path) -> dict[str, Any]:
     """Return what needs the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
-        return dict.fromkeys(("title", "objective", "ball_deg", "answer", "sphere", "room", "cards", "mounts"))
+        return dict.fromkeys(("title", "objective", "ball_deg", "answer", "sphere", "cards", "mounts", "task_scene"))
     angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
-    assembly = read(folder / "assembly.glb", load_glb)
-    scanner = [] if assembly is None else about_centre(assembly, angles)
     problem, task = problem_as_built(loaded, angles), loaded.task
     setting = mounting_rad(angles)
     planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_self_occlusion)
@@ -143,9 +142,30 @@ def _on_task(folder: Path) -> dict[str, Any]:
         "ball_deg": task.density.ball_radius_deg,
         "answer": result,
         "sphere": sphere,
-        "room": room_picture(task, folder, problem, setting, sphere, scanner, shadow),
+        "task_scene": _task_scene(loaded, angles, problem, sphere, shadow),
         "cards": cards(angles, result, figures, read(folder / "bom.csv", read_parts)),
         "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
+    }
+
+
+def _task_scene(
+    loaded: LoadedTask, angles: AngleSet, problem: Problem, sphere: DensitySphere, shadow: SelfOcclusion | None
+) -> dict[str, Any]:
+    """Return the room with its maps, and the cloud of one scan of the furnished room, for the stage."""
+    centre_m = angles.T_world_rot(0.0)[:3, 3]
+    room = room_about(loaded.task)
+    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": (0.0, 0.0, 0.0)}))
+    points = one_scan(scanner, joint_rad, None, loaded.source.parent, shadow, RAYS)
+    points = points[points[:, 2] < CEILING_M]
+    low, high = np.percentile(points[:, 2], SPREAD_PERCENT)
+    return room_scene(room, centre_m, np.array(sphere.middle), sphere.below) | {
+        "robot": robot_bodies(loaded.task, loaded.source.parent, centre_m),
+        "maps": [{"low": view.low, "high": view.high} for view in sphere.maps],
+        "cloud": cloud_scene(points + centre_m, (points[:, 2] - low) / (high - low)),
+        "shown": len(points),
+        "cast": problem.lines.count * problem.lines.repeats * len(problem.bearings_rad),
+        "heights": [f"{low:.1f} m", f"{high:.1f} m"],
     }
 
 
@@ -157,7 +177,7 @@ def _on_bodies(folder: Path) -> dict[str, Any]:
     bodies = None if assembly is None else placed_bodies(assembly)
     return {
         "hidden": None if own_body is None else hidden_by(own_body[0]),
-        "scene": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
+        "scanner": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
         "still": None if bodies is None else still(bodies),
         "places": {} if bodies is None else _places(bodies, findings or (), {} if parts is None else parts.bought),
     }

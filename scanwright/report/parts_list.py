@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from scanwright.cad.files.prices import ESTIMATED
 from scanwright.report.build_files import read_table
 
 Row = dict[str, str]
@@ -74,10 +75,17 @@ def read_parts(path: Path) -> PartsList:
     title_of = {kind: title for title, kinds in GROUPS.items() for kind in kinds}
     grouped: dict[str, list[Row]] = {title: [] for title in (*GROUPS, OTHERS)}
     for row in rows:
+        row["note"] = row["note"].replace(ESTIMATED, "estimate")  # the page says once what that is
         if row["kind"] != "total":
             grouped[title_of.get(row["kind"], OTHERS)].append(row)
     groups = tuple(Group(title, tuple(members)) for title, members in grouped.items() if members)
     return PartsList(groups, next((row for row in rows if row["kind"] == "total"), None))
+
+
+def price(row: Row) -> str:
+    """Return the range of one row's price as numbers; empty if there is none."""
+    ends = [float(row[column]) for column in ("low_usd", "high_usd") if row[column]]
+    return " to ".join(dict.fromkeys(f"{end:,.0f}" if end >= 10 else f"{end:.2g}" for end in ends))
 
 
 def usd_range(low: float, high: float) -> str:

@@ -1,13 +1,11 @@
 """The scanner in 3D for the report: bodies of `assembly.glb`, their places in `exploded.glb`, axis, field of view.
 
-The page draws this and reads no files: matrices are column by column, arrays little-endian in
-base64, all in the world frame in metres.
+The page draws this and reads no files: matrices are column by column, arrays little-endian in base64, all in the world
+frame in metres. Corners are in 65,535 steps of the body's box, and its matrices start from there.
 """
 
 from __future__ import annotations
 
-from base64 import b64encode
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scanwright.design.angles import AngleSet
-from scanwright.design.arrays import Array
-from scanwright.design.frames import apply
+from scanwright.design.arrays import Array, Vector
+from scanwright.design.frames import Rx, Ry, Rz, apply
 from scanwright.design.motion import Sweep
+from scanwright.design.scene.ray_caster import load_triangles
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
+from scanwright.design.task.shapes import MeshRegion
+from scanwright.design.task.task import Task
+from scanwright.report.build_files import numbers
 from scanwright.report.check_pictures import PlacedBody
 
 LARGEST_BYTES = 6_000_000  # of assembly.glb, of the 8 MB that a report may have: as much without normals in base64
@@ -28,6 +30,9 @@ SQUARE_M = 0.05  # of the grid below the scanner
 FAN_REACH = 0.9  # of the radius of the scanner: how far the fan and the axis are drawn
 Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # glTF has y up
 FRAMES = ("rot", "laser")
+STEPS = 2**16 - 1
+MOST_TRIANGLES = 30_000  # of a robot, 300 kB of the page; of more only the hatching is shown
+GREY = 0.6  # of a robot
 
 
 def load_glb(path: Path) -> Any:
@@ -62,20 +67,9 @@ def scanner_scene(
         T_apart = T_world_body if exploded is None else _pose(exploded, node)
         together.append(apply(T_world_body, mesh.vertices))
         spread.append(apply(T_apart, mesh.vertices))
-        vertices, number = np.unique(mesh.vertices, axis=0, return_inverse=True)  # they differ in their normals
-        wide = len(vertices) > 2**16 - 1
-        bodies.append(
-            {
-                "name": node,
-                "turns": node in turning,
-                "colour": _srgb(mesh.visual.material.baseColorFactor),
-                "matrix": _column_by_column(T_world_body),
-                "apart": _column_by_column(T_apart),
-                "vertices": _packed(vertices, "<f4"),
-                "faces": _packed(number.reshape(-1)[mesh.faces], "<u4" if wide else "<u2"),
-                "wide": wide,
-            }
-        )
+        body = _body(mesh.vertices, mesh.faces, T_world_body, _srgb(mesh.visual.material.baseColorFactor))
+        apart = _column_by_column(T_apart @ _T_body_box(mesh.vertices))
+        bodies.append(body | {"name": node, "turns": node in turning, "apart": apart})
     T_world_rot, T_world_laser = _pose(assembly, "rot"), _pose(assembly, "laser")
     reach = FAN_REACH * _fit(together)["radius"]
     grid = _grid(np.concatenate(together))
@@ -98,6 +92,29 @@ def scanner_scene(
     }
 
 
+def robot_bodies(task: Task, folder: Path, centre_m: Vector) -> list[dict[str, Any]]:
+    """Return the meshes that hide directions, for the stage.
+
+    Args:
+        task: its masks may name meshes.
+        folder: of their files.
+        centre_m: optical centre in the world [m].
+    """
+    robots = []
+    for region in task.mask:
+        if isinstance(region, MeshRegion):
+            roll, pitch, yaw = np.radians(region.rpy_deg)
+            T_world_mesh = np.eye(4)
+            T_world_mesh[:3, :3] = (Rz(yaw) @ Ry(pitch) @ Rx(roll)).T
+            T_world_mesh[:3, 3] = centre_m - T_world_mesh[:3, :3] @ region.sensor_m
+            triangles = load_triangles(folder / region.file, region.unit_m, T_world_mesh, region.posture)
+            if len(triangles) <= MOST_TRIANGLES:
+                corners = triangles.reshape(-1, 3)
+                body = _body(corners, np.arange(len(corners)).reshape(-1, 3), np.eye(4), [GREY] * 3)
+                robots.append(body | {"name": "robot", "turns": False, "apart": body["matrix"]})
+    return robots
+
+
 def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
     """Return the bodies of `assembly.glb` in the world."""
     turning = assembly.graph.transforms.successors("rot")
@@ -109,23 +126,37 @@ def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
     return bodies
 
 
-def about_centre(assembly: Any, angles: AngleSet) -> list[PlacedBody]:
-    """Return the same bodies, from the optical centre."""
-    centre_m = angles.T_world_rot(0.0)[:3, 3]
-    return [replace(body, triangles_m=body.triangles_m - centre_m) for body in placed_bodies(assembly).values()]
-
-
 def _pose(scene: Any, node: str) -> Array:
     """Return T_world_node, z up [m]."""
     return Y_TO_Z @ scene.graph.get(node)[0]
+
+
+def _body(vertices: Array, faces: Array, T_world_body: Array, colour: list[float]) -> dict[str, Any]:
+    """Return a body for the stage: corners in steps of its box."""
+    corners, number = np.unique(vertices, axis=0, return_inverse=True)  # they differ in their normals
+    wide, T_body_box = len(corners) > STEPS, _T_body_box(vertices)
+    return {
+        "colour": colour,
+        "matrix": _column_by_column(T_world_body @ T_body_box),
+        "vertices": numbers(np.round((corners - T_body_box[:3, 3]) / np.diag(T_body_box)[:3] * STEPS), "<u2"),
+        "faces": numbers(number.reshape(-1)[faces], "<u4" if wide else "<u2"),
+        "wide": wide,
+    }
+
+
+def _T_body_box(vertices: Array) -> Array:
+    """Return the transform from the unit cube to the box of a body."""
+    T = np.diag([*np.maximum(np.ptp(vertices, axis=0), 1e-9), 1.0])
+    T[:3, 3] = vertices.min(axis=0)
+    return T
 
 
 def _fan(shadow: SelfOcclusion, bearings_rad: Array) -> dict[str, Any]:
     """Return bearings, and for every beam that is ever hidden one bit an axis step, 1 if it is."""
     stator = np.zeros((len(bearings_rad), AXIS_STEPS), bool) if shadow.stator is None else shadow.stator
     hidden = stator | shadow.beams[:, None]
-    rows = {str(beam): _packed(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
-    return {"bearings": _packed(bearings_rad, "<f4"), "steps": hidden.shape[1], "hidden": rows}
+    rows = {str(beam): numbers(np.packbits(hidden[beam]), "u1") for beam in np.flatnonzero(hidden.any(axis=1))}
+    return {"bearings": numbers(bearings_rad, "<f4"), "steps": hidden.shape[1], "hidden": rows}
 
 
 def _grid(points: Array) -> dict[str, Any]:
@@ -154,7 +185,3 @@ def _srgb(linear: ArrayLike) -> list[float]:
 
 def _column_by_column(matrix: Array) -> list[float]:
     return (np.round(matrix, 9).T.ravel() + 0.0).tolist()
-
-
-def _packed(values: ArrayLike, kind: str) -> str:
-    return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")

@@ -20,10 +20,12 @@ import re
 import secrets
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from html import escape
 from http import HTTPStatus
 from importlib.resources import files
+from socket import socket
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
@@ -33,7 +35,9 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from scanwright.design.errors import TaskError
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
+from scanwright.serving.remembered import recalled, remember
 
 MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
 MOST_TEXT = 200  # characters of a text, entries of a list: more than our pages send
@@ -57,7 +61,14 @@ ICON = (
 )
 """A fan of beams, for the tab of the browser."""
 
-ADDED_TO_PAGE = "mended_page.css", "mended_page.js", "brush_ring.js", "fewer_points.js", "state_banner.js"
+ADDED_TO_PAGE = (
+    "mended_page.css",
+    "mended_page.js",
+    "brush_ring.js",
+    "fewer_points.js",
+    "state_banner.js",
+    "setting_link.js",
+)
 """A style and scripts that are put into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
@@ -73,14 +84,15 @@ class Gate:
         refused: what was turned away, reason -> how often.
     """
 
-    def __init__(self, port: int, title: str) -> None:
+    def __init__(self, port: int, title: str, *, recall: bool = False) -> None:
         self.title = title
-        self.token = secrets.token_urlsafe(24)
         self.refused: Counter[str] = Counter()
         self.visitors = 0
         self.opened = False
-        self.socket = bound(port)
+        self.socket, self.token = _opened(port, recall)
         self.port: int = self.socket.getsockname()[1]
+        if recall:
+            remember(self.port, self.token)
         self._cookie = f"scanwright-{self.port}"
         self._hosts = local_hosts(self.port)
 
@@ -166,6 +178,15 @@ class Gate:
             "X-Content-Type-Options": "nosniff",
             "Cache-Control": "no-store",
         }
+
+
+def _opened(port: int, recall: bool) -> tuple[socket, str]:
+    """Return a socket and a token: those of the last time if they are wanted and free."""
+    last = recalled() if recall else None
+    if last is not None and port in (0, last[0]):
+        with suppress(TaskError):
+            return bound(last[0]), last[1]
+    return bound(port), secrets.token_urlsafe(24)
 
 
 @cache

@@ -23,13 +23,18 @@ BRAND = (35, 77, 140)  # dark blue, readable under white text
 
 
 @contextmanager
-def guarded_server(title: str, port: int = 0) -> Iterator[tuple[viser.ViserServer, Gate]]:
-    """Run a viser server behind a gate while the body runs; `port` 0 chooses a free one.
+def guarded_server(title: str, port: int = 0, *, recall: bool = False) -> Iterator[tuple[viser.ViserServer, Gate]]:
+    """Run a viser server behind a gate while the body runs.
+
+    Args:
+        title: of the page.
+        port: of 127.0.0.1; 0 chooses a free one.
+        recall: whether to use port and token of the last time, so that links still work.
 
     Raises:
         TaskError: the port is taken.
     """
-    gate = Gate(port, title)
+    gate = Gate(port, title, recall=recall)
     rich.get_console().quiet = True  # viser greets on standard output, with an address that lacks the token
     # viser 1.1 takes a host and a port (`ViserServer`, `viser.infra.WebsockServer`), no socket and no check of its own
     opening = library.serve

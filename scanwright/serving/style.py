@@ -1,33 +1,11 @@
-"""The style of live pages: notes, banners and the colour scale."""
+"""Notes and banners of live pages, as HTML."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
 
-import numpy as np
-from numpy.typing import NDArray
-
-from scanwright.design.arrays import Array
-
-COLOUR_STOPS = (  # dark to light, readable in grey and for the colour-blind: a few stops of cividis
-    (0, 34, 78),
-    (50, 69, 108),
-    (102, 105, 112),
-    (150, 144, 119),
-    (205, 189, 104),
-    (253, 231, 55),
-)
-
-Colours = NDArray[np.uint8]
-
-
-def ramp(level: Array) -> Colours:
-    """Return the colours of levels 0 to 1, shape (n, 3); NaN counts as 0."""
-    stops = np.array(COLOUR_STOPS, dtype=float)
-    at = np.clip(np.nan_to_num(level), 0, 1) * (len(stops) - 1)
-    columns = [np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)]
-    return np.stack(columns, axis=1).astype(np.uint8)
+from scanwright.report.colours import Bands
 
 
 def banner_html(kind: str, lines: Iterable[str], *, lost: Iterable[str] = ()) -> str:
@@ -47,3 +25,14 @@ def note_html(text: str, *, bad: bool = False) -> str:
     kind = ' class="sw-bad"' if bad else ""
     line = f'<div{kind} style="font-size:12px;margin:2px 12px;overflow-wrap:anywhere">{escape(text)}</div>'
     return line if text else ""
+
+
+def key_html(bands: Bands, words: str) -> str:
+    """Return the colours of beam densities, with the fewest beams of each, and what they count."""
+    cells = "".join(
+        f'<span style="flex:1;text-align:center;border-top:9px solid {colour}">{word}</span>'
+        for colour, word in bands.key()
+    )
+    return (
+        f'<div style="font-size:12px;margin:4px 12px"><div style="display:flex">{cells}</div><div>{words}</div></div>'
+    )

@@ -7,10 +7,10 @@ run beside them. Everybody who has the page sees and moves the same setting.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,8 @@ from scanwright.design.angles import STANDARD_DEG, standard_settings
 from scanwright.design.errors import ScanwrightError, TaskError
 from scanwright.design.search.optimum import Optimum
 from scanwright.design.task.task import LoadedTask, load_task, shipped_tasks
-from scanwright.serving.style import note_html
+from scanwright.report.colours import bands_to
+from scanwright.serving.style import key_html, note_html
 from scanwright.studio.brush import PaintBrush
 from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
@@ -47,6 +48,7 @@ class Studio:
         self._canvas = Canvas(loaded)
         self.judge = Judge.for_task(loaded)
         self.facts: Facts | None = None
+        self._message_of: tuple[Canvas, Setting] | None = None
         self.view = View3D(server)
         names = shipped_tasks()
         own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
@@ -80,12 +82,21 @@ class Studio:
 
     def show(self, text: str, bad: bool = False) -> None:
         """One line under the facts."""
+        self._message_of = (self._canvas, self.setting)  # it goes with this state
         self.controls.note.content = note_html(text, bad=bad)
+
+    def _stood(self) -> None:
+        """Show the angles as text, and take away a message of another state."""
+        put(self.controls.typed, self.setting.text)
+        self.controls.typed_error.content = ""
+        if self.controls.note.content and self._message_of != (self._canvas, self.setting):
+            self.controls.note.content = ""
 
     def move(self, setting: Setting, of: Hashable = None) -> None:
         """Move the sliders; `of` is what for, where that takes more than one move."""
         for slider, angle in zip(self.controls.angles, setting.angles_deg, strict=True):
             put(slider, angle)
+        self._stood()
         self.judging.request(setting)
         self._note(of, math.inf)
 
@@ -115,6 +126,7 @@ class Studio:
             put(self.controls.fields[name], value)
         for slider, angle in zip(self.controls.angles, moment.setting.angles_deg, strict=True):
             put(slider, angle)
+        self._stood()
         if moment.canvas.base is not before.base:
             self._offer_scenes()
             put(self.controls.task, next(name for name, task in self._opened.items() if task is self._canvas.base))
@@ -140,6 +152,16 @@ class Studio:
         async def moved(event: viser.GuiEvent[Any]) -> None:
             self.judging.request(self.setting)
             noted(event)
+            if event.client is not None:
+                self._stood()
+
+        def typed(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:
+                return
+            try:
+                self.move(Setting.read(c.typed.value))
+            except TaskError as error:
+                c.typed_error.content = note_html(str(error), bad=True)
 
         def noted(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:  # else it is the program that moves it
@@ -150,6 +172,7 @@ class Studio:
 
         for slider in c.angles:
             slider.on_update(moved)
+        c.typed.on_update(typed)
         for field in c.fields.values():
             field.on_update(noted)
         for field in (c.brush, c.radius):
@@ -170,20 +193,24 @@ class Studio:
             (c.clear, lambda: self._paint(())),
             (c.restore, self.kept.restore),
             (c.remove, self._remove),
-            (c.save, lambda: self.saving.save(self._canvas.painted(), self.setting)),
-            (c.build, lambda: self.saving.build(self._canvas.painted(), self.setting)),
         ):
             button.on_click(self._guarded(act))
+        for button, write in ((c.save, self.saving.save), (c.build, self.saving.build)):
+            button.on_click(self._guarded(partial(self._write, write), self.saving.refuse))
 
-    def _guarded(self, act: Callable[[], Any]) -> Callable[[Any], None]:
-        """What goes wrong is said on the page."""
+    def _write(self, write: Callable[[LoadedTask, Setting], object]) -> None:
+        self.saving.refuse("")
+        write(self._canvas.painted(), self.setting)
 
-        @functools.wraps(act)
+    def _guarded(self, act: Callable[[], Any], refuse: Callable[[str], None] | None = None) -> Callable[[Any], None]:
+        """Return an event handler that shows errors, at their field if `refuse` does."""
+
+        @wraps(act)
         def guarded(_: Any) -> None:
             try:
                 act()
             except ScanwrightError as error:
-                self.show(str(error), bad=True)
+                (refuse or partial(self.show, bad=True))(str(error))
 
         return guarded
 
@@ -192,7 +219,7 @@ class Studio:
     def _follow(self, setting: Setting) -> None:
         judge = self.judge
         self._tell(judge.quick(setting))
-        self.view.colour(judge.problem, setting, self._highest)
+        self.view.colour(judge.problem, setting, self._bands)
         self._server.flush()  # else they wait for the next of its times
 
     def _rest(self, setting: Setting) -> None:
@@ -203,7 +230,7 @@ class Studio:
 
     def _tell(self, facts: Facts) -> None:
         self.facts = facts
-        self.controls.facts.content = panel_html.facts_html(facts, self.judge.problem.objective.name == "log")
+        self.controls.facts.content = panel_html.facts_html(facts)
         self._server.flush()
 
     # The task and the paint on it
@@ -218,6 +245,7 @@ class Studio:
             return
         self._canvas = Canvas(self._opened[name])
         self.kept.take(())  # another task asks for other angles
+        self._stood()
         self._offer_scenes()
         put(self.controls.name, name_of_copy(self._canvas.base))
         self.painting.request(self._canvas)
@@ -235,6 +263,7 @@ class Studio:
         canvas = Canvas(self._canvas.base, dabs)
         canvas.painted()  # refuses what no task could hold
         self._canvas = canvas
+        self._stood()
         self.painting.request(canvas)
         self._note(("stroke", stroke) if stroke is not None else None, math.inf)
 
@@ -249,8 +278,11 @@ class Studio:
 
     def _task_changed(self) -> None:
         settings = [*standard_settings().values(), self.setting.angles_rad]
-        self._highest = max(highest_density(self.judge.problem, angles) for angles in settings)
-        self.controls.scale.content = panel_html.scale_html(self._highest)
+        self._bands = bands_to(max(highest_density(self.judge.problem, angles) for angles in settings))
+        self.controls.scale.content = key_html(
+            self._bands,
+            "beams per direction, without parts; grey: none; white edge: what matters; red: hidden by the robot",
+        )
         self.view.outline(self.judge.problem)
         self.view.stand_in(self.judge.loaded.task)
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)

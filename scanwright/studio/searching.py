@@ -37,9 +37,9 @@ class Searching:
             return
         c.optimise.disabled = True
         c.progress.visible, c.progress.animated = True, True
-        Thread(target=self._run, args=(self._now()[0],), name="optimise", daemon=True).start()
+        Thread(target=self._run, args=self._now(), name="optimise", daemon=True).start()
 
-    def _run(self, canvas: Canvas) -> None:
+    def _run(self, canvas: Canvas, setting: Setting) -> None:
         steps = 0
 
         def progress(step: str, _fraction: float | None = None, /) -> None:
@@ -53,6 +53,9 @@ class Searching:
             if canvas != self._now()[0]:
                 return
             self._use(optimum)
+            if setting != self._now()[1]:
+                self._show("the optimum is known; Optimise moves the sliders there")
+                return
             step = object()  # both moves are one
             bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
             self._move(bare, step)
@@ -64,9 +67,13 @@ class Searching:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
                 self._move(Setting.within_bounds(chosen.family.angles_deg), step)
-            setting = chosen.family.angles_rad
             seen = as_built(
-                optimum.problem, optimum.loaded.task, setting, chosen.shadow, chosen.family.score, optimum.mounts
+                optimum.problem,
+                optimum.loaded.task,
+                chosen.family.angles_rad,
+                chosen.shadow,
+                chosen.family.score,
+                optimum.mounts,
             )
             self._show("; ".join([title, *chosen.lines(), *seen.lines(), holes]))
         except ScanwrightError as error:

@@ -30,7 +30,7 @@ def run_studio(
     Raises:
         TaskError: the port is taken, or the task has no region.
     """
-    with guarded_server(f"Scanwright: {loaded.task.name}", port) as (server, gate):
+    with guarded_server(f"Scanwright: {loaded.task.name}", port, recall=True) as (server, gate):
         progress("reading the task (first run: compiling, about 5 s)")
         studio = Studio(server, loaded, Path.cwd(), out)
         try:

@@ -54,6 +54,28 @@ class Setting:
         )
         return cls((alpha_rot, beta_rot, alpha_laser, beta_laser))
 
+    @classmethod
+    def read(cls, text: str) -> Setting:
+        """Return the setting that a text states.
+
+        Raises:
+            TaskError: it is not four numbers within the bounds.
+        """
+        try:
+            angles = [float(part) for part in text.replace(",", " ").split()]
+            setting = cls.within_bounds(angles)
+        except ValueError as error:
+            raise TaskError(f"angles: not four numbers (got '{text}'; for example 0, 90, 0, -90)") from error
+        for angle, bound in zip(angles, BOUNDS_DEG, strict=True):
+            if abs(angle) > bound:
+                raise TaskError(f"angles: {angle:g} deg is out of bounds (allowed -{bound:g} to {bound:g})")
+        return setting
+
+    @property
+    def text(self) -> str:
+        """The angles as `read` reads them."""
+        return ", ".join(f"{angle:g}" for angle in self.angles_deg)
+
     @property
     def angles_rad(self) -> Array:
         """The same in radians, shape (4,)."""

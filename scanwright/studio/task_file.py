@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import tomli_w
@@ -14,6 +15,8 @@ from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask, Task, load_task
 from scanwright.pipeline.records import rename_files
 from scanwright.studio.state import Setting
+
+NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]{0,63}")  # as `Task.name`; it becomes a file name
 
 
 def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None) -> str:
@@ -28,6 +31,8 @@ def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None
     Raises:
         TaskError: the name cannot be one.
     """
+    if not NAME.fullmatch(name):
+        raise TaskError(f"name: use letters, digits, _ and -, at most 64, a letter or digit first (got '{name}')")
     table = loaded.task.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | {"name": name}
     table["motion"] = loaded.task.motion.model_dump(mode="json")
     rename_files(table, loaded.task, lambda file, _: os.path.relpath(loaded.source.parent / file, folder))

@@ -5,7 +5,7 @@ import re
 import pytest
 
 import scanwright as sw
-from benchmarks.scanwright.figures import FIGURES, pages, with_figures
+from benchmarks.scanwright.printed.figures import FIGURES, pages, with_figures
 
 
 def test_every_page_states_the_figures_of_the_file():

@@ -2,9 +2,9 @@
 
 import sys
 import threading
-import time
 from collections import deque
 from queue import Empty
+from types import ModuleType
 
 
 class VirtualTime:
@@ -34,6 +34,13 @@ class VirtualTime:
     def sleep(self, seconds):
         self.wait(self.now_ns + round(max(seconds, 0) * 1e9))
 
+    def until(self, condition, seconds=300.0):
+        """Wait for something to be so."""
+        end_ns = self.now_ns + round(seconds * 1e9)
+        while not condition():
+            assert self.now_ns < end_ns, "it did not come to that in time"
+            self.sleep(0.005)
+
     def stop_all(self, seconds):
         """The process gets no processor for a while: nobody runs, and all find themselves late."""
         self.now_ns += round(seconds * 1e9)
@@ -57,7 +64,7 @@ class VirtualTime:
     def put_in_place_of_time(self, monkeypatch, *packages):
         """In all modules of packages that have been imported."""
         for name, module in list(sys.modules.items()):
-            if name.startswith(packages) and getattr(module, "time", None) is time:
+            if name.startswith(packages) and isinstance(getattr(module, "time", None), (ModuleType, VirtualTime)):
                 monkeypatch.setattr(module, "time", self)
 
     def Event(self):

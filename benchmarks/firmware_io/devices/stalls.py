@@ -1,14 +1,17 @@
-"""Stated errors of beam times when the reader is held up: `python -m benchmarks.firmware_io.devices.stalls [STALLS]`.
+"""Stated errors of beam times when the reader is held up.
 
-Each lidar without an exact clock of its own streams to its driver, on one virtual clock, and the driver is held up
-STALLS times (default 25, which are 500 in all), for 0.05 to 10 s, in a read or between two. What comes meanwhile waits
-in a buffer of a pseudo-terminal's or of a serial port's size; what finds it full is lost. Ranges tell when each beam
-was measured.
+    python -m benchmarks.firmware_io.devices.stalls [STALLS]
+    python -m benchmarks.firmware_io.devices.stalls --soak HOURS
+
+Each lidar streams to its driver on one virtual clock, and the driver is held up STALLS times (default 20, which are 520
+in all), for 0.05 to 10 s, in a read or between two. What comes meanwhile waits in a buffer of a pseudo-terminal's or of
+a serial port's size; what finds it full is lost. An adapter hands bytes over every 1 or 16 ms. Ranges tell when each
+beam was measured. A soak runs one lidar of each family for hours of that clock, with a stall every 20 s in the mean.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -29,18 +32,28 @@ from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
 from scanwright.firmware_io.lidar.lidar import LidarDriver, TimedScan
 from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
+from scanwright.firmware_io.lidar.scip import dialogue as scip_dialogue
+from scanwright.firmware_io.lidar.scip import driver as scip
+from scanwright.firmware_io.lidar.sick import dialogue as cola
+from scanwright.firmware_io.lidar.sick import driver as sick
 from scanwright.firmware_io.lidar.slamtec import dialogue
 from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 from scanwright.firmware_io.samples import Scan
 
 MODELS = ["LD06", "LD19", "STL27L", "LMS 200"]
 MODELS += [f"RPLIDAR {series}" for series in ("A1", "A2", "A3", "S1", "S2", "C1")]
+NOT_GATHERED = ["URG-04LX", "UTM-30LX", "TiM561"]  # USB devices of their own, and Ethernet
+MODELS += NOT_GATHERED
+SOAKED = ("LD19", "RPLIDAR C1", "LMS 200", "URG-04LX", "TiM561")
 BUFFER_BYTES = (4095, 69_631)
+LATENCY_MS = dict(zip(BUFFER_BYTES, (1, 16), strict=True))
 ROUNDED_MS = {model: 0.8 if " A" in model else 0.1 for model in MODELS}  # of a range: 8 mm of ultra capsules, or 1 mm
 
+_TIMED = (sensor_line, dialogue, slamtec, ldrobot, lms2xx, scip_dialogue, scip, cola, sick)
 _M_S = 10.0  # by which the range grows
 _CYCLE_S = 0.63  # no whole number of turns
 _NEAREST_M = 1.0
+_SOAK_STALL_S = 20.0  # from stall to stall: 17 s in the mean, and 2 s of its own
 
 
 class HeldUpLine:
@@ -61,6 +74,7 @@ class HeldUpLine:
         self.now_ns = time.monotonic_ns()  # when the machine was made
         self.stalls = deque((self.now_ns + round(at_s * 1e9), round(length_s * 1e9)) for at_s, length_s in stalls)
         self._buffer_bytes = buffer_bytes
+        self._latency_ns = 1 if model in NOT_GATHERED else LATENCY_MS[buffer_bytes] * 1_000_000
         self._received = b""
         self._coming: deque[tuple[int, bytes]] = deque()
 
@@ -90,7 +104,7 @@ class HeldUpLine:
         self._hold_up()
         end_ns = self.now_ns + max(round(timeout_s * 1e9), 0)
         while not self._comes_before(end_ns) and self.machine.next_ns() <= end_ns:
-            self._coming.extend(self.machine.next_packets())
+            self._coming.extend(self._handed_over(packet) for packet in self.machine.next_packets())
         sent_ns = self._coming[0][0] if self._comes_before(end_ns) else end_ns
         self.now_ns = max(sent_ns, self.now_ns + 1000)  # a look takes its time
         self._hold_up()
@@ -98,6 +112,10 @@ class HeldUpLine:
 
     def close(self) -> None:
         """As `Stream.close`."""
+
+    def _handed_over(self, packet: tuple[int, bytes]) -> tuple[int, bytes]:
+        """The packet, at the time at which the adapter next empties its buffer."""
+        return packet[0] + -packet[0] % self._latency_ns, packet[1]
 
     def _comes_before(self, end_ns: int) -> bool:
         return bool(self._coming) and self._coming[0][0] <= end_ns
@@ -112,7 +130,7 @@ class HeldUpLine:
             for sent_ns, data in self.machine.next_packets():
                 waiting += len(data)
                 if waiting <= self._buffer_bytes:
-                    self._coming.append((sent_ns, data))
+                    self._coming.append(self._handed_over((sent_ns, data)))
         self.machine.leave_out(self.now_ns)
 
 
@@ -122,9 +140,10 @@ def held_up(
 ) -> Iterator[tuple[LidarDriver, deque[tuple[int, int]]]]:
     """The lidar, opened on a line whose reader is held up, and the stalls that are still to come."""
     line = HeldUpLine(model, stalls, buffer_bytes)
-    clocks = [patch.object(module, "time", line) for module in (sensor_line, dialogue, slamtec, ldrobot, lms2xx)]
+    clocks = [patch.object(module, "time", line) for module in _TIMED]
     spun_up = patch.object(world, "SPIN_UP_S", 1e-6)  # turns are counted at full speed
-    with patch.object(sensor_line, "open_stream", lambda _: line), spun_up:
+    gathers = patch.object(sensor_line, "latency_ms", lambda _: LATENCY_MS[buffer_bytes])
+    with patch.object(sensor_line, "open_stream", lambda _: line), gathers, spun_up:
         for clock in clocks:
             clock.start()
         try:
@@ -135,10 +154,12 @@ def held_up(
                 clock.stop()
 
 
-def random_stalls(rng: np.random.Generator, count: int, first_s: float) -> list[tuple[float, float]]:
-    """When and how long [s]: 0.05 to 10 s, as often short as long, 0.05 to 2 s after each other."""
+def random_stalls(
+    rng: np.random.Generator, count: int, first_s: float, apart_s: tuple[float, float] = (0.05, 2.0)
+) -> list[tuple[float, float]]:
+    """When and how long [s]: 0.05 to 10 s, as often short as long, `apart_s` after each other."""
     length_s = np.exp(rng.uniform(np.log(0.05), np.log(10.0), count))
-    after_s = np.exp(rng.uniform(np.log(0.05), np.log(2.0), count))
+    after_s = np.exp(rng.uniform(np.log(apart_s[0]), np.log(apart_s[1]), count))
     begin_s = first_s + np.cumsum(length_s + after_s) - length_s
     return list(zip(begin_s.tolist(), length_s.tolist(), strict=True))
 
@@ -162,14 +183,65 @@ class Missing:
 def scans_of(model: str, stalls: list[tuple[float, float]], buffer_bytes: int) -> tuple[list[TimedScan], Missing]:
     """Every turn that the driver hands out until a second after the last stall."""
     with held_up(model, stalls, buffer_bytes) as (lidar, to_come):
-        lidar.start()
-        timed = [lidar.read()]
-        while to_come:
-            timed.append(lidar.read())
-        timed += [lidar.read() for _ in range(round(lidar.scan_rate_hz))]
+        timed = [one for one, _ in _turns(lidar, to_come)]
         turn_ns = 1e9 / lidar.scan_rate_hz
         steps = np.diff([one.scan.stamp_ns for one in timed]) / turn_ns
         return timed, Missing(round(float(np.rint(steps - 1).sum())), lidar.dropped)
+
+
+def _turns(lidar: LidarDriver, to_come: deque[tuple[int, int]]) -> Iterator[tuple[TimedScan, int]]:
+    """Each turn until a second after the last stall, and how many stalls were still to come."""
+    lidar.start()
+    while to_come:
+        yield lidar.read(), len(to_come)
+    for _ in range(round(lidar.scan_rate_hz)):
+        yield lidar.read(), 0
+
+
+@dataclass(slots=True)
+class Judged:
+    """Turns of a run, judged one after the other.
+
+    Attributes:
+        turns: that were handed out.
+        missing: turns between those, by their stamps.
+        counted: turns that the driver counted as missing.
+        beams: with a range.
+        within: of them, within one, two and three times the stated standard error.
+        worst_ms: error of a beam.
+        back: stamps that were earlier than the one before.
+        wrong: stalls after which a beam lay beyond three times its stated error.
+    """
+
+    turns: int
+    missing: int
+    counted: int
+    beams: int
+    within: Times
+    worst_ms: float
+    back: int
+    wrong: set[int]
+
+
+def judge(model: str, stalls: list[tuple[float, float]], buffer_bytes: int) -> Judged:
+    """Run a lidar through its stalls, and keep sums only."""
+    found = Judged(0, 0, 0, 0, np.zeros(3, np.int64), 0.0, 0, set())
+    with held_up(model, stalls, buffer_bytes) as (lidar, to_come):
+        last_ns = 0
+        for one, still in _turns(lidar, to_come):
+            off, stated = _errors_ms(model, one)
+            found.turns += 1
+            found.beams += off.size
+            found.within += [int(np.sum(off < k * stated)) for k in (1, 2, 3)]
+            found.worst_ms = max(found.worst_ms, float(off.max(initial=0.0)))
+            if np.any(off >= 3 * stated):
+                found.wrong.add(still)
+            if last_ns:
+                found.back += one.scan.stamp_ns < last_ns
+                found.missing += round((one.scan.stamp_ns - last_ns) / 1e9 * lidar.scan_rate_hz - 1)
+            last_ns = one.scan.stamp_ns
+        found.counted = lidar.dropped
+    return found
 
 
 def _seen_at(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
@@ -179,23 +251,35 @@ def _seen_at(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
 
 
 def main() -> None:
-    """Print how many beams lie within one, two and three times the stated standard uncertainty, for each lidar."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 25
-    print("| lidar | buffer | turns | missing, counted | within 1, 2, 3 times the stated error | worst | steps back |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
-    for model in MODELS:
-        for buffer_bytes in BUFFER_BYTES:
-            rng = np.random.default_rng([count, MODELS.index(model), buffer_bytes])
-            timed, missing = scans_of(model, random_stalls(rng, count, 1.0), buffer_bytes)
-            errors = [_errors_ms(model, one) for one in timed]
-            off, stated = (np.concatenate(part) for part in zip(*errors, strict=True))
-            within = ", ".join(f"{100 * np.mean(off < k * stated):.2f}" for k in (1, 2, 3))
-            back = int((np.diff([one.scan.stamp_ns for one in timed]) < 0).sum())
-            print(
-                f"| {model} | {buffer_bytes:,} | {len(timed):,} | {missing.seen:,}, {missing.counted:,} | {within} % | "
-                f"{off.max():.2f} ms | {back} |",
-                flush=True,
-            )
+    """Print a row for each lidar and buffer, and after how many stalls every beam was right, or dropped and counted."""
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("stalls", nargs="?", type=int, default=20)
+    arguments.add_argument("--soak", type=float, metavar="HOURS")
+    chosen = arguments.parse_args()
+    print(
+        "| lidar | buffer, latency | turns | missing, counted | within 1, 2, 3 times the stated error | worst | back |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- |", flush=True)
+    wrong, count = 0, chosen.stalls if chosen.soak is None else round(chosen.soak * 3600 / _SOAK_STALL_S)
+    runs = [(model, size) for model in MODELS for size in BUFFER_BYTES]
+    if chosen.soak is not None:
+        runs = [(model, BUFFER_BYTES[0]) for model in SOAKED]
+    for model, buffer_bytes in runs:
+        rng = np.random.default_rng([count, MODELS.index(model), buffer_bytes])
+        apart_s = (0.05, 2.0) if chosen.soak is None else (2.0, 60.0)
+        found = judge(model, random_stalls(rng, count, 1.0, apart_s), buffer_bytes)
+        latency_ms = 0 if model in NOT_GATHERED else LATENCY_MS[buffer_bytes]
+        within = ", ".join(f"{100 * part / found.beams:.2f}" for part in found.within)
+        print(
+            f"| {model} | {buffer_bytes:,}, {latency_ms} ms | {found.turns:,} | "
+            f"{found.missing:,}, {found.counted:,} | {within} % | {found.worst_ms:.2f} ms | {found.back} |",
+            flush=True,
+        )
+        wrong += len(found.wrong)
+    total = count * len(runs)
+    print(
+        f"\nafter {total - wrong} of {total} stalls every beam was within three times its stated error, or was dropped"
+    )
 
 
 def _errors_ms(model: str, timed: TimedScan) -> tuple[Floats, Floats]:

@@ -42,7 +42,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
         scanner = assembly.layout.scanner
         servo = scanner.servo
         kinds = {SERVO_CASE: {servo.front.kind, servo.rear.kind}, LIDAR_BODY: {scanner.lidar.base.kind}}
-        kinds |= {horn: {servo.horn_kind} for horn in (SERVO_HORN, SERVO_OUTPUT)}
+        kinds |= {horn: {servo.horn_kind or "tapped"} for horn in (SERVO_HORN, SERVO_OUTPUT)}
         return MOULDED if "self_tapping" in kinds.get(body, ()) else BOUGHT
     process = assembly.parts[body].process
     if process == "printed":

@@ -18,7 +18,7 @@ from scanwright.cad.checks.table import FREQUENCY_RATIO
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.names import BASE_MOUNT, LIDAR
 from scanwright.cad.statics.spring import Spring, of_shaft
-from scanwright.cad.statics.vibration import Row, mass_matrix, row_of
+from scanwright.cad.statics.vibration import SpringRow, mass_matrix, row_of
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
@@ -67,7 +67,7 @@ def vibration_checks(
 
 def row_of_scanner(
     scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], linkage: Spring, mount: Spring | None
-) -> Row:
+) -> SpringRow:
     """Return the scanner as bodies on springs; arguments as for `vibration_checks`.
 
     What turns besides linkage and lidar counts half for the hub, half for the horn: a beam's ends.
@@ -82,7 +82,7 @@ def row_of_scanner(
     return row_of(springs, masses)
 
 
-def amplitude_m(row: Row, scanner: Scanner) -> float:
+def amplitude_m(row: SpringRow, scanner: Scanner) -> float:
     """Return how far the mirror moves a beam at AT_M, at worst within the error of the frequency."""
     lidar, R = scanner.lidar, scanner.angles.R_rot_laser()
     kg, hz = MIRROR_SHARE * lidar.mass_g / 1000, lidar.scan_rate_hz

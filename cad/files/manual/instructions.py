@@ -13,7 +13,7 @@ from scanwright.cad.checks.products import products_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import DECK_MM, Joint
-from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT
+from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TEST_PLATE
 from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import measure_first
@@ -66,7 +66,10 @@ def instructions_text(
         "lists what you need.",
         "",
         *_misfits(products_of(scanner, assembly.layout.drive)),
-        f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
+        "Try the hole patterns before you print parts: print `template.pdf` at 100 %, measure its scale of 100 mm, and "
+        f"lay each page on its device. Then print `print/{TEST_PLATE}.3mf` and screw it to lidar and servo.",
+        "",
+        f"Print `print/{FIT_COUPON}.3mf` next: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
         f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
         "",

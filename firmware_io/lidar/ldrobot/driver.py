@@ -155,7 +155,8 @@ class LdrobotLidar(LineDriver):
                 deadline_s = time.monotonic() + patience_s
             for packet in packets:
                 self._take(packet, arrival_ns)
-        return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], intensity=self._intensity)
+        uncertainty_ns = self._line.widened(self._arrivals.uncertainty_ns)
+        return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
 
     def condition(self) -> tuple[str, ...]:
         """Nothing: it only ever sends points."""

@@ -279,7 +279,7 @@ class LmsLidar(LineDriver):
         warning = "its window is dirty: clean it" if measured.status & protocol.POLLUTED else ""
         if not warning and self._baud < _FAST_BAUD:
             warning = f"at {self._baud} baud most turns are lost; use an adapter with {_FAST_BAUD} baud"
-        return TimedScan(scan, arrival_ns, count.arrivals.uncertainty_ns, warning)
+        return TimedScan(scan, arrival_ns, self._line.widened(count.arrivals.uncertainty_ns), warning)
 
 
 def open_lms2xx(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LmsLidar:

@@ -133,7 +133,9 @@ class SlamtecLidar(LineDriver):
                 self._resume()
                 deadline_s = time.monotonic() + patience_s
         self._turning = True
-        timed = timed_scan(turn[0], self._count.arrivals, self._lidar, turn[1], intensity=self._intensity)
+        arrivals = self._count.arrivals
+        uncertainty_ns = self._line.widened(arrivals.uncertainty_ns)
+        timed = timed_scan(turn[0], arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
         return replace(timed, warning=self._warning)
 
     def stop(self) -> None:

@@ -119,6 +119,23 @@ class Products:
 
 
 @dataclass(frozen=True, slots=True)
+class MeasuredModel:
+    """Values for a product file, measured in a model of the device; none of them is verified.
+
+    Attributes:
+        values: keys of a product file.
+        notes: other screws that a hole may be for, and what was left out.
+        toml: written proposal.
+        picture: written picture.
+    """
+
+    values: dict[str, Any]
+    notes: tuple[str, ...]
+    toml: Path
+    picture: Path
+
+
+@dataclass(frozen=True, slots=True)
 class WrittenFiles:
     """Files that a command wrote.
 
@@ -347,6 +364,7 @@ RESULTS: dict[str, Any] = {
     "accuracy": WrittenFiles,
     "build": Built | Rebuilt,
     "check": Checked,
+    "measure": MeasuredModel,
     "report": WrittenFiles,
     "study": Studied,
     "emulate": Devices,

@@ -35,7 +35,7 @@ _PACKAGE = """<?xml version="1.0"?>
 <package format="3">
   <name>{name}</name>
   <version>1.0.0</version>
-  <description>The 3D scanner of the task {task}, made by scanwright (pip install scanwright).</description>
+  <description>The 3D scanner of the task {task}, made by Scanwright.</description>
   <maintainer email="robot@example.org">the robot's own</maintainer>
   <license>Apache-2.0</license>
 {depends}

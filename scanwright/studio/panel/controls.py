@@ -8,11 +8,13 @@ import viser
 
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
+from scanwright.serving.style import banner_html
 from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
 from scanwright.studio.view.view_3d import SIDES
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
 UNDO, REDO = "Undo", "Redo"
+LOST = "The studio has ended: nothing on this page is current.", "Start it again, and reload this page."
 QUIET: Literal["gray"] = "gray"  # every button but the one that a tab is for
 BRUSHES: tuple[Brush, ...] = get_args(Brush)
 
@@ -28,7 +30,7 @@ class Controls:
     """
 
     def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Setting) -> None:
-        self.mode, self.facts = gui.add_html(""), gui.add_html("")
+        self.mode, self.facts = gui.add_html(banner_html("running", (), lost=LOST)), gui.add_html("")
         self.note, self.making = gui.add_html(""), gui.add_html("")
         self.undo = gui.add_button(UNDO, icon=viser.Icon.ARROW_BACK_UP, color=QUIET, disabled=True)
         self.redo = gui.add_button(REDO, icon=viser.Icon.ARROW_FORWARD_UP, color=QUIET, visible=False)
@@ -42,6 +44,9 @@ class Controls:
                 gui.add_slider(name, -bound, bound, 0.01, angle)
                 for name, bound, angle in zip(NAMES, BOUNDS_DEG, setting.angles_deg, strict=True)
             )
+            self.typed = gui.add_text("angles [deg]", setting.text, hint="All four: a link to this page has them too")
+            self.typed_error = gui.add_html("")
+            self.link = gui.add_button("Copy link", hint="It opens this setting, also after a restart", color=QUIET)
             self.optimise = gui.add_button("Optimise", hint="Search all angles of the task, and move the sliders there")
             self.progress = gui.add_progress_bar(0.0, visible=False)
             self.keep = gui.add_button("Keep this setting", hint="Put it into the table under Compare", color=QUIET)
@@ -66,6 +71,7 @@ class Controls:
             self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
             self.name = gui.add_text("name", name_of_copy(loaded))
+            self.name_error = gui.add_html("")
             self.fixed = gui.add_checkbox(
                 "fix these angles", initial_value=False, hint="Write the angles in place of ranges"
             )

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.metres import PlaneFigures, on_planes, planes_of
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
 from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.score import Score, score, score_on
 from scanwright.design.search.limits import blind_cones_deg, line_gaps_deg
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.shortest_period import shortest_period_s
-from scanwright.design.task.task import LoadedTask
+from scanwright.design.task.task import Limits, LoadedTask
 from scanwright.studio.state import Setting
 
 DRAG_NODES = 2187  # 3^7, fewer than `NODES`, to follow the hand; the panel shows the larger error
@@ -38,6 +39,9 @@ class Facts:
         period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo does not spin.
         density: beams per ball that the period is for.
         mounts: J of the reference mounts for the same task, the best one first.
+        least: fewest beams per ball where it counts.
+        limits: of the task.
+        log: whether J is the mean of -ln(1 + d): differences of J are ratios of beams.
         planes: each plane of the task in words, and what a full scan leaves on it in metres; None while not known.
     """
 
@@ -52,6 +56,34 @@ class Facts:
     density: int
     mounts: dict[str, float]
     planes: tuple[tuple[str, PlaneFigures | None], ...]
+    least: int
+    limits: Limits
+    log: bool
+
+    @property
+    def ratio(self) -> float:
+        """Beams per direction against the best usual mount, geometric mean; NaN if J gives no ratio."""
+        best = min(self.mounts.values(), default=math.nan)
+        return math.exp(min(best - self.J, 50.0)) if self.log and math.isfinite(best - self.J) else math.nan
+
+    def asked(self) -> list[tuple[str, bool, str]]:
+        """What the task asks for: in words, whether it is met without parts, and the value."""
+        limits, blind = self.limits, f"{percent(self.blind_weight)} blind"
+        rows = [("no blind spot", self.blind_weight <= (limits.max_blind_weight or NO_BLIND_WEIGHT), blind)]
+        for words, limit, value, met in (
+            (
+                "at least {:g} beams per ball",
+                limits.min_density,
+                f"{self.least}",
+                self.least >= (limits.min_density or 0),
+            ),
+            ("scan lines at most {:g} deg apart", limits.max_line_gap_deg, f"{self.gap_deg:.3f} deg", None),
+            ("blind cone at most {:g} deg", limits.max_blind_cone_deg, f"{self.blind_cone_deg:.2f} deg", None),
+        ):
+            if limit is not None:
+                own = self.gap_deg if "lines" in words else self.blind_cone_deg
+                rows.append((words.format(limit), own <= limit if met is None else met, value))
+        return rows
 
     @property
     def gap_mm(self) -> float:
@@ -108,6 +140,9 @@ class Judge:
             density=self._least,
             mounts=self.mounts,
             planes=tuple((region.words(), None) for region in planes_of(self.loaded)),
+            least=result.least,
+            limits=self.loaded.task.limits,
+            log=self.problem.objective.name == "log",
         )
 
     @property

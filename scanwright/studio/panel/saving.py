@@ -59,6 +59,10 @@ class Saving:
 
         self._building = BuildProcess(path, self._out, progress, done)
 
+    def refuse(self, text: str) -> None:
+        """Show an error at the name, which it is about; an empty text removes it."""
+        self._controls.name_error.content = note_html(text, bad=True)
+
     def close(self) -> None:
         """End a build that runs."""
         if self._building is not None:

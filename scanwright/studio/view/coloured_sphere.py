@@ -13,13 +13,11 @@ from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.objective.problem import Problem
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.sphere.regions import Field
-from scanwright.serving.style import Colours, ramp
+from scanwright.report.density_sphere import DENSEST
 
 TILES = 5_000  # 2.9 deg each; of more, a browser without a graphics card draws less than ten pictures a second
 RADIUS_M = 0.5  # of the sphere of densities about the scanner
 OVERLAP = 1.25  # of the hexagons, so that no seam shows
-BLIND = (236, 236, 240)  # directions that no beam enters: a grey that is not in the scale
-LEAST_OF_HIGHEST = 300  # the scale of `density.png`
 EDGE_STEP_DEG = 1.0  # between the corners of a drawn outline
 
 
@@ -54,19 +52,8 @@ def hexagons() -> Hexagons:
 
 
 def highest_density(problem: Problem, angles_rad: Array) -> float:
-    """Highest mean beams per ball of a setting on the tiles: the top of a colour scale."""
-    return float(mean_density_at(problem, angles_rad, spiral(TILES)).max())
-
-
-def density_colours(problem: Problem, angles_rad: Array, directions: Array, highest: float) -> Colours:
-    """Colour of the mean density at directions (n, 3) on a logarithmic scale that ends at `highest`, shape (n, 3).
-
-    What no beam reaches is pale, what the robot hides is hatched by its edge only.
-    """
-    density = mean_density_at(problem, angles_rad, directions)
-    lowest = max(1.0, highest / LEAST_OF_HIGHEST)
-    level = np.log(np.clip(density, lowest, highest) / lowest) / max(np.log(highest / lowest), 1e-9)
-    return np.where(density[:, None] > 1e-9, ramp(level), np.array(BLIND, np.uint8))
+    """Return the mean beams per ball that all but the densest directions keep to: the top of a colour scale."""
+    return float(np.quantile(mean_density_at(problem, angles_rad, spiral(TILES)), DENSEST))
 
 
 def edges(field: Field) -> tuple[Array, Array]:

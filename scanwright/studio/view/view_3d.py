@@ -9,14 +9,15 @@ import viser
 import viser.transforms
 
 from scanwright.design.arrays import Array
+from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.task.task import Task
-from scanwright.report.cut_room import Room, room_about
-from scanwright.serving.style import Colours, ramp
+from scanwright.report.colours import Bands, Colours, ramp
+from scanwright.report.room import Room, room_about
+from scanwright.serving.density_room import density_colours, lit, room_tiles, unlit
 from scanwright.studio.state import Setting
-from scanwright.studio.view.coloured_sphere import RADIUS_M, density_colours, edges, hexagons
-from scanwright.studio.view.room_tiles import room_tiles
+from scanwright.studio.view.coloured_sphere import RADIUS_M, edges, hexagons
 from scanwright.studio.view.scanner_bodies import BodyMesh
 
 Look = Literal["in its room", "sphere from inside", "sphere from outside", "hidden"]
@@ -26,7 +27,6 @@ SIDES: dict[Look, Literal["front", "back"]] = {
     "sphere from outside": "front",
     "hidden": "back",
 }
-AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body has its own colour at pi
 SPHERE_EYE_M = (-0.75, 0.95, 0.65)  # behind, left and above: ahead points away from the viewer
 MARK = 1.12  # of the radius: words are drawn there
 LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
@@ -48,10 +48,7 @@ class View3D:
         self._edges: tuple[Array, ...] = ()
         self._cloud: viser.PointCloudHandle | None = None
         self.points = 0
-        self._scene.configure_default_lights(enabled=False, cast_shadow=False)
-        self._scene.configure_environment_map(None)  # the browser shows a pale picture until it has one
-        self._scene.add_light_ambient("/light/all", intensity=AMBIENT)
-        self._scene.add_light_directional("/light/above", intensity=LAMP, position=LAMP_M, cast_shadow=False)
+        lit(self._scene)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
         self._scanner = self._scene.add_frame("/scanner", show_axes=False)
         self._marks = {
@@ -95,7 +92,7 @@ class View3D:
 
     def stand_in(self, task: Task) -> None:
         """Put up the room of a task, in the colour of what has none yet."""
-        room, _ = room_about(task)
+        room = room_about(task)
         before = self._placeholder
         if before is not None and np.array_equal([before.low, before.high], [room.low, room.high]):
             return  # paint changes what counts, and no wall
@@ -123,14 +120,15 @@ class View3D:
         """Whether the sphere is shown."""
         return self._looked in ("sphere from inside", "sphere from outside")
 
-    def colour(self, problem: Problem, setting: Setting, highest: float) -> None:
+    def colour(self, problem: Problem, setting: Setting, bands: Bands) -> None:
         """Colour the tiles by the density of a setting, and show its axis and fan."""
         if self._looked == "in its room" and self._room is not None:
             painted, directions, normals = self._room, self.room.directions, self.room.normals
         else:
             painted, directions = self.sphere, self.tiles.directions
             normals = -directions if self.inside else directions
-        painted.batched_colors = _unlit(density_colours(problem, setting.angles_rad, directions, highest), normals)
+        density = mean_density_at(problem, setting.angles_rad, directions)
+        painted.batched_colors = unlit(density_colours(density, bands), normals)
         R = R_world_rot(*setting.angles_rad[:2])
         beams = problem.beams_rot(setting.angles_rad[2:]) @ R.T
         rim = 0.98 * RADIUS_M * beams[:: max(1, len(beams) // 90)]
@@ -216,11 +214,3 @@ class View3D:
 def _blank(tiles: Array) -> Colours:
     """A colour for each tile from the first: a browser that got one for all complains of the many that follow."""
     return np.full((len(tiles), 3), 200, np.uint8)
-
-
-def _unlit(colours: Colours, normals: Array) -> Colours:
-    """Colours of tiles that look alike wherever they face: in linear light, darker where the lamp shines on them."""
-    c = colours / 255.0
-    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-    lit = AMBIENT + LAMP * np.maximum(0, normals @ np.array(LAMP_M) / np.linalg.norm(LAMP_M))
-    return np.round(255 * linear * AMBIENT / lit[:, None]).astype(np.uint8)

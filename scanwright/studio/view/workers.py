@@ -18,9 +18,9 @@ from scanwright.design.errors import ScanwrightError
 from scanwright.design.objective.problem import Problem
 from scanwright.design.scanner import Scanner
 from scanwright.design.task.task import LoadedTask
+from scanwright.report.room import one_scan
 from scanwright.studio.state import Setting
 from scanwright.studio.view.latest_only import LatestOnly
-from scanwright.studio.view.preview_scan import preview_scan
 from scanwright.studio.view.scanner_bodies import make_bodies
 from scanwright.studio.view.view_3d import View3D
 
@@ -103,9 +103,7 @@ class Workers:
         problem, placed = order.problem, order.loaded.task.scene if order.scene == "task" else None
         joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
         folder = order.loaded.source.parent
-        self._view.show_points(
-            worker.ask("casting the scan ...", preview_scan, order.scanner(), joint_rad, placed, folder)
-        )
+        self._view.show_points(worker.ask("casting the scan ...", one_scan, order.scanner(), joint_rad, placed, folder))
 
 
 class _Worker:

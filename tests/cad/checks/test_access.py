@@ -5,19 +5,17 @@ import pytest
 
 from scanwright.cad import solids
 from scanwright.cad.checks import access
-from scanwright.cad.checks.access import access_checks, blocked_screws
+from scanwright.cad.checks.access import Body, access_checks, blocked_screws
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.joints import Joint, ScrewAxis
 from scanwright.cad.screws import SCREWS
-from scanwright.design.scene import ray_caster
 
 AT = (20.0, 0.0, 0.0)
 DOWN = Joint("plate", "block", "thread", SCREWS["M3"], (ScrewAxis(AT, (0.0, 0.0, -1.0)),), 4.0, 8.0)
 
 
 def body(low, high):
-    mesh = mesh_of(solids.box(low, high))
-    return ray_caster.build_scene(mesh.vertices[mesh.faces] / 1000)
+    return Body(mesh_of(solids.box(low, high)))
 
 
 @pytest.mark.parametrize(

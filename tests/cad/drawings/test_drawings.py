@@ -355,7 +355,7 @@ def test_everything_that_a_pen_draws_is_in_every_format():
 
     (pen, first), (_, second) = sheet(), sheet()
     assert dxf_bytes(first) == dxf_bytes(second)
-    for write in (svg_bytes, pdf_bytes):
+    for write in (svg_bytes, lambda sheet, shown: pdf_bytes([(sheet, shown)])):
         assert write(first, list(drawn_on(first))) == write(second, list(drawn_on(second)))
     document = ezdxf.read(io.StringIO(dxf_bytes(first).decode("utf-8")))
     kinds = sorted(entity.dxftype() for entity in document.modelspace())

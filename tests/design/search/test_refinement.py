@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,14 @@ from scipy.optimize import minimize, rosen
 
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import problem_of
+from scanwright.design.progress import no_progress
 from scanwright.design.search import families
+from scanwright.design.search.families import MOST_WALKS
 from scanwright.design.search.grid_classes import plane_key
-from scanwright.design.search.refinement import Enough, _Chart, _on_the_grid, lowest_by_simplex
+from scanwright.design.search.refinement import Enough, _Chart, _on_the_grid, descended, lowest_by_simplex
 from scanwright.design.search.search import search
-from scanwright.design.task.task import load_task
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.task import Limits, load_task
 
 CORNERS = np.array([[-1.2, 0.8, 0.5], [-0.7, 0.8, 0.5], [-1.2, 0.4, 0.5], [-1.2, 0.8, 0.9]])
 
@@ -24,7 +28,7 @@ CORNERS = np.array([[-1.2, 0.8, 0.5], [-0.7, 0.8, 0.5], [-1.2, 0.4, 0.5], [-1.2,
 def test_it_goes_where_that_of_scipy_goes(bounds):
     bounds = np.array([bounds] * 3)
     values = np.array([rosen(corner) for corner in CORNERS])
-    found = lowest_by_simplex(rosen, CORNERS, values, bounds, Enough(1e-6, 1e-9, 2000))
+    found, _ = lowest_by_simplex(rosen, CORNERS, values, bounds, Enough(1e-6, 1e-9, 2000))
     options = {"initial_simplex": CORNERS, "xatol": 1e-6, "fatol": 1e-9}
     theirs = minimize(rosen, CORNERS[0], method="Nelder-Mead", bounds=bounds, options=options)
     assert found == pytest.approx(theirs.x, abs=1e-9)
@@ -39,9 +43,9 @@ def test_it_takes_no_more_values_than_it_may(most):
         return rosen(point)
 
     values = np.array([rosen(corner) for corner in CORNERS])
-    found = lowest_by_simplex(counted, CORNERS, values, np.array([[-9.0, 9.0]] * 3), Enough(1e-6, 1e-9, most))
+    found, lowest = lowest_by_simplex(counted, CORNERS, values, np.array([[-9.0, 9.0]] * 3), Enough(1e-6, 1e-9, most))
     assert len(taken) <= most + len(CORNERS) - 1, "only a simplex that shrinks is brought to its end"
-    assert rosen(found) == min([*values, *(rosen(point) for point in taken)])
+    assert rosen(found) == lowest == min([*values, *(rosen(point) for point in taken)])
 
 
 def test_what_is_refused_is_kept_off():
@@ -51,7 +55,9 @@ def test_what_is_refused_is_kept_off():
         return point.sum() if (point >= 1).all() else np.inf
 
     corners = np.array([[3.0, 3.0], [2.5, 3.0], [3.0, 2.5]])
-    found = lowest_by_simplex(value, corners, corners.sum(axis=1), np.array([[-9.0, 9.0]] * 2), Enough(1e-3, 1e-3, 200))
+    found, _ = lowest_by_simplex(
+        value, corners, corners.sum(axis=1), np.array([[-9.0, 9.0]] * 2), Enough(1e-3, 1e-3, 200)
+    )
     assert found == pytest.approx([1, 1], abs=0.05)
 
 
@@ -90,3 +96,40 @@ def test_an_angle_that_is_nearly_one_of_the_grid_is_that_one_unless_J_minds():
     assert indifferent.tolist() == [0.0, -55.0, -88.0, 30.01], "no further than the limits, and what is fixed stays"
     minds = _on_the_grid(asked, free, limits, 5.0, lambda setting: 1e-2 * abs(setting[1] + 54.9))
     assert minds.tolist() == [0.0, -54.9, -88.0, 30.01]
+
+
+class Valley:
+    """J of a region that a turning plane sees only about its equator: a valley of axes, narrow and long."""
+
+    limits = Limits(min_density=1)
+    problem = SimpleNamespace(sweep=None)
+
+    def J(self, angles_deg, _):
+        u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]
+        off = [u @ np.array([0.6, 0.8, 0.0]), *np.radians(angles_deg[2:])]
+        return float(20 * (np.hypot(off, 0.02) - 0.02).sum()) - float(u[2])
+
+
+@pytest.mark.parametrize("start", [[-40.0, 55.0, 5.0, 15.0], [-50.0, 65.0, -15.0, 0.0]])
+def test_walks_go_on_along_a_valley_that_is_narrower_than_the_grid(start):
+    """One simplex ends up to 0.4 above the lowest J, -1 with an upright axis."""
+    first = descended(AngleRanges(), [(np.array(start), False)], Valley(), 1, no_progress)
+    assert first[0].J > -0.9
+    found = descended(AngleRanges(), [(np.array(start), False)], Valley(), MOST_WALKS[2], no_progress)
+    assert found[0].J < -0.999
+    assert found[0].J == Valley().J(found[0].angles_deg, 0)
+
+
+@pytest.mark.parametrize("most", [1, 16])
+def test_what_gains_nothing_is_walked_from_once(most):
+    flat = []
+
+    class Plateau(Valley):
+        def J(self, angles_deg, _):
+            flat.append(bool(angles_deg[3] > 45))
+            return 5.0 if flat[-1] else super().J(angles_deg, 0)
+
+    starts = [(np.array(start), False) for start in ([-50.0, 65.0, -15.0, 0.0], [-50.0, 65.0, -15.0, 70.0])]
+    found = descended(AngleRanges(), starts, Plateau(), most, no_progress)
+    assert [descent.start for descent in found] == [0, 1]
+    assert sum(flat) < 60

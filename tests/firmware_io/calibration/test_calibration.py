@@ -59,7 +59,7 @@ def room(tmp_path_factory):
 def test_the_command_writes_an_angle_set_that_assembles_straight_walls(room, tmp_path, command):
     recording, angles = room
     out = tmp_path / "angles.calibrated.json"
-    code, printed, complaints = command("calibrate", recording, "--angles", angles, "-o", out)
+    code, printed, complaints = command("calibrate", recording, "--angles", angles, "-o", out, "-v")
     assert (code, complaints) == (0, [])
     assert "not estimated: one direction at one speed" in printed
     assert "warning" not in printed

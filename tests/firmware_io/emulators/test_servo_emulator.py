@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from patience import until
 from pyax12.connection import Connection
+from virtual_bus import VirtualServo
 
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io import serial_port
@@ -340,14 +341,28 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture
+def emulated(monkeypatch):
+    """Makes a servo on a clock of its own, which this file and the driver wait on."""
+
+    def make(model="MX-64R", protocol=None, **options):
+        servo = VirtualServo(model, protocol, **options)
+        servo.install(monkeypatch)
+        monkeypatch.setitem(globals(), "time", servo.clock)
+        monkeypatch.setitem(globals(), "until", servo.clock.until)
+        return servo
+
+    return make
+
+
 def open_servo(port, model=None, servo_id=None):
     """A servo that the driver may set to whatever mode a test needs."""
     return servo_driver.open_servo(port, model, servo_id, undo_folder=Path())
 
 
 @pytest.mark.parametrize(("model", "protocol"), MODELS)
-def test_spin_reads_the_true_angle_at_the_stated_time(model, protocol):
-    with ServoEmulator(model, protocol, angle_rad=-3.0) as emulator, open_servo(emulator.port, model) as servo:
+def test_spin_reads_the_true_angle_at_the_stated_time(emulated, model, protocol):
+    with emulated(model, protocol, angle_rad=-3.0) as emulator, open_servo(emulator.port, model) as servo:
         assert (servo.model, servo.protocol, servo.id) == (model, protocol, 1)
         assert servo.baud == BAUDS.get(protocol, 57600)
         servo.spin(-RATE)
@@ -385,8 +400,8 @@ def slack_rad(servo, state):
     return servo.step_rad / 2 + (state.time_bound_ns / 1e9 + 1e-4) * 2 * RATE
 
 
-def test_the_dead_sector_is_marked_and_never_guessed():
-    with ServoEmulator("AX-12A") as emulator, open_servo(emulator.port) as servo:
+def test_the_dead_sector_is_marked_and_never_guessed(emulated):
+    with emulated("AX-12A") as emulator, open_servo(emulator.port) as servo:
         assert servo.baud == 1_000_000
         servo.spin(5.0)
         states = read_for(servo, 1.6)
@@ -407,9 +422,9 @@ def test_the_dead_sector_is_marked_and_never_guessed():
     assert seen == {"dead", "first turn", "second turn"}
 
 
-def test_turns_are_counted_across_a_pause_at_rest():
+def test_turns_are_counted_across_a_pause_at_rest(emulated):
     """The speeds before and after say nothing of the time in between."""
-    with ServoEmulator() as emulator, open_servo(emulator.port, servo_id=1) as servo:
+    with emulated() as emulator, open_servo(emulator.port, servo_id=1) as servo:
         servo.spin(6.0)
         read_for(servo, 0.1)
         servo.hold()
@@ -423,8 +438,8 @@ def test_turns_are_counted_across_a_pause_at_rest():
         assert abs(servo.read().position_rad - true_rad(emulator)) < 0.01
 
 
-def test_a_servo_stuck_in_its_dead_sector_stalls():
-    with ServoEmulator("AX-12A", angle_rad=math.pi) as emulator, open_servo(emulator.port) as servo:
+def test_a_servo_stuck_in_its_dead_sector_stalls(emulated):
+    with emulated("AX-12A", angle_rad=math.pi) as emulator, open_servo(emulator.port) as servo:
         emulator.stall()
         servo.spin(6.0)
         with pytest.raises(DeviceFaultError, match="stall: stuck in the dead sector instead of"):
@@ -432,16 +447,18 @@ def test_a_servo_stuck_in_its_dead_sector_stalls():
 
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
-def test_an_adapter_that_echoes_and_flips_bits(model, protocol):
-    with ServoEmulator(model, protocol, echo=True, seed=3) as emulator, open_servo(emulator.port) as servo:
+def test_an_adapter_that_echoes_and_flips_bits(emulated, model, protocol):
+    emulator = emulated(model, protocol, seed=3)
+    emulator.echo = True
+    with open_servo(emulator.port) as servo:
         emulator.bit_errors(0.001)
         servo.spin(RATE)
         for state in read_for(servo, 0.3):
             assert abs(state.position_rad - true_rad(emulator, state.time_ns)) < slack_rad(servo, state)
 
 
-def test_opening_sets_what_it_relies_on_if_it_may_and_says_so():
-    with ServoEmulator("XM430-W350") as emulator:
+def test_opening_sets_what_it_relies_on_if_it_may_and_says_so(emulated):
+    with emulated("XM430-W350") as emulator:
         memory = emulator.memory
         memory[7], memory[8], memory[20], memory[68], memory[10] = 42, 2, -500, 0, 1
         with pytest.raises(ServoSetupError, match=r"homing_offset \(register 20\) is -500"):
@@ -460,8 +477,8 @@ def test_opening_sets_what_it_relies_on_if_it_may_and_says_so():
             open_servo(emulator.port, "MX-64R")
 
 
-def test_a_locked_memory_is_said():
-    with ServoEmulator("MX-64R") as emulator:
+def test_a_locked_memory_is_said(emulated):
+    with emulated("MX-64R") as emulator:
         emulator.memory[47] = 1
         with open_servo(emulator.port) as servo:
             servo.sweep_to(0.1, 1.0)
@@ -519,9 +536,9 @@ TROUBLE = [(*of, *what) for of in FAMILIES for what in FAULTS]
 
 
 @pytest.mark.parametrize(("model", "protocol", "fault", "words"), TROUBLE)
-def test_a_fault_stops_the_turn_and_says_what_to_do(model, protocol, fault, words):
+def test_a_fault_stops_the_turn_and_says_what_to_do(emulated, model, protocol, fault, words):
     words = words.replace("{volts}", str(VOLTS.get(model, 12.0)))
-    with ServoEmulator(model, protocol) as emulator:
+    with emulated(model, protocol) as emulator:
         with open_servo(emulator.port, servo_id=1) as servo:
             servo.spin(RATE)
             read_for(servo, 0.1)
@@ -544,9 +561,9 @@ def read_on(servo, seconds):
             servo.read()
 
 
-def test_after_an_overload_it_can_be_opened_and_turns_again():
+def test_after_an_overload_it_can_be_opened_and_turns_again(emulated):
     for protocol in ("1.0", "2.0"):
-        with ServoEmulator("MX-64R", protocol) as emulator:
+        with emulated("MX-64R", protocol) as emulator:
             for again in (False, True):
                 with open_servo(emulator.port) as servo:
                     assert again == any("it reported overload and was reset" in note for note in servo.warnings())

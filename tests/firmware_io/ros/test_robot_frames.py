@@ -72,7 +72,7 @@ def test_what_changed_is_said_in_words():
     assert lean == (
         "lidar tilt: 0.500 deg (sigma 0.0081) from the design: +0.300 about x, -0.400 about y of the rotation frame"
     )
-    assert "lies 5.00 mm (sigma 0.14) from where it was: +3.00 along x, -4.00 along y" in shift
+    assert "5.00 mm (sigma 0.14) from the design: +3.00 along x, -4.00 along y" in shift
     assert "effect at 10 m: up to 92.3 mm" in most  # 10 m times 0.5 deg, and 5 mm
     assert what_changed(DESIGNED, DESIGNED)[0].startswith("lidar tilt: 0.000 deg from")
 

@@ -216,6 +216,27 @@ def test_schema_and_catalogue(command):
     assert listed["UST-20LX"]["provenance"]["range_max_mm"]["verified"] is True
 
 
+def test_a_sketch_of_a_product(command, tmp_path):
+    code, _, err = command("catalogue", "STL27L", "--sketch", tmp_path / "lidar.svg")
+    assert (code, f"wrote {tmp_path / 'lidar.svg'}" in err) == (0, True)
+    assert "3x M2" in (tmp_path / "lidar.svg").read_text()
+    code, _, err = command("catalogue", "--sketch", tmp_path / "all.svg")
+    assert (code, "with its NAME" in err[0]) == (2, True)
+
+
+def test_measure_proposes_a_product_file(command, tmp_path, monkeypatch):
+    block, hole = trimesh.creation.box((40, 30, 10)), trimesh.creation.cylinder(1.25, 20, sections=32)
+    trimesh.boolean.difference([block, hole]).export(tmp_path / "plate.stl")
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = command("measure", "plate.stl", "--json")
+    assert code == 0
+    assert json.loads(out)["values"]["holes"][0]["at_mm"] == [0, 0, 0]
+    assert "verified = false" in (tmp_path / "plate.toml").read_text()
+    assert (tmp_path / "plate.svg").exists()
+    code, _, err = command("measure", "plate.stl", "--kind", "servo")
+    assert (code, "no horn was detected" in err[0]) == (2, True)
+
+
 def test_import_and_assemble_a_real_recording(command, data, tmp_path):
     recording, cloud = tmp_path / "room.mcap", tmp_path / "room.ply"
     source = ["--scan", "/slice:laserScan", "--angle", "/slice:stepAngle", "--angle-unit", "deg", "--hold"]

@@ -1,5 +1,6 @@
 """The cloud while it grows: what is handed over, where its points lie, and that nobody waits for a viewer."""
 
+import io
 import os
 import re
 import threading
@@ -13,12 +14,14 @@ import numpy as np
 import pytest
 import typer
 from patience import until
+from PIL import Image
 from scipy.stats import kstest
 from websockets.sync.client import connect
 
 from scanwright.cli import devices
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import DeviceError, ScanwrightError, UnsafeError, UnsafeNote
+from scanwright.design.task.task import load_task
 from scanwright.firmware_io.assembly.deskew import deskew
 from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
@@ -29,6 +32,7 @@ from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray
 from scanwright.live.scan_page import live_page
+from scanwright.report.colours import COLOUR_STOPS
 from scanwright.serving.page_server import guarded_server
 
 HARMLESS = ("THREE.Clock", "GPU stall", "GL Driver Message", "inside passive event listener")  # without a graphics card
@@ -336,6 +340,37 @@ def test_a_page_that_cannot_be_served_is_one_line(tmp_path):
         pytest.fail("there are no angles in that folder")
 
 
+def test_the_ceiling_is_cut_away_and_stays_away():
+    height = np.linspace(-1, 1, 1001, dtype=np.float32)
+    points, nothing = np.outer(height, [0, 0, 1]).astype(np.float32), np.zeros(1001, np.float32)
+    with guarded_server("a page") as (server, _):
+        view = CloudView(server, "scan", np.zeros(3))
+        view.add(CloudGrowth(points, nothing, nothing, (), 0))
+        view.cut.value = 1.5
+        assert view.chunks[0].handle.points[:, 2].max() == 0.5 and len(view.cloud().points_m) == 1001
+        view.by.value = "range"
+        view.add(CloudGrowth(points, nothing, nothing, (), 0))
+        handle = view.chunks[0].handle
+        assert len(handle.points) == len(handle.colors) == 2 * 751
+        assert "range: 0.0 m" in view.page() and "1,502 of 1,502 points" in view.page()
+
+
+def test_the_expected_density_lies_in_the_room_about_the_scanner(tmp_path, cheapest_task):
+    (tmp_path / "task.toml").write_text(cheapest_task)
+    loaded = load_task(tmp_path / "task.toml")
+    angles = loaded.angle_set((0, 0, 0, -60)).model_copy(update={"t_world_rot_mm": (100.0, 0.0, 300.0)})
+    (tmp_path / "angles.json").write_text(angles.to_json())
+    with guarded_server("a page") as (server, _):
+        view = CloudView(server, "scan", angles.T_world_rot(0.0)[:3, 3])
+        scan_page._expect(view, tmp_path, angles)
+        places = np.asarray(view.room.batched_positions)
+        np.testing.assert_allclose(places.min(axis=0), [-1.9, -2, -0.7], atol=0.1)
+        assert places[:, 2].max() < 2.3  # the ceiling is none of its business: the task looks to the sides
+        assert len(np.unique(view.room.batched_colors, axis=0)) > 2
+        view._expected.value = False
+        assert not view.room.visible
+
+
 def test_the_ruler_takes_the_point_that_is_meant():
     rng = np.random.default_rng(0)
     wall = np.stack([np.full(5000, 4.0), *rng.uniform(-2, 2, (2, 5000))], axis=1).astype(np.float32)
@@ -384,11 +419,19 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
                     until(lambda number=number: len(view.ruler.ends) == number, 3)
         assert re.fullmatch(r"\d\.\d{3} m", view.ruler.text)
         with page.expect_download() as download:
-            page.get_by_role("button", name="Save what is seen").click()
+            page.get_by_role("button", name="Save as PLY").click()
         assert download.value.suggested_filename == "hall.ply"
         download.value.save_as(tmp_path / "hall.ply")
         (cloud,), _ = read_clouds(tmp_path / "hall.ply")
         np.testing.assert_array_equal(cloud.points_m, floor)
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save as web page").click()
+        download.value.save_as(tmp_path / download.value.suggested_filename)
+    saved = browser.open((tmp_path / "hall.html").as_uri(), 900, 600)
+    saved.locator("#canvas").press("ArrowLeft")
+    assert "20,000 of 20,000 points" in saved.inner_text("main") and browser.barriers(saved) == []
+    shot = np.asarray(Image.open(io.BytesIO(saved.locator("#canvas").screenshot())).convert("RGB"), int)
+    assert (np.abs(shot - COLOUR_STOPS[0]).max(axis=2) < 9).mean() > 0.03  # a floor has one height
     browser.complaints[:] = [said for said in browser.complaints if not any(word in said for word in HARMLESS)]
 
 

@@ -41,6 +41,7 @@ FILES = {
     "exploded.glb",
     "assembly.md",
     "bom.csv",
+    "template.pdf",
     "wiring.md",
     "wiring.svg",
     "scanner.urdf",
@@ -57,7 +58,7 @@ FILES = {
     *(f"ros2/meshes/{part}.stl" for part in PARTS),
     *(f"parts/{part}.{kind}" for kind in ("step", "stl") for part in PARTS),
     *(f"drawings/{part}.{kind}" for kind in ("pdf", "dxf", "svg") for part in PARTS),
-    *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon") if part not in METAL),
+    *(f"print/{part}.3mf" for part in (*PARTS, "fit_coupon", "test_plate") if part not in METAL),
     *(f"print/plate_1.{kind}" for kind in ("3mf", "png")),
     *(f"assembly/step_{number:02d}.png" for number in range(1, 10)),
 }

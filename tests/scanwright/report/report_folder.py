@@ -1,7 +1,10 @@
 """The build folder that the tests of the report read: every file of it, by the writers of a build."""
 
+import gzip
 import html
 import io
+import json
+import re
 from base64 import b64decode
 from html.parser import HTMLParser
 from pathlib import Path
@@ -149,6 +152,11 @@ def sphere(loaded, axes):
     problem = problem_as_built(loaded, ANGLES)
     mounts = reference_mounts(problem, loaded.task)
     return density_sphere(problem, ANGLES, mounts, axes, loaded.task.angles.step_deg)
+
+
+def scene_of(text):
+    """What the stage of a page draws."""
+    return json.loads(gzip.decompress(b64decode(re.search(r'id="scene">(.*?)</script>', text)[1])))
 
 
 def picture(data):

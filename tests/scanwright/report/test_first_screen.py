@@ -120,12 +120,21 @@ def test_what_to_do_begins_with_what_is_wrong(parts):
         Finding("known_error", "note", "XM540", "XM540: c"),
         Finding("shaft_slope", "error", "servo_shaft", "d"),
     ]
-    files = ["assembly.md", "print/fit_coupon.3mf", "print/plate_2.3mf", "print/plate_1.3mf", "print/plate_1.png"]
+    files = [
+        "assembly.md",
+        "template.pdf",
+        "print/test_plate.3mf",
+        "print/fit_coupon.3mf",
+        "print/plate_2.3mf",
+        "print/plate_1.3mf",
+        "print/plate_1.png",
+    ]
     todo = to_do(files, findings, parts)
     assert [each.title for each in todo] == [
         "Fix 1 failed check",
         "Correct 1 wrong value",
         "Measure 1 value",
+        "Try the hole patterns on your devices",
         "Print the fit coupon",
         "Order devices, screws and wiring",
         "Have 1 part machined",
@@ -133,5 +142,6 @@ def test_what_to_do_begins_with_what_is_wrong(parts):
         "Assemble and wire",
     ]
     assert todo[2].findings == (findings[0],)
-    assert todo[5].files == ("drawings/shaft.pdf",) and todo[6].files == ("print/plate_1.3mf", "print/plate_2.3mf")
+    assert todo[3].files == ("template.pdf", "print/test_plate.3mf")
+    assert todo[6].files == ("drawings/shaft.pdf",) and todo[7].files == ("print/plate_1.3mf", "print/plate_2.3mf")
     assert to_do([], [], None) == []

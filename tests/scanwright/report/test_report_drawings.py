@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib import colormaps
 from report_folder import ANGLES, AXES, Page, cell, drawn, own_body, picture, sphere
 
 from scanwright.design.frames import R_world_rot
@@ -13,14 +12,15 @@ from scanwright.design.motion import Sweep
 from scanwright.design.task.task import load_task
 from scanwright.report.answer import hidden_by
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
-from scanwright.report.density_sphere import SHADES, bands_to
+from scanwright.report.colours import bands_to, ramp
+from scanwright.report.density_sphere import SHADES
 from scanwright.report.page import report_html
 from scanwright.report.scanner_scene import load_glb, placed_bodies
 
 
 def world_points(body, key):
     T = np.reshape(body[key], (4, 4)).T
-    points = np.frombuffer(b64decode(body["vertices"]), "<f4").reshape(-1, 3)
+    points = np.frombuffer(b64decode(body["vertices"]), "<u2").reshape(-1, 3) / 65535
     return points @ T[:3, :3].T + T[:3, 3]
 
 
@@ -68,7 +68,7 @@ def test_a_sweep_stays_within_its_limits(folder):
 def test_a_scanner_too_large_for_a_page_is_left_out(folder, monkeypatch):
     monkeypatch.setattr("scanwright.report.page.LARGEST_BYTES", 100)
     page = Page(report_html(folder))
-    assert "too much for one page" in page.text["result"] and "canvas" not in page.ids
+    assert "too much for one page" in page.text["result"] and "spin" not in page.ids
 
 
 def test_the_pictures_of_the_sphere_show_what_is_where():
@@ -84,8 +84,7 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
     ]
     own, rolling, pitching, _, _, axes = (picture(shown.picture) for shown in ball.maps)
     assert own.tobytes() == rolling.tobytes() != pitching.tobytes()
-    shades = {tuple((np.array(colormaps["cividis"](i / (SHADES - 1))[:3]) * 255).round()) for i in range(SHADES)}
-    bright = max(shades, key=sum)
+    bright = tuple(ramp(np.linspace(0, 1, SHADES))[-1].tolist())
     # rolling is densest along its axis, ahead and behind; behind it sees nothing within 43 deg, and the robot is there
     assert own.getpixel(cell(np.array([1, 0, 0]))) == bright
     assert own.getpixel(cell(np.array([-1, 0.2, 0.2]))) == (255, 255, 255)
@@ -103,10 +102,10 @@ def test_the_pictures_of_the_sphere_show_what_is_where():
 def test_bands_double_and_reach_the_densest_direction():
     assert bands_to(77.0).edges == (5, 10, 20, 40)
     edges = bands_to(3000.0).edges
-    assert edges == (40, 80, 160, 320, 640, 1280, 2560) and bands_to(0.0).edges == (5,)
+    assert edges == (80, 160, 320, 640, 1280, 2560) and bands_to(0.0).edges == (5,)
     bands = bands_to(3000.0)
-    np.testing.assert_allclose(bands([0, 39.9, 40, 2559, 2560, 1e5]), np.array([0, 0, 1, 6, 7, 7]) / 7)
-    assert [word for _, word in bands.key()] == ["<40", "40", "80", "160", "320", "640", "1280", "2560"]
+    np.testing.assert_allclose(bands([0, 79.9, 80, 2559, 2560, 1e5]), np.array([0, 0, 1, 5, 6, 6]) / 6)
+    assert [word for _, word in bands.key()] == ["<80", "80", "160", "320", "640", "1280", "2560"]
 
 
 def test_axes_without_a_search_stay_white():

@@ -2,13 +2,12 @@
 
 import io
 import itertools
-import json
 import re
 
 import numpy as np
 import pytest
 from PIL import Image
-from report_folder import cell, picture
+from report_folder import cell, picture, scene_of
 
 
 def shot_of(page, selector):
@@ -42,9 +41,11 @@ def shown(browser, folder):
 
 def test_the_page_is_whole_with_the_network_off(shown):
     """And the console is silent, nothing is asked of anybody: the fixture holds that for every test with it."""
-    sizes = shown.evaluate("Promise.all([...document.images].map((i) => i.decode().then(() => i.naturalWidth)))")
+    sizes = shown.evaluate(
+        "Promise.all([...document.querySelectorAll('img[src]')].map((i) => i.decode().then(() => i.naturalWidth)))"
+    )
     assert len(sizes) >= 12 and min(sizes) > 0
-    assert shown.locator("#still, #sphere-hint").evaluate_all("all => all.every((each) => each.hidden)")
+    assert not shown.is_visible("#stills") and shown.is_visible("#drawn")
     assert shown.evaluate("document.documentElement.scrollWidth") <= 1400
     scanner = shot_of(shown, "#canvas")
     assert lilac(scanner).mean() > 0.01
@@ -73,13 +74,15 @@ def test_every_control_of_the_scanner_does_what_it_says(shown):
     shown.locator("#apart").fill("0")
     assert not changed(shot_of(shown, "#canvas"), start)
     shown.click("#nearer")
-    assert lilac(shot_of(shown, "#canvas")).sum() > 1.2 * area
+    assert lilac(shot_of(shown, "#canvas")).sum() > 1.1 * area
     shown.click("#farther")
     assert not changed(shot_of(shown, "#canvas"), start)
     shown.check("#fan")
     fan = shot_of(shown, "#canvas")
-    light, dark = (np.abs(fan - colour).max(axis=2) < 0.02 for colour in ([0.98, 0.88, 0.64], [0.15] * 3))
-    assert light.mean() > 0.02 < light.sum() / dark.sum() and dark.sum() > 100  # two fifths of it over white
+    ground = np.median(fan.reshape(-1, 3), axis=0)
+    over, black = 0.6 * ground + 0.4 * np.array([0.95, 0.7, 0.1]), 0.15 * ground
+    light, dark = (np.abs(fan - colour).max(axis=2) < 0.02 for colour in (over, black))
+    assert light.mean() > 0.02 < light.sum() / dark.sum() and dark.sum() > 100
     for axis, count in (("89.5", 200), ("90", 100), ("359.5", 100), ("0", 200)):
         shown.locator("#axis").fill(axis)
         until(shown, f"document.getElementById('fan-shown').textContent == '{count} of 1081 beams hidden'")
@@ -128,41 +131,88 @@ def test_a_check_shows_where(shown):
     assert not shown.is_visible("#picked")
 
 
-def test_the_ball_is_wrapped_the_right_way_round(shown):
-    """What is in its middle is what its picture has in the direction of the camera."""
-    shown.check("#view-sphere", force=True)
+def placed(scene, point, shape):
+    """Column and row of a point of the room in the picture of the room, by another way than the page."""
+    low, high = (np.array(scene["room"][end]) for end in ("low", "high"))
+    yaw, pitch = scene["look"]["yaw"], scene["look"]["pitch"]
+    back = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
+    right = np.array([-np.sin(yaw), np.cos(yaw), 0])
+    half = np.tan(np.radians(15))
+    eye = (low + high) / 2 + 0.47 * np.linalg.norm(high - low) / np.sin(np.radians(15)) * back
+    x, y, z = np.array([right, np.cross(back, right), back]) @ (point - eye)
+    height, width = shape[:2]
+    return int(width / 2 + height / 2 * x / -z / half), int(height / 2 * (1.12 - y / -z / half))
+
+
+def test_the_room_has_the_colours_of_the_map(shown, text):
+    """Every point of its walls shows what the map has in its direction."""
+    scene = scene_of(text)
+    shown.check("#view-room", force=True)
     seen = []
-    look_deg = json.loads(shown.locator("#sphere").text_content())["look_deg"]
-    assert look_deg[0] == 25 and -45 < look_deg[1] < -25  # the region is ahead and 5 to 60 deg down
     for number in range(4):
-        shown.select_option("#sphere-choice", str(number))
-        title = shown.locator("#sphere-choice option").nth(number).inner_text()
-        until(shown, f"document.getElementById('sphere-title').textContent == '{title}'")
-        shot = shot_of(shown, "#sphere-canvas")
-        yaw, pitch = np.radians(look_deg[0] + 3), np.radians(look_deg[1])
-        wrapped = picture(shown.get_attribute(f"#sphere-{number}", "src"))
-        towards = np.array([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)])
-        height, width = shot.shape[:2]
-        # a little beside the middle, where a line of the grid is
-        right = int(width / 2 + 0.052 * height / 2 / 1.25 * np.cos(pitch))
-        column, row = cell(towards)
-        near = np.asarray(wrapped.crop((column - 1, row - 1, column + 2, row + 2)), float) / 255  # a band may end here
-        assert np.abs(near - shot[height // 2, right]).max(axis=2).min() < 0.05
+        shown.select_option("#map-choice", str(number))
+        until(shown, f"document.getElementById('canvas').dataset.map == '{number}'")
+        shot = shot_of(shown, "#canvas")
+        chosen = picture(shown.get_attribute(f"#map-{number}", "src"))
+        centre = np.array(scene["centre"])
+        low, high = np.array(scene["room"]["low"]), np.array(scene["room"]["high"])
+        for point in ((1.3, 0.4, low[2]), (-0.6, 1.3, low[2]), (high[0], -0.7, -0.3)):
+            point = np.array([*(centre[:2] + point[:2]), point[2]]) if point[2] == low[2] else np.array(point)
+            column, row = cell(point - centre)
+            near = (
+                np.asarray(chosen.crop((column - 1, row - 1, column + 2, row + 2)), float) / 255
+            )  # a band may end here
+            x, y = placed(scene, point, shot.shape)
+            assert np.abs(near - shot[y, x]).max(axis=2).min() < 0.05, (number, point)
         seen.append(shot)
     assert all(changed(*pair) for pair in itertools.pairwise(seen))  # the first is rolling behind its parts
-    shown.locator("#sphere-canvas").press("ArrowUp")
-    assert changed(shot_of(shown, "#sphere-canvas"), seen[3])
-    assert {"ahead", "left", "axis"} <= set(shown.locator(".mark:visible").all_inner_texts())
+    shown.locator("#canvas").press("ArrowUp")
+    assert changed(shot_of(shown, "#canvas"), seen[3])
+    shown.click("#fit")
+    assert not changed(shot_of(shown, "#canvas"), seen[3])
+
+
+def test_one_scan_is_a_cloud_with_a_legend(shown, text):
+    scene = scene_of(text)
+    shown.check("#view-scan", force=True)
+    shot = shot_of(shown, "#canvas")
+    stops = np.array(scene["stops"]) / 255
+    assert all((np.abs(shot - stop).max(axis=2) < 0.03).any() for stop in stops[[0, -1]])
+    words = " ".join(shown.locator(".tools:visible").all_inner_texts())
+    assert (
+        all(height in words for height in scene["heights"])
+        and f"{scene['shown']:,} of {scene['cast']:,} beams" in words
+    )
+    assert 20_000 < scene["shown"] < 90_000
+
+
+def test_parts_have_names_a_click_selects_one_and_the_cut_opens_them(shown):
+    shown.uncheck("#fan")
+    assert {"lidar", "mount", "ahead"} <= set(shown.locator(".mark:visible").all_inner_texts())
+    whole = shot_of(shown, "#canvas")
+    row, column = np.argwhere(lilac(whole)).mean(axis=0)
+    rows, columns = np.nonzero(lilac(whole))
+    at = np.argmin(np.hypot(rows - row, columns - column))
+    place = {"x": float(columns[at]), "y": float(rows[at])}
+    shown.hover("#canvas", position=place)
+    name = shown.inner_text("#tip")
+    assert name in ("base mount", "lidar body")
+    shown.click("#canvas", position=place)
+    assert shown.inner_text("#picked-shown") == name.replace(" ", "_")
+    assert lilac(shot_of(shown, "#canvas")).sum() < 0.9 * lilac(whole).sum()
+    shown.click("#everything")
+    shown.mouse.move(5, 5)
+    assert not changed(shot_of(shown, "#canvas"), whole)
+    shown.locator("#cut").fill("0.98")
+    assert changed(shot_of(shown, "#canvas"), whole)
 
 
 def test_a_phone_needs_no_sideways_scroll(browser, folder):
     page = browser.open((folder / "report.html").as_uri(), 390, 844, device_scale_factor=2, has_touch=True)
     page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")
     assert page.evaluate("document.documentElement.scrollWidth") == 390
-    page.check("#view-sphere", force=True)
-    heights = "[...document.querySelectorAll('#sphere-place .mark')].map((mark) => mark.offsetHeight)"
-    assert len(set(page.evaluate(heights)) - {0}) == 1  # no word of the ball is broken at the edge
-    page.check("#view-scanner", force=True)
+    heights = "[...document.querySelectorAll('#place .mark')].map((mark) => mark.offsetHeight)"
+    assert len(set(page.evaluate(heights)) - {0}) == 1  # no name is broken at the edge
     assert lilac(shot_of(page, "#canvas")).mean() > 0.01
     small = page.evaluate(
         "[...document.querySelectorAll('p, td, dd, dt, li, summary, label, button')]"
@@ -227,9 +277,9 @@ def test_on_paper_nothing_is_folded_and_no_control_is_left(shown):
     assert shown.evaluate("window.printed") == shown.locator("details.screen").count()
     assert shown.locator("details[open]").count() == 1  # devices, as before
     shown.emulate_media(media="print")
-    for selector in ("#controls", "#sphere-controls", "#sphere-canvas", ".tabs", "nav", ".pager"):
+    for selector in ("#spin", "#map-choice", ".tabs", ".zoom", "nav", ".pager"):
         assert not shown.is_visible(selector)
-    for selector in ("#canvas", ".room img", ".fact", ".step"):
+    for selector in ("#canvas", "#stills figure >> nth=1", ".fact", ".step"):
         assert shown.locator(selector).first.is_visible()
     assert lilac(shot_of(shown, "#canvas")).mean() > 0.005
 
@@ -238,20 +288,15 @@ def test_without_webgl_still_pictures_are_there(browser, folder):
     page = browser.open("about:blank")
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto((folder / "report.html").as_uri())
-    assert page.is_visible("#still") and not page.is_visible("canvas") and not page.is_visible("#controls")
-    page.check("#view-sphere", force=True)
-    assert page.is_visible("#sphere-hint")
-    page.check("#view-room", force=True)
-    assert page.is_visible(".room img")
+    assert page.locator("#stills img:visible").count() == 2 and not page.is_visible("canvas")
     assert page.locator("#checks button:disabled").count() == page.locator("#checks button").count() > 0
 
 
 def test_without_scripts_all_of_it_is_there(browser, folder):
     page = browser.open((folder / "report.html").as_uri(), java_script_enabled=False)
-    assert page.is_visible("#still") and not page.is_visible(".pager") and not page.is_visible("canvas")
+    assert page.locator("#stills img:visible").count() == 2
+    assert not page.is_visible(".pager") and not page.is_visible("canvas")
     assert all(step.is_visible() for step in page.locator(".step").all())
-    page.check("#view-room", force=True)
-    assert page.is_visible(".room img") and not page.is_visible("#still")
 
 
 def test_the_browser_tests_would_see_a_request(browser, tmp_path):

@@ -11,6 +11,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from scanwright.design.errors import TaskError
+from scanwright.serving.gate import Gate
 from scanwright.serving.handshake import MOST_VISITORS
 from scanwright.serving.page_server import guarded_server
 
@@ -222,3 +223,22 @@ def test_a_port_that_is_taken_is_said_in_one_line(page):
         pass
     with pytest.raises(TaskError, match="port = 70000"), guarded_server("a page", 70_000):
         pass
+
+
+def test_the_next_studio_has_the_port_and_the_token_of_the_last_one(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    first = Gate(0, "a", recall=True)
+    first.socket.listen()
+    beside = Gate(0, "b", recall=True)  # its port is taken: another one, with a token of its own
+    assert beside.port != first.port and beside.token != first.token
+    for gate in (first, beside):
+        gate.socket.close()
+    again = Gate(0, "a", recall=True)
+    assert (again.port, again.token) == (beside.port, beside.token)
+    again.socket.close()
+    state = tmp_path / "scanwright/studio.json"
+    assert state.stat().st_mode & 0o777 == 0o600
+    state.chmod(0o644)  # anybody may have read it
+    other = Gate(0, "a", recall=True)
+    assert other.token != again.token
+    other.socket.close()

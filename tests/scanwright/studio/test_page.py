@@ -15,8 +15,8 @@ from matplotlib.image import imread
 from scanwright.design.progress import no_progress
 from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import load_task
+from scanwright.report.colours import ramp
 from scanwright.serving.page_server import guarded_server
-from scanwright.serving.style import ramp
 from scanwright.studio.page import Studio
 from scanwright.studio.panel.build_process import BuildProcess
 from scanwright.studio.state import Dab, Setting, painted
@@ -58,7 +58,7 @@ def opened(folder, text):
     with guarded_server("a page") as (server, gate), pytest.MonkeyPatch.context() as patch:
         patch.setattr(coloured_sphere, "TILES", 300)  # drawn without a graphics card here
         patch.setattr(workers, "make_bodies", box)
-        patch.setattr(workers, "preview_scan", dots)
+        patch.setattr(workers, "one_scan", dots)
         studio = Studio(server, load_task(folder / "small.toml"), folder, folder / "out")
         try:
             yield studio, gate
@@ -203,7 +203,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     page.locator(".mantine-TextInput-input:visible").first.fill("../evil")
     page.locator(".mantine-TextInput-input:visible").first.blur()
     page.get_by_role("button", name="Save task").click()
-    page.get_by_text("a task name becomes a folder name").wait_for()
+    page.get_by_text("name: use letters, digits, _ and -").wait_for()
     page.locator(".mantine-TextInput-input:visible").first.fill("mine")
     page.locator(".mantine-TextInput-input:visible").first.blur()
     until(lambda: studio.controls.name.value == "mine")
@@ -246,6 +246,27 @@ def test_what_a_build_says_is_told_as_progress(tmp_path, monkeypatch, code):
     assert said[:2] == (f"-P -m scanwright build {tmp_path / 'a.toml'} --out {tmp_path / 'out'}", "line 0")
     assert list(shares) == sorted(shares) and len(set(shares)) > 40 and max(shares) < 1
     assert ended == [(code, "line 59")] and not build.runs
+
+
+def test_a_link_opens_its_setting_and_what_is_wrong_is_said_at_its_field(studio, browser):
+    studio, gate = studio
+    page = shown(browser, f"{gate.address}#angles=10,-20,30,-40", 700, 500)
+    until(lambda: studio.setting == Setting((10, -20, 30, -40)))
+    studio.show("of this setting alone")
+    page.get_by_text("of this setting alone").wait_for()
+    studio.move(Setting((0, 50, 0, -60)))
+    page.wait_for_function("location.hash === '#angles=0,50,0,-60'")
+    assert studio.controls.note.content == ""  # a message goes with its state
+    field = page.get_by_label("angles [deg]")
+    assert field.input_value() == "0, 50, 0, -60"
+    field.fill("0, 95, 0, -60")
+    field.blur()
+    page.get_by_text("95 deg is out of bounds (allowed -90 to 90)").wait_for()
+    assert studio.setting == Setting((0, 50, 0, -60))
+    field.fill("0, 45, 0, -60")
+    field.blur()
+    until(lambda: studio.setting == Setting((0, 45, 0, -60)) and not studio.controls.typed_error.content)
+    harmless(browser)
 
 
 def test_on_a_phone_the_facts_can_be_read(studio, browser):

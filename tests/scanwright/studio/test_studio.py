@@ -18,8 +18,9 @@ from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.sphere.directions import spiral
-from scanwright.design.task.task import load_task
+from scanwright.design.task.task import Limits, load_task
 from scanwright.firmware_io.emulators.world import furnished_room
+from scanwright.report.room import MOST_RAYS, one_scan
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
@@ -28,17 +29,8 @@ from scanwright.studio.panel.kept_settings import KeptSettings
 from scanwright.studio.state import MOST_DABS, Canvas, Dab, Setting, painted
 from scanwright.studio.task_file import save_task, task_text
 from scanwright.studio.view import workers
-from scanwright.studio.view.coloured_sphere import (
-    BLIND,
-    RADIUS_M,
-    density_colours,
-    direction_hit,
-    edges,
-    hexagons,
-    highest_density,
-)
+from scanwright.studio.view.coloured_sphere import RADIUS_M, direction_hit, edges
 from scanwright.studio.view.latest_only import LatestOnly
-from scanwright.studio.view.preview_scan import MOST_RAYS, preview_scan
 from scanwright.studio.view.scanner_bodies import BodyMesh
 from scanwright.studio.view.view_3d import GHOST, View3D
 from scanwright.studio.view.workers import Order, Workers
@@ -145,8 +137,8 @@ def test_facts_at_rest_are_those_of_score_and_while_dragging_within_their_error(
     exact, quick = judge.exact(SETTING), judge.quick(SETTING)
     assert (exact.J, exact.J_error, exact.exact) == (truth.J, truth.J_error, True)
     assert not quick.exact and abs(quick.J - truth.J) <= quick.J_error + truth.J_error
-    assert f"{truth.J:.5f}" in panel_html.facts_html(exact, log=True)
-    assert panel_html.facts_html(exact, log=True).count("without parts") == 2  # J, and what is never seen
+    assert f"{truth.J:.5f}" in panel_html.facts_html(exact)
+    assert panel_html.facts_html(exact).count("without parts") == 1
     assert exact.gap_mm == pytest.approx(math.radians(exact.gap_deg) * 10_000)
 
 
@@ -156,20 +148,34 @@ def test_what_a_scan_leaves_on_the_ground_is_told_in_metres_when_the_hand_rests(
     on_ground = load_task(tmp_path / "ground.toml")
     judge = Judge.for_task(on_ground)
     (figures,) = on_planes(on_ground, judge.problem, SETTING.angles_rad)
-    dragged = panel_html.facts_html(judge.quick(SETTING), log=True)
+    dragged = panel_html.facts_html(judge.quick(SETTING))
     assert "ground 0.5 to 5 m ahead: ..." in dragged and "points per m2" not in dragged  # no figure of another setting
-    assert figures.words() in panel_html.facts_html(judge.settled(judge.exact(SETTING)), log=True)
+    assert figures.words() in panel_html.facts_html(judge.settled(judge.exact(SETTING)))
 
 
-def test_colours_are_pale_exactly_where_no_beam_comes(loaded):
-    from scanwright.design.evaluation.coverage import mean_density_at
+def test_what_was_asked_for_is_ticked_and_ratios_are_against_the_best_usual_mount(loaded):
+    limits = Limits(min_density=3, max_line_gap_deg=0.01, max_blind_cone_deg=90)
+    judge = Judge.for_task(replace(loaded, task=loaded.task.model_copy(update={"limits": limits})))
+    facts = judge.exact(SETTING)
+    asked = {words: (met, value) for words, met, value in facts.asked()}
+    assert asked["no blind spot"][0] == (facts.blind_weight < 1e-6)
+    assert asked["at least 3 beams per ball"] == (facts.least >= 3, str(facts.least))
+    assert asked["scan lines at most 0.01 deg apart"] == (False, f"{facts.gap_deg:.3f} deg")
+    assert asked["blind cone at most 90 deg"][0]
+    assert "not met" in panel_html.facts_html(facts) and "met" in panel_html.facts_html(facts)
+    assert facts.ratio == pytest.approx(math.exp(min(facts.mounts.values()) - facts.J))
+    assert f"{facts.ratio:.2f} x" in panel_html.kept_html({"A": facts})
+    assert math.isnan(replace(facts, log=False).ratio)
 
-    problem, directions = problem_of(loaded), hexagons().directions
-    highest = highest_density(problem, SETTING.angles_rad)
-    colours = density_colours(problem, SETTING.angles_rad, directions, highest)
-    blind = mean_density_at(problem, SETTING.angles_rad, directions) <= 1e-9
-    assert 0 < blind.sum() < len(blind)
-    np.testing.assert_array_equal((colours == BLIND).all(axis=1), blind)
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("0, 90, 0", "not four numbers"), ("a b c d", "not four"), ("0 91 0 0", "91 deg is out of bounds"), ("", "four")],
+)
+def test_a_typed_setting_that_is_none_is_one_line(text, words):
+    with pytest.raises(TaskError, match=words):
+        Setting.read(text)
+    assert Setting.read(SETTING.text) == SETTING
 
 
 def test_edges_lie_on_the_cones_of_the_task(loaded):
@@ -277,7 +283,7 @@ def points(_scanner, joint_rad, _placed, _folder):
 def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp_path, monkeypatch):
     monkeypatch.setenv("SCANWRIGHT_TEST_GO", str(tmp_path / "go"))
     monkeypatch.setattr(workers, "make_bodies", bodies)
-    monkeypatch.setattr(workers, "preview_scan", points)
+    monkeypatch.setattr(workers, "one_scan", points)
     shown, said, faded = {}, [], []
     problem = problem_of(loaded)
 
@@ -330,7 +336,7 @@ def test_parts_of_an_earlier_setting_are_ghosts_until_the_new_ones_stand():
 def test_the_preview_draws_as_many_points_as_a_page_can_and_stands_on_the_walls_of_the_room(loaded, tmp_path):
     order = Order(loaded, problem_of(loaded), SETTING, True, "room")
     joint_rad = np.linspace(0, 2 * np.pi, 1000, endpoint=False)
-    seen = preview_scan(order.scanner(), joint_rad, None, tmp_path)
+    seen = one_scan(order.scanner(), joint_rad, None, tmp_path)
     assert 10_000 < len(seen) <= MOST_RAYS
     low, high = furnished_room().reshape(-1, 3).min(axis=0), furnished_room().reshape(-1, 3).max(axis=0)
     assert ((seen > low - 0.2) & (seen < high + 0.2)).all()
@@ -358,4 +364,4 @@ def test_what_is_kept_while_the_others_are_judged_again_stays_and_is_judged_by_t
     kept_one.set()
     thread.join(20)
     assert controls.kept.options == ("rolling", "pitching", name) and ">A<" in controls.table.content
-    assert f"{after.exact(SETTING).J:.4f}" in controls.table.content
+    assert f"{after.exact(SETTING).ratio:.2f} x" in controls.table.content

@@ -1,6 +1,6 @@
 """Write the figures of `benchmarks/figures.toml` into README and docs, or list the pages that differ.
 
-uv run python -m benchmarks.scanwright.figures [--check]
+uv run python -m benchmarks.scanwright.printed.figures [--check]
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FIGURES: dict[str, str] = tomllib.loads((ROOT / "benchmarks/figures.toml").read_text(encoding="utf-8"))
 _MARKED = re.compile(r"(<!-- figure: (\w+) -->)[^<]*(<!-- end -->)")
 

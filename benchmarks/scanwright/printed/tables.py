@@ -1,6 +1,6 @@
 """Tables of the pages that come from builds: written between the marks `<!-- table: NAME -->` and `<!-- end -->`.
 
-    uv run python -m benchmarks.scanwright.tables [OUT]
+    uv run python -m benchmarks.scanwright.printed.tables [OUT]
 
 Builds the tasks of the table that OUT (out/ by default) does not have, runs `compare` of `ground_ahead`, and rewrites
 the tables of docs/choose-hardware.md and docs/compared.md.
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from scanwright.design.task.task import load_task
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 TASKS = ("low_cost", "indoor_urg", "quadruped_ld19", "capsule_ring", "ceiling", "ground_ahead")
 """Scanners of the hardware table; those that are not shipped are written by `NEW`."""
 NEW = {
