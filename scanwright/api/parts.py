@@ -56,7 +56,8 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
         progress: progress callback.
 
     Returns:
-        The assembly: cadquery solids by name, such as `assembly.made["alignment_linkage"]`; `bought` are the purchased products.
+        The assembly: cadquery solids by name, made ones in `made`, such as `assembly.made["alignment_linkage"]`, and
+        purchased products in `bought`.
 
     Raises:
         InstallError: the CAD kernel is not installed.

@@ -43,7 +43,7 @@ def build(
 
     Writes everything into DIR/<task>/; does nothing if the build is current.
     """
-    from scanwright.cli.results.of_commands import Built, Check, Rebuilt
+    from scanwright.cli.results.of_commands import Built, CheckEntry, Rebuilt
 
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
@@ -62,7 +62,11 @@ def build(
         raise typer.Exit(130) from None
     _print_failed_checks(built.checks)
     record = Built(
-        built.folder, built.files, built.warnings, built.misfits, [Check(**entry) for entry in entries_of(built.checks)]
+        built.folder,
+        built.files,
+        built.warnings,
+        built.misfits,
+        [CheckEntry(**entry) for entry in entries_of(built.checks)],
     )
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
     _warn_of_misfits(built.misfits)
@@ -93,7 +97,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     Prints the failed checks and the warnings; with -v, all checks.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Check, Checked
+    from scanwright.cli.results.of_commands import Checked, CheckEntry
     from scanwright.pipeline.build import finding_lines
 
     checks = api.check(out, progress=ConsoleProgress())
@@ -107,7 +111,9 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
         named = ("unverified", "known_error")  # a line sums them up
         warnings = [each for each in checks if each.severity == "warning" and each.code not in named]
         lines += finding_lines(warnings, checks, in_full=False)
-    show_result(lambda: lines, Checked(loaded.task.name, [Check(**entry) for entry in entries_of(checks)]), as_json)
+    show_result(
+        lambda: lines, Checked(loaded.task.name, [CheckEntry(**entry) for entry in entries_of(checks)]), as_json
+    )
     raise typer.Exit(1 if errors_in(checks) else 0)
 
 

@@ -1,10 +1,6 @@
 """Peak memory of converting large clouds against their size: it must not grow.
 
-<<<<<<<< HEAD:benchmarks/firmware_io/clouds/memory.py
-    python -m benchmarks.firmware_io.clouds.memory 2 20 [200] [FORMAT ...]       # million points
-========
     python -m benchmarks.firmware_io.recordings.clouds_memory 2 20 [200] [FORMAT ...]       # million points
->>>>>>>> refs/heads/io40:benchmarks/firmware_io/recordings/clouds_memory.py
 
 For each size a cloud of x y z, intensity and time is made, then converted to each format and back to PLY, each in a
 process of its own. Needs 60 bytes of disk a point.

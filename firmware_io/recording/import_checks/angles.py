@@ -19,6 +19,8 @@ _FAR_SHARE = 0.85  # of the neighbours: at a step of an axis that stops half of 
 _LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are smaller
 _STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
 _SIGMAS = 8.0  # of the differences to the neighbours: noise alone never gets there
+_USUAL, _USUAL_SHARE = 8.0, 0.85  # times what most angles keep: whole degrees at uneven times are off their lines
+_FARTHEST_STEPS = 3.0  # times their distance a line through two angles is extended
 _MOVING_RAD_S = math.radians(1.0)  # slower than any sweep
 _RESTS, _CAUGHT_UP = 5, 1.8  # steps of 0, and times the usual speed after them: no servo starts so fast
 _FASTEST = 4.0  # times the usual speed: no servo jumps to it for one sample
@@ -53,23 +55,29 @@ def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"],
     wrong[inner] = (off[inner] > limit) & (np.mean(np.abs(apart) > limit, axis=0) >= _FAR_SHARE)
     rest = np.flatnonzero(~wrong)
     lone_rad = _off_both_lines(time_ns[rest], position_rad[rest])
-    lone = lone_rad > max(_LEAST_RAD, _SIGMAS * 1.4826 * float(np.median(lone_rad)))
+    lone = lone_rad > max(_LEAST_RAD, _USUAL * float(np.quantile(lone_rad, _USUAL_SHARE)) if rest.size else 0)
     wrong[rest[lone]], off[rest[lone]] = True, lone_rad[lone]
     return wrong, off
 
 
 def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
     """Return how far positions lie off the nearer of the lines through two before and two after them, shape (n,)."""
-    seconds, off = (time_ns - time_ns[0]) / 1e9, np.zeros(time_ns.size)
+    off = np.zeros(time_ns.size)
+    if off.size < 5:
+        return off
+    seconds = (time_ns - time_ns[0]) / 1e9
     here = np.arange(2, time_ns.size - 2)
     sides = []
     for side in (-1, 1):
         near, far = here + side, here + 2 * side
         apart_s = seconds[near] - seconds[far]
-        rate = _wrapped(position_rad[near] - position_rad[far]) / np.where(apart_s == 0, np.inf, apart_s)
-        line = position_rad[near] + rate * (seconds[here] - seconds[near])
+        steps = (seconds[here] - seconds[near]) / np.where(apart_s == 0, np.inf, apart_s)
+        steps = np.where(steps <= _FARTHEST_STEPS, steps, 0)  # two angles at almost one time show no rate
+        line = position_rad[near] + _wrapped(position_rad[near] - position_rad[far]) * steps
         sides.append(np.abs(_wrapped(position_rad[here] - line)))
-    off[here] = np.minimum(*sides)
+    apart_s = np.diff(seconds)
+    gap_s = np.max([apart_s[k : k + here.size] for k in range(4)], axis=0)  # beyond a gap the axis may be anywhere
+    off[here] = np.where(gap_s > _FARTHEST_STEPS * np.median(apart_s), 0, np.minimum(*sides))
     return off
 
 

@@ -23,7 +23,7 @@ ANGLES = AngleSet(
     J_error=1e-3,
 )
 GROUND = {"shape": "ground", "from_m": 0.5, "to_m": 3.0, "width_m": 2.0, "height_m": 0.4}
-HEADER = "kind,part,number,quantity,total_usd,low_usd,high_usd,mass_g\n"
+HEADER = "kind,part,number,quantity,total_usd,low_usd,high_usd,mass_g,note\n"
 
 
 def ground_task():
@@ -84,12 +84,12 @@ def test_every_motion_has_its_words():
 
 @pytest.fixture
 def parts(tmp_path):
-    rows = ["tool,multimeter,,1,,15,60,", "bought,lidar,UTM-30LX,1,5000,5000,5000,370", "screw,cap,M3,6,,1,2,"]
+    rows = ["tool,multimeter,,1,,15,60,,", "bought,lidar,UTM-30LX,1,5000,5000,5000,370,", "screw,cap,M3,6,,1,2,,"]
     rows += [
-        "turned,shaft,,1,,30,90,20",
-        "printed,mount,,1,,0,0,50",
-        "strange,thing,,,,,,",
-        "total,all,,,5000,5046,5152,",
+        "turned,shaft,,1,,30,90,20,",
+        "printed,mount,,1,,0,0,50,",
+        "strange,thing,,,,,,,",
+        "total,all,,,5000,5046,5152,,",
     ]
     (tmp_path / "bom.csv").write_text(HEADER + "\n".join(rows) + "\n")
     return read_parts(tmp_path / "bom.csv")
