@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
@@ -97,9 +96,6 @@ class Scan:
             return self.stamp_ns + self.beam_offset_ns
         offset_ns = np.rint(np.arange(self.range_m.size) * (self.time_increment_s * 1e9))
         return self.stamp_ns + offset_ns.astype(np.int64)
-
-
-Echo = Literal["first", "last", "strongest", "all"]
 
 
 def chosen_echo(range_m: Float32s, intensity: Float32s, echo: str) -> Ints:

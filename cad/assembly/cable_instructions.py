@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import math
 
-from scanwright.cad.layout.cables.joint import LENGTH
 from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
 from scanwright.cad.layout.layout import Layout
+from scanwright.design.electrics.wiring import connectors_of
 
-SPARE = 15.0  # mm more than its way, so that a joint can be made once again
-HUB, SHAFT, NECK, PLATE, FOOT = "hub", "shaft", "neck", "plate", "foot of the mount"  # where cables are tied
+HUB, SHAFT, NECK, COIL, PLATE, FOOT = "hub", "shaft", "neck", "coil", "plate", "foot of the mount"  # tied there
 
 
 def leads_text(layout: Layout) -> str:
-    """Return the instructions for the leads between lidar and ring."""
-    leads = layout.leads
-    straight = layout.scanner.lidar.cable_straight_mm
-    laid = [lead for lead in leads if lead.path is not None]
+    """Return the instructions for the leads of the ring's rotor: no cable of the lidar is cut or stripped."""
+    leads, lidar = layout.leads, layout.scanner.lidar
     lines = [
-        f"Take the jacket of the lidar's cable off {straight:g} mm behind the lidar: that much stays straight, and the "
-        "bare wires behind it go on as one bundle with the leads of the ring, the way that the picture shows.",
-        *(_one(layout, lead) for lead in laid),
-        f"Crimp the wires of each bundle side by side on a straight piece, with {LENGTH:g} mm of shrink tube "
-        "over all of them; the wiring diagram tells which belong together. "
-        f"The {SPARE:g} mm that are left go back along the joint, under the same tube.",
-        *_ties(layout),
+        "Do not cut or strip a cable of the lidar. The leads of the ring run the way that the picture shows and end in "
+        "sockets beside the linkage; coil what is over of each cable flat about the hub, where it meets neither a "
+        "beam nor what stands still, and tie the coil with two cable ties.",
+        *(_one(layout, lead) for lead in leads if lead.path is not None),
     ]
+    for cable, connector in connectors_of(lidar):
+        what = {"power": "Power", "data": "Data", "both": "Power and data"}[cable.carries]
+        if cable.end == "bare":
+            lines.append(f"{what}: put the leads and the bare ends of the lidar's cable into the {connector.words}.")
+        else:
+            lines.append(
+                f"{what}: crimp the leads of a {cable.end} socket to those of the ring, a shrink tube over each, and "
+                f"plug the lidar's {cable.end} plug into it."
+            )
+    lines += ["The wiring diagram says which circuit goes to which pin.", *_ties(layout)]
     missing = [lead for lead in leads if lead.path is None]
     lines += [
         f"For the cable that leaves the lidar at y = {lead.y:g} mm no way was found: see `lead_bend` in `checks.json`."
@@ -37,6 +41,7 @@ def leads_text(layout: Layout) -> str:
 def tied_at(layout: Layout) -> list[str]:
     """Return where cables are tied, a place for each tie; leads without a path, which a person lays, count too."""
     leads, seat, places = layout.leads, layout.linkage.hub_tie, [PLATE] * len(layout.linkage.plate_ties)
+    places = [COIL] * 2 + places if leads else places
     if seat is not None and all(tied_mm(lead, seat) is not None for lead in leads if lead.path is not None):
         places.insert(0, HUB)
     elif leads:
@@ -61,7 +66,7 @@ def _ties(layout: Layout) -> list[str]:
     if PLATE in places:
         lines.append(
             "Another through the two slots of each tongue behind the plate, crossed between tongue and cable, holds "
-            "the jacket of the lidar's cable."
+            "the lidar's cable."
         )
     return lines
 
@@ -70,13 +75,10 @@ def _one(layout: Layout, lead: RotorLead) -> str:
     assert lead.path is not None
     x, y, _ = lead.path.corners[2]
     azimuth = math.degrees(math.atan2(y, x)) % 360.0
-    joint = lead.joint
-    where = "" if joint is None else f", its joint {math.dist(joint.middle, lead.path.corners[-1]):.0f} mm from there"
     return (
-        f"The cable at y = {lead.y:g} mm: the bundle leaves {layout.drive.leads_leave} at {azimuth:.0f} deg "
-        "(counter-clockwise from above, "
-        f"90 at the index), is {lead.path.length():.0f} mm long to the jacket{where}, and is bent by no less than "
-        f"{lead.radius:g} mm; cut it {lead.path.length() + SPARE:.0f} mm long."
+        f"The leads for the cable at y = {lead.y:g} mm leave {layout.drive.leads_leave} at {azimuth:.0f} deg "
+        "(counter-clockwise from above, 90 at the index); the way to the lidar's outlet "
+        f"is {lead.path.length():.0f} mm long, and bends by no less than {lead.radius:g} mm."
     )
 
 

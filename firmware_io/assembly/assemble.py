@@ -33,9 +33,10 @@ from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
 from scanwright.firmware_io.clouds.ply import PlyWriter
+from scanwright.firmware_io.echo import Echo
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
-from scanwright.firmware_io.samples import Block, Echo, straight
+from scanwright.firmware_io.samples import Block, straight
 
 _PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0  # an hour: two clocks of the same day

@@ -10,7 +10,8 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Floats
 from scanwright.firmware_io.assembly.own_body import OwnBody
-from scanwright.firmware_io.samples import Block, Echo, Scan, chosen_echo, echo_count
+from scanwright.firmware_io.echo import Echo
+from scanwright.firmware_io.samples import Block, Scan, chosen_echo, echo_count
 
 
 class Verdict(IntEnum):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scanwright.firmware_io.samples import Echo
+from scanwright.firmware_io.echo import Echo
 
 if TYPE_CHECKING:
     from scanwright.design.task.task import LoadedTask

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from scanwright.design.errors import RecordingError
-from scanwright.firmware_io.samples import Echo
+from scanwright.firmware_io.echo import Echo
 
 _COUNTS = re.compile(r"(\d{1,12}(?:\.\d+)?)/turn")
 

@@ -65,3 +65,5 @@ def test_the_last_step_tells_where_each_lead_runs(lying):
     assert thing == "rotor_leads"
     for lead in lying.layout.leads:
         assert f"is {lead.path.length():.0f} mm long" in step.words
+    assert "plug the lidar's USB-A plug into it" in step.words and "into the terminal block, 2 poles" in step.words
+    assert "jacket" not in step.words

@@ -120,7 +120,10 @@ def test_there_is_a_cable_tie_for_every_place_that_the_layout_has(rows, made):
     (row,) = [row for row in rows if row["part"] == "cable tie, 2.5 mm"]
     layout = made.result.assembly.layout
     assert layout.linkage.hub_tie is not None and not layout.linkage.plate_ties
-    assert (row["quantity"], row["note"].split(";")[0]) == ("2", "1 at the hub, 1 at the foot of the mount")
+    assert (row["quantity"], row["note"].split(";")[0]) == (
+        "4",
+        "1 at the hub, 2 at the coil, 1 at the foot of the mount",
+    )
 
 
 def test_what_the_paper_asks_for_is_there(rows):

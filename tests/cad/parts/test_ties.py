@@ -80,7 +80,7 @@ def test_a_tie_is_counted_for_every_tongue_and_for_the_foot_of_a_mount(tied):
     layout, left_out = tied.layout, {entry.what for entry in tied.layout.left_out}
     plates = 0 if PLATE_TIE in left_out else len(layout.scanner.lidar.cable_y_mm)
     foot = 0 if layout.deck.flat else 1
-    assert tied_at(layout) == ["hub"] + plates * ["plate"] + foot * ["foot of the mount"]
+    assert tied_at(layout) == ["hub"] + 2 * ["coil"] + plates * ["plate"] + foot * ["foot of the mount"]
 
 
 def test_a_tie_that_went_in_under_the_bar_is_closed_and_no_other_asked_for(tied):
