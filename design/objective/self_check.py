@@ -94,8 +94,8 @@ def _counted(
     cost = near + PER_LAYER * (len(task.weight) + len(task.mask)) / max(count.weighted, 1e-3)
     while SURE * count.J_error > NEAR and 2 * points * cost <= MOST_WORK:
         # the error of a net falls nearly as the number of its points, which is a power of two
-        times = min(SURE * count.J_error / (AIM * NEAR), MOST_WORK / cost / points)
-        points *= 2 ** max(1, int(np.log2(times)))
+        needed = np.ceil(np.log2(SURE * count.J_error / (AIM * NEAR)))
+        points *= 2 ** int(min(needed, np.log2(MOST_WORK / cost / points)))
         count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)
     return count.J, SURE * count.J_error, points
 
