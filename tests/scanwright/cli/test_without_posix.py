@@ -87,4 +87,4 @@ def test_what_drives_no_device_works_and_devices_are_refused_in_one_line(tmp_pat
     assert "two builds" not in done.stdout and "built ['a.txt', 'ahead']" in done.stdout
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert errors == [f"error: {REFUSED}"] * 2
-    assert len(codes) == 17
+    assert len(codes) == 16
