@@ -217,7 +217,7 @@ def lowest_by_simplex(
     while True:
         order = np.argsort(values, kind="stable")
         corners, values = corners[order], values[order]
-        small = np.abs(corners[1:] - corners[0]).max() <= enough.size
+        small = np.abs(corners[1:] - corners[0]).max(initial=0.0) <= enough.size  # one corner: no angle is free
         if left < STEP or (small and not values[-1] - values[0] > enough.spread):
             return corners[0], float(values[0])
         middle = corners[:-1].mean(axis=0)
