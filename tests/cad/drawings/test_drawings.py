@@ -111,7 +111,7 @@ def test_shaft_circle_of_holes_and_diameters(sheets):
     np.testing.assert_allclose(2 * np.linalg.norm(np.array(holes)[:, :2], axis=1), float(circle), atol=0.01)
     top = sheet.mesh.bounds[1, 2]
     outer = max(diameter for diameter, _ in circles_in(sheet.mesh, [0, 0, top - 25.0], Z))
-    assert f"Ø{number(round(outer, 1))}  0/-0.011" in sheet.said  # h6 below the bearing's sleeve
+    assert f"Ø{number(round(outer, 2))}  0/-0.011" in sheet.said  # h6 below the bearing's sleeve
     assert any(abs(value - (top - low)) < 0.01 for value in ordinates(sheet))
 
 

@@ -184,7 +184,7 @@ def test_what_the_scanner_sees_of_itself_does_not_count(tmp_path, command):
     np.savez(tmp_path / "own_body.npz", bearing_rad=bearing_rad, beams=hidden)
     code, printed, _ = command(*words)
     assert code == 0
-    assert f"left out {hidden.sum() * len(scans):,} beams: own body" in printed
+    assert f"dropped {hidden.sum() * len(scans):,} beams: own body" in printed
     found = load_angles(tmp_path / "a.json")
     off = np.radians(found.delta_rotvec_rot_deg) - [truth.tilt_x_rad, truth.tilt_y_rad]
     off = np.append(off, np.array(found.t_rot_laser_mm[:2]) / 1e3 - [truth.offset_x_m, truth.offset_y_m])
