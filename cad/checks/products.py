@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.design.catalogue.holes import Hole, what_holds
 from scanwright.design.catalogue.measuring import how_to_measure
 from scanwright.design.catalogue.product_base import Product
@@ -16,7 +17,7 @@ from scanwright.design.scanner import Scanner
 SHAPING = {
     "lidar.holes": "the screws of the lidar",
     "printer.screw_clearance_mm": "every screw hole",
-    "slip_ring.friction_nm": "whether there is a counterweight",
+    "slip_ring.friction_nm": f"whether there is a {COUNTERWEIGHT}",
     "servo.holes": "the screws of the servo's case",
 }
 SHOWN_CHARS = 60  # of a value in a message; a longer one is cut
