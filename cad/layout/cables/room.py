@@ -50,7 +50,7 @@ class RotorRoom:
         room = half + gap
         clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room)
         for is_clear in (  # the cheapest first, and of what is left only
-            lambda some: ~self._in_fan(some, half),
+            lambda some: ~self._in_fan(some, room),
             lambda some: clear_of(self.shapes, some, room, lambda inside: self._carved(inside, room)),
             self.clear_of_others,
         ):

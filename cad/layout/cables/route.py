@@ -192,8 +192,9 @@ class PathGraph:
             turn = np.einsum("ij,ij->i", along[last], ends.directions[end])
             fits[last] &= _arc(self.radius, turn) <= np.minimum(ends.left[end], lengths[last] / 2)
         chosen = np.flatnonzero(fits)
-        inside = self.points[here] + _inwards(self.radius, direction, along[chosen])
-        return chosen[self.room.free(inside, self.half, GAP)]
+        inside = self.points[here] + _on_arcs(self.radius, direction, along[chosen])
+        free = self.room.free(inside.reshape(-1, 3), self.half, GAP).reshape(len(inside), -1).all(axis=0)
+        return chosen[free]
 
     def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
         """Points that a free straight piece leads to from one, directions (m, 3) and lengths (m,)."""
@@ -223,7 +224,13 @@ def _arc(radius: float, cosine: Array) -> Array:
     return np.where(angle < SHARPEST, radius * np.tan(np.minimum(angle, SHARPEST) / 2), np.inf)
 
 
-def _inwards(radius: float, direction: Array, along: Array) -> Array:
-    """From a corner to the middle of its arc, for each way on (m, 3)."""
+def _on_arcs(radius: float, direction: Array, along: Array) -> Array:
+    """From a corner to the quarters of its arc, for each way on (m, 3): shape (3, m, 3).
+
+    The widest arcs are four times as long as SAMPLE; where they begin and end, they touch the straight pieces.
+    """
     half = np.arccos(np.clip(along @ direction, -1.0, 1.0)) / 2
-    return (along - direction) * (radius * (1 / np.cos(half) - 1) / np.maximum(2 * np.sin(half), 1e-9))[:, None]
+    turned = np.array([-0.5, 0.0, 0.5])[:, None] * half
+    inwards = radius * (1 / np.cos(half) - np.cos(turned)) / np.maximum(2 * np.sin(half), 1e-9)
+    onwards = radius * np.sin(turned) / np.maximum(2 * np.cos(half), 1e-9)
+    return np.asarray(inwards[..., None] * (along - direction) + onwards[..., None] * (along + direction))
