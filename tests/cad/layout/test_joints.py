@@ -19,6 +19,7 @@ from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
 from scanwright.cad.geometry.holes import Piercing, rounds_of
 from scanwright.cad.layout.joints import DECK_MM, shank_mm
+from scanwright.cad.layout.rotor.linkage import CROSS_WASHER_THICK
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import SCREWS, thread_hole, trap_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
@@ -207,15 +208,17 @@ def test_the_declared_joints_are_those_that_the_solids_have(name, parts_of):
     for key, ((fixing, screw, trap), holes) in read.items():
         joint = declared[key]
         assert (joint.fixing, joint.screw.name, joint.count, joint.traps) == (fixing, screw, len(holes), trap), key
-        grip = round(max(hole.length for hole, _ in holes), 3)  # of a tilted part the kernel knows it to a nanometre
+        washer = 0.0 if joint.washer_mm is None else CROSS_WASHER_THICK
+        # of a tilted part the kernel knows it to a nanometre
+        grip = round(washer + max(hole.length for hole, _ in holes), 3)
         depth = min(behind.depth for _, behind in holes)
         assert joint.length_mm == shank_mm(joint.screw, grip, fixing, depth), (key, grip, depth)
         assert joint.grip_mm == pytest.approx(grip, abs=LOOSE if key[1].endswith("shaft") else 0.02), key
         for axis in joint.axes:
             (hole,) = [hole for hole, _ in holes if _is_on(axis, hole) and _begins(axis, hole)]
             ends = [float((np.array(end) - axis.start) @ axis.along) for end in (hole.low, hole.high)]
-            assert min(ends) == pytest.approx(0.0, abs=0.02), (key, ends)  # it starts where the head bears
-            assert max(ends) == pytest.approx(hole.length, abs=0.02), (key, ends)
+            assert min(ends) == pytest.approx(washer, abs=0.02), (key, ends)  # it starts where the head bears
+            assert max(ends) == pytest.approx(washer + hole.length, abs=0.02), (key, ends)
 
 
 def _is_on(axis, hole):
