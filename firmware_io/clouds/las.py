@@ -124,9 +124,10 @@ def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[
     packed = path.suffix.lower() == ".laz"
     with atomic_write(path, RecordingError) as place, place.open("wb") as stream:
         what = f"{path}: cannot write"
-        with foreign(what, laspy.open, stream, mode="w", header=header, do_compress=packed, closefd=False) as writer:
-            for part in parts:
-                foreign(what, writer.write_points, _points(header, part, exact=exact))
+        writer = foreign(what, laspy.open, stream, mode="w", header=header, do_compress=packed, closefd=False)
+        for part in parts:
+            foreign(what, writer.write_points, _points(header, part, exact=exact))
+        foreign(what, writer.close)
     return notes
 
 
