@@ -16,7 +16,7 @@ from scanwright.design.progress import Progress, no_progress
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredFiles:
     """What was measured, and where it was written."""
 
     proposal: Proposal
@@ -41,7 +41,7 @@ def measure_files(
     front: str = "+x",
     unit: str | None = None,
     progress: Progress = no_progress,
-) -> Measured:
+) -> MeasuredFiles:
     """Measure a maker's model; write the proposal and the picture.
 
     Args:
@@ -70,4 +70,4 @@ def measure_files(
     out.write_text(toml_text(proposal, model.name, digest), encoding="utf-8")
     progress("drawing")
     picture.write_bytes(picture_svg(proposal, model.name))
-    return Measured(proposal, out, picture)
+    return MeasuredFiles(proposal, out, picture)

@@ -18,7 +18,7 @@ LEAST_SHARE = 0.01  # of the surface, that is round about the axis
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class ScanWindow:
     """A band about the optical axis: place of the axis, largest radius, lower and upper edge."""
 
     axis: tuple[float, float]
@@ -27,7 +27,7 @@ class Window:
     high: float
 
 
-def window_of(triangles: Array) -> Window | None:
+def window_of(triangles: Array) -> ScanWindow | None:
     """Return the largest band that is round about an upright axis, in the upper part; None if there is none.
 
     Args:
@@ -60,7 +60,7 @@ def window_of(triangles: Array) -> Window | None:
     best = int(np.argmax(np.bincount(index.reshape(-1), area[round_])))
     inside = triangles[round_][index.reshape(-1) == best]
     radius = float(np.linalg.norm(inside[..., :2] - axis, axis=2).max())
-    return Window((float(axis[0]), float(axis[1])), radius, float(edges[best, 0]), float(edges[best, 1]))
+    return ScanWindow((float(axis[0]), float(axis[1])), radius, float(edges[best, 0]), float(edges[best, 1]))
 
 
 def _meeting_point(aside: Array, offset: Array, area: Array) -> Array:

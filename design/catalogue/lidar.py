@@ -11,8 +11,8 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from scanwright.design.catalogue.cable import Cable
 from scanwright.design.catalogue.holes import Hole, HolePattern, mounting_holes
+from scanwright.design.catalogue.lidar_cable import Cable
 from scanwright.design.catalogue.product_base import (
     Box,
     Lead,

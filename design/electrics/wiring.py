@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
-from scanwright.design.catalogue.cable import Cable, Connector, connector_for
 from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.lidar_cable import Cable, Connector, connector_for
 from scanwright.design.catalogue.product_base import Circuits
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.electrics.cautions import MEASURE, RISKS, cautions_of

@@ -21,10 +21,9 @@ from numpy.typing import ArrayLike
 from scanwright.design import frames
 from scanwright.design.arrays import Array, Vector
 from scanwright.design.errors import SceneError
+from scanwright.design.scene.mesh_file import mesh_file
 from scanwright.design.scene.nearest import Nearest, nearest_search
 from scanwright.design.scene.urdf import AS_IT_IS, SUFFIX, Posture, urdf_triangles
-
-SUFFIXES = (".stl", ".ply", ".obj", ".dae", ".glb")
 
 _AS_IT_IS = np.eye(4)
 _BATCH = 1 << 17  # rays; bounds the memory of one cast
@@ -88,26 +87,6 @@ def load_triangles(
     if stated_m and not np.isclose(stated_m, unit_m):
         raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file states that one unit is {stated_m:g} m")
     return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)
-
-
-def mesh_file(path: Path) -> tuple[Float[ndarray, "t 3 3"], float | None]:
-    """Return the corners of a mesh in units of its file, shape (t, 3, 3), and the unit that it states [m], if any.
-
-    Raises:
-        SceneError: the file is missing or is not a mesh.
-    """
-    if path.suffix.lower() not in SUFFIXES:
-        raise SceneError(f"{path}: not a mesh by its name; a mesh is one of {', '.join(SUFFIXES)}")
-    if not path.is_file():
-        raise SceneError(f"{path}: {'this is a folder, not a mesh' if path.is_dir() else 'no such file'}")
-    import trimesh
-
-    try:
-        loaded = trimesh.load_scene(path, process=False)
-        triangles = np.asarray(loaded.to_mesh().triangles, dtype=float).reshape(-1, 3, 3)
-        return triangles, trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else None
-    except Exception as error:  # readers of a dozen formats fail with as many types
-        raise SceneError(f"{path}: not a readable {path.suffix[1:].upper()} mesh: {type(error).__name__}") from error
 
 
 def build_scene(triangles_m: Float[ndarray, "t 3 3"], name: str = "scene") -> Scene:

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from scanwright.design import frames
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import SceneError, suggest
+from scanwright.design.scene.mesh_file import mesh_file
 
 SUFFIX = ".urdf"
 
@@ -138,8 +139,6 @@ def _moved(joint: ElementTree.Element, value: float) -> Pose:
 
 def _geometry(path: Path, link: str, shape: ElementTree.Element) -> Iterator[Float[ndarray, "t 3 3"]]:
     import trimesh
-
-    from scanwright.design.scene.ray_caster import mesh_file
 
     for node in shape.findall("geometry/*"):
         try:

@@ -29,7 +29,7 @@ from scanwright.firmware_io.clouds.cloud import (
     pose_numbers,
     with_header,
 )
-from scanwright.firmware_io.clouds.streams.parts import Parts, Survey, survey
+from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts, survey
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
@@ -84,14 +84,14 @@ def write(path: Path, clouds: Sequence[Cloud]) -> list[str]:
     return []
 
 
-def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[str]:
     """Write a flat cloud part by part."""
     with atomic_write(path, RecordingError) as place:
         foreign(f"{path}: cannot write", _write_scans, place, [(known, (1, known.rows), parts)], path.stem)
     return []
 
 
-_Scan = tuple[Survey | None, tuple[int, int], Iterable[Cloud]]
+_Scan = tuple[CloudSurvey | None, tuple[int, int], Iterable[Cloud]]
 
 
 def _write_scans(place: Path, scans: Iterable[_Scan], name: str) -> None:
@@ -193,7 +193,7 @@ def _chunks(e57: pye57.E57, header: Any, rows: int) -> Iterator[dict[str, Column
 
 
 def _write_scan(
-    e57: pye57.E57, known: Survey | None, shape: tuple[int, int], parts: Iterable[Cloud], name: str
+    e57: pye57.E57, known: CloudSurvey | None, shape: tuple[int, int], parts: Iterable[Cloud], name: str
 ) -> None:
     file = e57.image_file
     if known is None:

@@ -18,7 +18,7 @@ from scanwright.design import frames
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, with_header
-from scanwright.firmware_io.clouds.streams.parts import Parts, Survey, survey
+from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts, survey
 from scanwright.firmware_io.foreign import foreign
 
 _HEADER = struct.Struct("<94xHII")  # size of the header, byte of the first point, number of records before it
@@ -100,7 +100,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     return write_parts(path, known, [cloud])
 
 
-def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[str]:
     """Write a flat cloud part by part."""
     names = known.head.columns
     header = laspy.LasHeader(version="1.4", point_format=7 if "red" in names else 6)
@@ -124,9 +124,10 @@ def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
     packed = path.suffix.lower() == ".laz"
     with atomic_write(path, RecordingError) as place, place.open("wb") as stream:
         what = f"{path}: cannot write"
-        with foreign(what, laspy.open, stream, mode="w", header=header, do_compress=packed, closefd=False) as writer:
-            for part in parts:
-                foreign(what, writer.write_points, _points(header, part, exact=exact))
+        writer = foreign(what, laspy.open, stream, mode="w", header=header, do_compress=packed, closefd=False)
+        for part in parts:
+            foreign(what, writer.write_points, _points(header, part, exact=exact))
+        foreign(what, writer.close)
     return notes
 
 
@@ -196,7 +197,7 @@ def _check_chunks(path: Path, at: int, points: int) -> None:
         raise RecordingError(f"{path}: {chunks:,} chunks announced for {points:,} points")
 
 
-def _step_m(path: Path, known: Survey) -> float:
+def _step_m(path: Path, known: CloudSurvey) -> float:
     """The finest step at which 32 bits reach over all points."""
     across_m = float((known.high_m - known.low_m).max()) + 1
     for step_m in _STEPS_M:

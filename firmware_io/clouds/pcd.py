@@ -30,7 +30,7 @@ from scanwright.firmware_io.clouds.cloud import (
     pose_matrix,
     pose_numbers,
 )
-from scanwright.firmware_io.clouds.streams.parts import Parts, Survey
+from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 
@@ -238,7 +238,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     return _write(path, cloud, cloud.shape, [cloud])
 
 
-def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[str]:
     """Write a flat cloud part by part."""
     return _write(path, known.head, (1, known.rows), parts)
 

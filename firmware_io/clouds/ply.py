@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
-from scanwright.firmware_io.clouds.streams.parts import Parts, Survey
+from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 
@@ -340,7 +340,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     return _write(path, cloud, [cloud])
 
 
-def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[str]:
     """Write a flat cloud part by part."""
     return _write(path, known.head, parts)
 

@@ -20,7 +20,7 @@ from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, Column, as_type, cloud_rows, headlines, with_header
-from scanwright.firmware_io.clouds.streams.parts import Parts, Survey
+from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
@@ -259,7 +259,7 @@ def write(path: Path, cloud: Cloud) -> list[str]:
     return _write(path, cloud, [cloud])
 
 
-def write_parts(path: Path, known: Survey, parts: Iterable[Cloud]) -> list[str]:
+def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[str]:
     """Write a flat cloud part by part."""
     return _write(path, known.head, parts)
 

@@ -22,9 +22,9 @@ def _announce(as_json: bool) -> Callable[[str], None]:
     """Return a function that prints the address of a page."""
 
     def announce(address: str) -> None:
-        from scanwright.cli.results.of_commands import Shown
+        from scanwright.cli.results.of_commands import OpenedPage
 
-        show_result(lambda: [f"open {address}"], Shown(address=address), as_json)
+        show_result(lambda: [f"open {address}"], OpenedPage(address=address), as_json)
 
     return announce
 
@@ -62,12 +62,12 @@ def view(
 ) -> None:
     """Show a recording in Foxglove."""
     require("foxglove", "view needs a websocket server", "websockets")
-    from scanwright.cli.results.of_commands import Shown
+    from scanwright.cli.results.of_commands import OpenedPage
     from scanwright.live.foxglove_view import view_recording, write_for_foxglove
     from scanwright.serving.handshake import as_origins
 
     if out is not None:
-        result = Shown(file=out, scans=write_for_foxglove(recording, angles, out))
+        result = OpenedPage(file=out, scans=write_for_foxglove(recording, angles, out))
         show_result(lambda: [f"wrote {result.scans:,} scans with their points to {out}"], result, as_json)
         return
     try:

@@ -25,7 +25,7 @@ AXES = {f"{sign}{axis}": (1 if sign == "+" else -1) * np.eye(3)[i] for i, axis i
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class BoxBody:
     """A box between two corners."""
 
     low: Point3
@@ -52,7 +52,7 @@ class Spot:
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class DeviceOutline:
     """A device to draw.
 
     Attributes:
@@ -62,7 +62,7 @@ class Outline:
         unverified: fields that the sketch shows and no source verifies.
     """
 
-    solids: tuple[Box | Upright, ...]
+    solids: tuple[BoxBody | Upright, ...]
     spots: tuple[Spot, ...] = ()
     heights: tuple[float, ...] = ()
     unverified: tuple[str, ...] = ()
@@ -86,7 +86,7 @@ def spots_of(holes: Iterable[Hole], mark: str = "") -> tuple[Spot, ...]:
 
 
 @singledispatch
-def outline_of(product: Product) -> Outline:
+def outline_of(product: Product) -> DeviceOutline:
     """Return what a sketch shows of a product.
 
     Raises:
@@ -96,19 +96,19 @@ def outline_of(product: Product) -> Outline:
 
 
 @outline_of.register
-def _lidar(product: Lidar) -> Outline:
+def _lidar(product: Lidar) -> DeviceOutline:
     x, y, z = product.body_mm
     window = Upright(product.window_radius_mm, *product.window_z_mm)
-    body = Box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
-    ears = [Box(low, high) for low, high in product.ears_mm or ()]
+    body = BoxBody((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
+    ears = [BoxBody(low, high) for low, high in product.ears_mm or ()]
     fields = ("body_mm", "ears_mm", "window_z_mm", "window_radius_mm", "holes", "optical_height_mm")
     unverified = _open(product, fields)
     spots = spots_of(product.holes, _mark("holes", unverified))
-    return Outline((body, *ears, window), spots, (product.optical_height_mm,), unverified)
+    return DeviceOutline((body, *ears, window), spots, (product.optical_height_mm,), unverified)
 
 
 @outline_of.register
-def _servo(product: Servo) -> Outline:
+def _servo(product: Servo) -> DeviceOutline:
     horn = Upright(product.horn_diameter_mm / 2, -product.horn_thickness_mm, 0.0)
     boss = Upright(product.horn_boss_diameter_mm / 2, 0.0, product.horn_boss_height_mm)
     horn_fields = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
@@ -120,13 +120,13 @@ def _servo(product: Servo) -> Outline:
     words = f"{product.horn_screw} TAPPED, {number(product.horn_thread_depth_mm)} DEEP ON Ø{number(2 * circle)}{mark}"
     radius = SCREWS[product.horn_screw].nominal / 2
     on_horn = [Spot((-circle * math.sin(t), circle * math.cos(t), 0.0), (0.0, 0.0, 1.0), radius, words) for t in turns]
-    solids: list[Box | Upright] = [Box(product.case_min_mm, product.case_max_mm), horn]
+    solids: list[BoxBody | Upright] = [BoxBody(product.case_min_mm, product.case_max_mm), horn]
     spots = (*on_horn, *spots_of(product.holes, _mark("holes", unverified)))
-    return Outline((*solids, *([boss] if boss.radius else [])), spots, (), unverified)
+    return DeviceOutline((*solids, *([boss] if boss.radius else [])), spots, (), unverified)
 
 
 @outline_of.register
-def _slip_ring(product: SlipRing) -> Outline:
+def _slip_ring(product: SlipRing) -> DeviceOutline:
     length = product.length_mm
     solids = [Upright(product.outer_diameter_mm / 2, 0.0, length)]
     if product.bore_mm:
@@ -143,19 +143,19 @@ def _slip_ring(product: SlipRing) -> Outline:
     if product.rotor is not None:
         solids.append(Upright(product.rotor.diameter_mm / 2, length, length + product.rotor.length_mm))
     fields = ("bore_mm", "outer_diameter_mm", "length_mm", "flange", "rotor")
-    return Outline(tuple(solids), tuple(spots), (), _open(product, fields))
+    return DeviceOutline(tuple(solids), tuple(spots), (), _open(product, fields))
 
 
 @outline_of.register
-def _bearing(product: Bearing) -> Outline:
+def _bearing(product: Bearing) -> DeviceOutline:
     outer = Upright(product.outer_mm / 2, 0.0, product.width_mm)
     bore = Upright(product.bore_mm / 2, 0.0, product.width_mm)
-    return Outline((outer, bore), (), (), _open(product, ("bore_mm", "outer_mm", "width_mm")))
+    return DeviceOutline((outer, bore), (), (), _open(product, ("bore_mm", "outer_mm", "width_mm")))
 
 
 @outline_of.register
-def _printer(product: Printer) -> Outline:
-    return Outline((Box((0.0, 0.0, 0.0), product.bed_mm),), (), (), _open(product, ("bed_mm",)))
+def _printer(product: Printer) -> DeviceOutline:
+    return DeviceOutline((BoxBody((0.0, 0.0, 0.0), product.bed_mm),), (), (), _open(product, ("bed_mm",)))
 
 
 def _open(product: Product, fields: Sequence[str]) -> tuple[str, ...]:

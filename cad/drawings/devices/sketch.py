@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scanwright.cad import outlines
-from scanwright.cad.drawings.devices.outline import Box, Outline, Spot, Upright, outline_of
+from scanwright.cad.drawings.devices.outline import BoxBody, DeviceOutline, Spot, Upright, outline_of
 from scanwright.cad.drawings.dimensions import Callout, callouts_right, centre_mark, ordinates
 from scanwright.cad.drawings.patterns import counted, number
 from scanwright.cad.drawings.pen import Pen, Point, document_at
@@ -37,7 +37,7 @@ Draw = Callable[[Array, Array], list[Array]]
 
 
 @dataclass(slots=True)
-class View:
+class SketchView:
     """A view in its own plane, millimetres of the device; `signs` are -1 if the frame's axis points to the left."""
 
     title: str
@@ -68,7 +68,7 @@ def sketch_svg(product: Product) -> bytes:
     return sketch_of(f"{product.name} ({product.maker})", views, notes)
 
 
-def views_of(spots: Sequence[Spot], draw: Draw, heights: Sequence[float] = ()) -> list[View]:
+def views_of(spots: Sequence[Spot], draw: Draw, heights: Sequence[float] = ()) -> list[SketchView]:
     """Return the views that a device needs, with its holes and dimensions.
 
     Args:
@@ -79,7 +79,7 @@ def views_of(spots: Sequence[Spot], draw: Draw, heights: Sequence[float] = ()) -
     views = []
     for title, right, up in _shown(spots):
         r, u = np.asarray(right, dtype=float), np.asarray(up, dtype=float)
-        view = View(title, float(r.sum()), draw(r, u))
+        view = SketchView(title, float(r.sum()), draw(r, u))
         corners = np.concatenate(view.polygons)
         for x in (corners[:, 0].min(), corners[:, 0].max()):
             view.below[round(float(x), 3)] = float(corners[:, 1].min())
@@ -102,7 +102,7 @@ def views_of(spots: Sequence[Spot], draw: Draw, heights: Sequence[float] = ()) -
     return views
 
 
-def sketch_of(title: str, views: Sequence[View], notes: Sequence[str]) -> bytes:
+def sketch_of(title: str, views: Sequence[SketchView], notes: Sequence[str]) -> bytes:
     """Return views in rows of two with a title and notes, as SVG."""
     size = max(float(np.ptp(np.concatenate(view.polygons), axis=0).max()) for view in views)
     scale = next((scale for scale in SCALES if size * scale <= LARGEST_MM), SCALES[-1])
@@ -134,7 +134,7 @@ def sketch_of(title: str, views: Sequence[View], notes: Sequence[str]) -> bytes:
     return svg_bytes(sheet, list(drawn_on(sheet)))
 
 
-def _draw(pen: Pen, view: View) -> None:
+def _draw(pen: Pen, view: SketchView) -> None:
     for polygon in view.polygons:
         points = [pen.paper((float(x), float(y))) for x, y in polygon]
         pen.stroke("VISIBLE", [*points, points[0]])
@@ -157,18 +157,18 @@ def _shown(spots: Sequence[Spot]) -> list[tuple[str, tuple[float, float, float],
     return [view for i, view in enumerate(VIEWS) if i in ALWAYS or faced(view[1], view[2])]
 
 
-def _ends(solid: Box | Upright) -> tuple[float, float]:
+def _ends(solid: BoxBody | Upright) -> tuple[float, float]:
     """Return the heights of its lower and upper end."""
     return (solid.low, solid.high) if isinstance(solid, Upright) else (solid.low[2], solid.high[2])
 
 
-def _polygons(outline: Outline, right: Array, up: Array) -> list[Array]:
+def _polygons(outline: DeviceOutline, right: Array, up: Array) -> list[Array]:
     """Return the outlines of bodies in a view; from below a box covers the cylinders on it."""
     towards = float(np.cross(right, up)[2])
-    boxed = any(isinstance(solid, Box) for solid in outline.solids)
+    boxed = any(isinstance(solid, BoxBody) for solid in outline.solids)
     polygons = []
     for solid in outline.solids:
-        if isinstance(solid, Box):
+        if isinstance(solid, BoxBody):
             corners = np.array([[np.asarray(c) @ right, np.asarray(c) @ up] for c in (solid.low, solid.high)])
         elif abs(towards) < ALONG:
             corners = np.array([[-solid.radius, solid.low], [solid.radius, solid.high]])

@@ -29,7 +29,7 @@ class Parts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Survey:
+class CloudSurvey:
     """All parts of a cloud, without its points.
 
     Attributes:
@@ -49,9 +49,9 @@ class Survey:
     integers: frozenset[str]
 
 
-def survey(parts: Iterable[Cloud]) -> Survey | None:
+def survey(parts: Iterable[Cloud]) -> CloudSurvey | None:
     """Return the survey of the parts of a cloud; None if no row is a point."""
-    merged: Survey | None = None
+    merged: CloudSurvey | None = None
     for part in parts:
         flat = part.flat()
         if len(flat.points_m):
@@ -59,7 +59,7 @@ def survey(parts: Iterable[Cloud]) -> Survey | None:
     return merged
 
 
-def _of(cloud: Cloud) -> Survey:
+def _of(cloud: Cloud) -> CloudSurvey:
     world_m = frames.apply(cloud.T_world_cloud, cloud.points_m.astype(float))
     limits, integers = {}, set()
     for name, values in cloud.columns.items():
@@ -69,10 +69,10 @@ def _of(cloud: Cloud) -> Survey:
             integers |= {name} if np.all(values == np.round(values)) else set()
     head = cloud.select(np.empty(0, np.int64))
     low_m, high_m = world_m.min(axis=0), world_m.max(axis=0)
-    return Survey(head, len(cloud.points_m), low_m, high_m, limits, frozenset(integers))
+    return CloudSurvey(head, len(cloud.points_m), low_m, high_m, limits, frozenset(integers))
 
 
-def _both(one: Survey, other: Survey) -> Survey:
+def _both(one: CloudSurvey, other: CloudSurvey) -> CloudSurvey:
     limits = {
         name: (min(a, other.limits[name][0]), max(b, other.limits[name][1])) for name, (a, b) in one.limits.items()
     }

@@ -14,7 +14,7 @@ from scanwright.design.objective.holes import BlindSpot
 
 
 @dataclass(frozen=True, slots=True)
-class Objective:
+class ObjectiveResult:
     """The objective of a mount: lower is better.
 
     Attributes:
@@ -27,7 +27,7 @@ class Objective:
 
 
 @dataclass(frozen=True, slots=True)
-class Mount:
+class MountResult:
     """Mounting angles.
 
     Attributes:
@@ -48,7 +48,7 @@ class Mount:
 
 
 @dataclass(frozen=True, slots=True)
-class RankedMount(Mount):
+class RankedMount(MountResult):
     """One of the best mounts.
 
     Attributes:
@@ -61,7 +61,7 @@ class RankedMount(Mount):
 
 
 @dataclass(frozen=True, slots=True)
-class Unconstrained(Mount):
+class Unconstrained(MountResult):
     """The mount with the lowest J if blind spots were allowed.
 
     Attributes:
@@ -83,7 +83,7 @@ class Preferred:
 
     accepted_loss: float
     J_more: float
-    lowest_J: Mount  # noqa: N815  a key of the JSON object
+    lowest_J: MountResult  # noqa: N815  a key of the JSON object
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +184,7 @@ class Optimised:
     plain: Unconstrained | None
     least_blind_weight: float | None
     preferred: Preferred | None
-    standard: dict[str, Objective]
+    standard: dict[str, ObjectiveResult]
     gains: list[GainResult]
     covered: int
     evaluated: int

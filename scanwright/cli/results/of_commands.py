@@ -341,7 +341,7 @@ class Mapped:
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class OpenedPage:
     """A page or a server, or a file for a viewer.
 
     Attributes:
@@ -379,8 +379,8 @@ RESULTS: dict[str, Any] = {
     "register": Registered,
     "map": Mapped,
     "convert": Converted,
-    "studio": Shown,
-    "view": Shown,
+    "studio": OpenedPage,
+    "view": OpenedPage,
 }
 """Command -> record that it prints with `--json`."""
 

@@ -62,7 +62,7 @@ def test_nothing_free_is_nothing_to_map(fixed, tmp_path):
 def test_optimise_draws_it(command, tmp_path):
     code, out, _ = command("optimise", "ceiling", "--picture", tmp_path / "new/J.png")
     assert code == 0
-    assert "covered 1,369 settings" in out
+    assert "searched 1,369 mounts" in out
     assert f"wrote {tmp_path / 'new/J.png'}" in out.splitlines()
     assert imread(tmp_path / "new/J.png").std() > 0.1
 
