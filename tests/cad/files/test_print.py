@@ -203,7 +203,7 @@ def test_the_coupon_has_the_clearances_that_it_says(made):
     assert coupon.is_watertight
     section, _ = coupon.section(plane_origin=[0, 0, 0.9], plane_normal=[0, 0, 1]).to_2D()
     diameters = sorted(np.ptp(loop[:, 0]) for loop in section.discrete if len(loop) > 20)
-    printer, shaft = made.scanner.printer, 12.0
+    printer, shaft = made.scanner.printer, made.result.assembly.layout.stack.shaft_diameter
     assert (printer.fit_clearance_mm, printer.screw_clearance_mm) == (0.2, 0.4)
     expected = [nominal + c for nominal in (2.5, 3.0) for c in (0.2, 0.3, 0.4, 0.5, 0.6)]
     expected += [shaft + c for c in (0.0, 0.1, 0.2, 0.3, 0.4)]
