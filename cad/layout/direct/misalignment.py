@@ -29,7 +29,7 @@ PLASTIC_GROWS_PER_K = 70e-6  # PLA and PETG; the case is taken not to grow
 SHARE = 0.5  # of the horn's rating that the worst case may use
 SURELY = 0.92  # of what is allowed, as long as the rotor is not weighed: balanced, it may lean a little more
 # the shaft's waist, each in the order of preference
-WAIST_LENGTHS = (20.0, 24.0, 28.0, 32.0)
+WAIST_LENGTHS = (20.0, 24.0, 28.0, 32.0, 36.0, 40.0)
 WAIST_DIAMETERS = tuple(tenths / 10 for tenths in range(70, 44, -1))
 
 
