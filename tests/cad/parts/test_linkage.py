@@ -17,6 +17,7 @@ from scanwright.cad.assembly.linkage_preview import draft_linkage
 from scanwright.cad.checks.printing import thin_walls
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
+from scanwright.cad.layout.direct.loads import LINKAGE_CM3
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.envelope import (
     box_corners,
@@ -79,7 +80,7 @@ def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha
     mesh = checked_mesh(alignment_linkage(bare_linkage(scanner)), "alignment_linkage")
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     assert body.is_watertight and body.body_count == 1
-    assert 20_000 < body.volume < 120_000
+    assert 20_000 < body.volume < 1000 * LINKAGE_CM3
     a, b = np.radians([alpha, beta])
     normal = np.array([np.sin(b) * np.cos(a), -np.sin(a), np.cos(b) * np.cos(a)])
     seat = scanner.lidar.optical_height_mm + (4.0 if stack.sub_plate else 0.0)
