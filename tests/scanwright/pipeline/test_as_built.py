@@ -34,7 +34,7 @@ def test_every_place_states_the_same_numbers_of_a_build(built, command):
     stated = [line for line in lines if line.startswith("with parts")]
     code, out, _ = command("evaluate", folder)
     assert code == 0
-    told, without = out.split("without parts:\n")
+    told, without = out.split("\nwithout parts:\n")
     assert told.splitlines() == [line for line in stated if "one full scan" not in line]
     assert "with parts" not in without
 
