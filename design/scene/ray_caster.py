@@ -23,7 +23,7 @@ from scanwright.design.arrays import Array, Vector
 from scanwright.design.errors import SceneError
 from scanwright.design.scene.mesh_file import mesh_file
 from scanwright.design.scene.nearest import Nearest, nearest_search
-from scanwright.design.scene.urdf import AS_IT_IS, SUFFIX, Posture, urdf_triangles
+from scanwright.design.scene.posture import AS_IT_IS, SUFFIX, Posture
 
 _AS_IT_IS = np.eye(4)
 _BATCH = 1 << 17  # rays; bounds the memory of one cast
@@ -82,8 +82,13 @@ def load_triangles(
     """
     if not 0 < unit_m < np.inf:
         raise SceneError(f"{path}: unit_m = {unit_m}: the length of one unit of the file, such as 0.001 for mm")
-    urdf = path.suffix.lower() == SUFFIX
-    triangles, stated_m = (urdf_triangles(path, posture), 1.0) if urdf else mesh_file(path)
+    stated_m: float | None = 1.0
+    if path.suffix.lower() == SUFFIX:
+        from scanwright.design.scene.urdf import urdf_triangles
+
+        triangles = urdf_triangles(path, posture)
+    else:
+        triangles, stated_m = mesh_file(path)
     if stated_m and not np.isclose(stated_m, unit_m):
         raise SceneError(f"{path}: unit_m = {unit_m:g}, but the file states that one unit is {stated_m:g} m")
     return frames.apply(np.asarray(T_world_mesh, dtype=float), triangles.reshape(-1, 3) * unit_m).reshape(-1, 3, 3)

@@ -12,8 +12,8 @@ from numpy import ndarray
 
 from scanwright.design.errors import TaskError
 from scanwright.design.frames import Rx, Ry, Rz
+from scanwright.design.scene.posture import AS_IT_IS, Posture
 from scanwright.design.scene.ray_caster import build_scene, cast, load_triangles
-from scanwright.design.scene.urdf import AS_IT_IS, Posture
 
 _LEAST_M = 0.02  # no robot and no room is smaller
 _UNITS_M = (0.001, 0.01, 0.0254, 0.3048, 1.0, 1000.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 from xml.etree import ElementTree
@@ -18,28 +17,7 @@ from scanwright.design import frames
 from scanwright.design.arrays import Pose
 from scanwright.design.errors import SceneError, suggest
 from scanwright.design.scene.mesh_file import mesh_file
-
-SUFFIX = ".urdf"
-
-
-@dataclass(frozen=True, slots=True)
-class Posture:
-    """How a robot stands.
-
-    Attributes:
-        joint_deg: joint that turns -> its angle; 0 for the others.
-        joint_mm: joint that slides -> its length; 0 for the others.
-        frame: link in whose frame the triangles are; empty for the root.
-        omit: links without geometry, such as the scanner's own.
-    """
-
-    joint_deg: Mapping[str, float] = field(default_factory=dict)
-    joint_mm: Mapping[str, float] = field(default_factory=dict)
-    frame: str = ""
-    omit: tuple[str, ...] = ()
-
-
-AS_IT_IS = Posture()
+from scanwright.design.scene.posture import AS_IT_IS, SUFFIX, Posture
 
 
 def urdf_triangles(path: Path, posture: Posture = AS_IT_IS) -> Float[ndarray, "t 3 3"]:

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
 from scanwright.design.files.record import Record
-from scanwright.design.scene.urdf import AS_IT_IS, Posture
+from scanwright.design.scene.posture import AS_IT_IS, Posture
 
 Number = Annotated[float, Strict()]
 """An int or a float of the file; text and booleans are not accepted."""

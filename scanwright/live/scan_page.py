@@ -23,7 +23,9 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet, angles_in_use
 from scanwright.design.errors import ScanwrightError
+from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.self_occlusion import load_self_occlusion
+from scanwright.design.task.task import load_task
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.scan.live_feed import UNWATCHED, Feed, Placing, Viewer, growing
 from scanwright.firmware_io.scan.scan_end import LOST
@@ -120,8 +122,6 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
 
 def _expect(view: CloudView, folder: Path, angles: AngleSet) -> None:
     """Show the density that a full scan has where the task looks."""
-    from scanwright.design.evaluation.coverage import mean_density_at
-    from scanwright.design.task.task import load_task
     from scanwright.report.answer import mounting_rad, problem_as_built
     from scanwright.report.density_sphere import DENSEST
     from scanwright.report.room import room_about

@@ -14,8 +14,8 @@ from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.files.atomic_file import atomic_write, place_in
 from scanwright.design.left_out import LeftOut
+from scanwright.design.scene.posture import SUFFIX as URDF
 from scanwright.design.scene.ray_caster import load_triangles
-from scanwright.design.scene.urdf import SUFFIX as URDF
 from scanwright.design.search.search import SearchResult
 from scanwright.design.task.shapes import MapRegion, MeshRegion
 from scanwright.design.task.task import LoadedTask, Task

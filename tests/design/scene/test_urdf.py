@@ -7,8 +7,9 @@ import pytest
 import trimesh
 
 from scanwright.design.errors import SceneError, TaskError
+from scanwright.design.scene.posture import Posture
 from scanwright.design.scene.ray_caster import load_triangles
-from scanwright.design.scene.urdf import Posture, urdf_triangles
+from scanwright.design.scene.urdf import urdf_triangles
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.records import write_task
 

@@ -1,0 +1,28 @@
+"""How the robot of a URDF stands; apart from its geometry, so that a task is read without scipy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+SUFFIX = ".urdf"
+
+
+@dataclass(frozen=True, slots=True)
+class Posture:
+    """How a robot stands.
+
+    Attributes:
+        joint_deg: joint that turns -> its angle; 0 for the others.
+        joint_mm: joint that slides -> its length; 0 for the others.
+        frame: link in whose frame the triangles are; empty for the root.
+        omit: links without geometry, such as the scanner's own.
+    """
+
+    joint_deg: Mapping[str, float] = field(default_factory=dict)
+    joint_mm: Mapping[str, float] = field(default_factory=dict)
+    frame: str = ""
+    omit: tuple[str, ...] = ()
+
+
+AS_IT_IS = Posture()
