@@ -17,7 +17,6 @@ from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.assembly.options import DEFAULT, AssembleOptions
 from scanwright.firmware_io.assembly.own_body import own_body_of
 from scanwright.firmware_io.clouds.formats import check_target
-from scanwright.firmware_io.poses.gyro import oriented
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
 from scanwright.firmware_io.ros import robot_frames
 
@@ -158,6 +157,7 @@ def _platform(recording: Path, options: AssembleOptions) -> tuple[Trajectory | N
         return trajectory, []
     if trajectory is None:
         raise RecordingError("`imu` requires `poses`")
+    from scanwright.firmware_io.poses.gyro import oriented
     from scanwright.firmware_io.poses.gyro_files import imu_mount, load_gyro
 
     gyro = load_gyro(options.imu, recording)
