@@ -110,8 +110,11 @@ class SensorLine:
         raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
     def widened(self, uncertainty_ns: float) -> int:
-        """Return the standard uncertainty of a time made of arrivals, with that of an adapter which gathers bytes."""
-        return round(math.hypot(uncertainty_ns, self._gathers_ns / math.sqrt(12)))
+        """Return the standard uncertainty of a time made of arrivals, with that of an adapter which gathers bytes.
+
+        Bytes wait in it from none to all of its latency, and nothing tells how long: root mean square of the delay.
+        """
+        return round(math.hypot(uncertainty_ns, self._gathers_ns / math.sqrt(3)))
 
     def close(self) -> None:
         """Let go of the port; what is closed stays so."""
