@@ -42,7 +42,9 @@ def out(tmp_path):
 def program(*words):
     """A command in a process of its own, which is not left behind."""
     command = [sys.executable, "-m", "scanwright", *map(str, words)]
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    # Without the COLUMNS that readline puts behind the back of os.environ: lines would be wrapped.
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": dict(os.environ)}
+    with subprocess.Popen(command, cwd=ROOT, text=True, **pipes) as process:
         try:
             yield process
         finally:
