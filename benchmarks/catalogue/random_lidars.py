@@ -1,4 +1,4 @@
-"""Lidars that nobody sells: random bodies, holes and ears, laid out, and some of them built and measured.
+"""Invented lidars: random bodies, holes and ears, laid out, and some of them built and measured.
 
     python -m benchmarks.catalogue.random_lidars [--count 200] [--built 4]
 

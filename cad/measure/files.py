@@ -12,6 +12,7 @@ from scanwright.cad.measure.model import read_model, turned
 from scanwright.cad.measure.picture import picture_svg
 from scanwright.cad.measure.proposal import Proposal, propose, toml_text
 from scanwright.design.errors import TaskError
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.design.progress import Progress, no_progress
 
 
@@ -61,13 +62,16 @@ def measure_files(
         raise TaskError(f"out = {out}: a proposal is a .toml file")
     if out.exists() and "scanwright measure" not in out.read_text(encoding="utf-8"):
         raise TaskError(f"out = {out}: exists and is no proposal: choose another name")
+    check_place(out, TaskError)
     progress("reading the model")
     triangles = turned(read_model(model, unit), up, front)
     progress("measuring")
     proposal = propose(triangles, kind)
     digest = hashlib.sha256(model.read_bytes()).hexdigest()
     picture = out.with_suffix(".svg")
-    out.write_text(toml_text(proposal, model.name, digest), encoding="utf-8")
+    with atomic_write(out, TaskError) as place:
+        place.write_text(toml_text(proposal, model.name, digest), encoding="utf-8")
     progress("drawing")
-    picture.write_bytes(picture_svg(proposal, model.name))
+    with atomic_write(picture, TaskError) as place:
+        place.write_bytes(picture_svg(proposal, model.name))
     return MeasuredFiles(proposal, out, picture)

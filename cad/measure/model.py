@@ -57,7 +57,9 @@ def _step_triangles(path: Path) -> Array:
         compound = cq.Compound.makeCompound([shape for shape in shapes if isinstance(shape, cq.Shape)])
         mesh = mesh_of(compound, CHORD_ERROR, CHORD_ANGLE)
     except Exception as error:  # the kernel fails with types of its own
-        raise SceneError(f"{path}: not a readable STEP model: {type(error).__name__}") from error
+        raise SceneError(
+            f"{path}: not a readable STEP model: export it again as STEP AP214 or AP242, or as STL"
+        ) from error
     return mesh.vertices[mesh.faces]
 
 

@@ -14,7 +14,7 @@ End = Literal["bare", "USB-A", "RJ45", "XH2.54", "M12"]
 
 
 class Cable(Record):
-    """One cable of a lidar, as its maker sells it: nobody cuts or strips it."""
+    """One cable of a lidar, as its maker sells it; never cut or stripped."""
 
     carries: Literal["power", "data", "both"]
     end: End = Field(description="its end away from the lidar: a plug, or bare wires")

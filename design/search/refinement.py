@@ -129,7 +129,7 @@ def walked(ranges: AngleRanges, descent: Descent, walk: Walk, required: Requirem
     corners, values = _first_simplex(J, chart, sides)
     most = replace(walk.enough, values=walk.enough.values * len(sides) - len(values))
     lowest, value = lowest_by_simplex(J, corners, values, chart.bounds, most)
-    # a walk without luck does not tell that the next one has none
+    # a walk without gain does not exclude that the next one gains
     gain = max(float(values[0]) - value, descent.gain * LUCK if number else 0.0)
     return replace(descent, angles_deg=chart.setting(lowest), J=value, gain=gain)
 

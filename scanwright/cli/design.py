@@ -12,7 +12,7 @@ from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
 from scanwright.cli.console import ConsoleProgress, Verbosity, hint, show, show_json, show_result, verbosity
 from scanwright.cli.help import Commands
-from scanwright.design.errors import ScanwrightError, suggest
+from scanwright.design.errors import ScanwrightError, TaskError, suggest
 
 app = Commands("Design")
 
@@ -210,8 +210,10 @@ def catalogue(
     if sketch is not None:
         require_kernel("catalogue --sketch")
         from scanwright.cad.drawings.devices.sketch import sketch_svg
+        from scanwright.design.files.atomic_file import atomic_write
 
-        sketch.write_bytes(sketch_svg(listed[0]))
+        with atomic_write(sketch, TaskError) as place:
+            place.write_bytes(sketch_svg(listed[0]))
     show_result(lambda: listed[0].lines() if name else table_lines(listed), record, as_json)
     if sketch is not None:
         hint(f"wrote {sketch}")

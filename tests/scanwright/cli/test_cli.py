@@ -326,3 +326,12 @@ def test_optimise_prefers_a_simple_mount_and_says_what_that_costs(command, tmp_p
     task.write_text(task.read_text(encoding="utf-8").replace('prefer = "simple"\n', ""), encoding="utf-8")
     code, out, err = command("optimise", task)
     assert (code, out, len(err)) == (2, "", 1) and "prefer_loss = 0.02 is for prefer = 'simple'" in err[0]
+
+
+@pytest.mark.parametrize(
+    "words", [("catalogue", "UTM-30LX", "--sketch", "none/x.svg"), ("measure", "a.step", "--out", "none/x.toml")]
+)
+def test_a_file_that_cannot_be_written_is_one_line(command, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    code, _, complaints = command(*words)
+    assert (code, len([line for line in complaints if "none" in line])) == (2, 1)
