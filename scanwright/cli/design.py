@@ -13,6 +13,7 @@ from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
 from scanwright.cli.console import ConsoleProgress, Verbosity, hint, show, show_json, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
+from scanwright.design.files.atomic_file import atomic_write
 
 app = Commands("Design")
 
@@ -210,7 +211,6 @@ def catalogue(
     if sketch is not None:
         require_kernel("catalogue --sketch")
         from scanwright.cad.drawings.devices.sketch import sketch_svg
-        from scanwright.design.files.atomic_file import atomic_write
 
         with atomic_write(sketch, TaskError) as place:
             place.write_bytes(sketch_svg(listed[0]))
