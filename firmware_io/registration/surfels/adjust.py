@@ -18,7 +18,7 @@ from numpy import ndarray
 from scanwright.design import frames
 from scanwright.design.arrays import Floats, Pose
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.firmware_io.registration.surfels.beams import UNKNOWNS, Beams, sum_beams
+from scanwright.firmware_io.registration.surfels.beams import UNKNOWNS, BeamRun, Beams, sum_beams
 from scanwright.firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
 
 _ROUNDS = 8  # of finding cells and solving: an end to poses that do not settle
@@ -57,7 +57,7 @@ class Adjusted:
 
 
 def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None:
-    """The pose from a start right to a fraction of `spacing_m`; None where the flat surfaces do not hold it."""
+    """The pose from a start right to a fraction of `spacing_m`; None if the flat surfaces do not hold it."""
     cells = find_cells(
         np.concatenate([a.voxels_m, frames.apply(T_a_b, b.voxels_m)]),
         np.concatenate([a.counts, b.counts]),
@@ -72,14 +72,14 @@ def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None
         prior[6:, 6:] = np.linalg.inv(a.covariance)
     T, answer = T_a_b, None
     for _ in range(_ROUNDS):
-        if len(cells) < _MIN_CELLS:
+        if cells.number < _MIN_CELLS:
             return None
         lookup = look_up(cells)
         one, on_a, off_a = _summed(a, cells, lookup, np.eye(4), False)
         two, on_b, off_b = _summed(b, cells, lookup, T, True)
         enough = (np.minimum(on_a, on_b) > 3) & (off_a <= _FOREIGN * on_a) & (off_b <= _FOREIGN * on_b)
         cells, one, two, on_a, on_b = cells.select(enough), one[enough], two[enough], on_a[enough], on_b[enough]
-        if len(cells) < _MIN_CELLS:
+        if cells.number < _MIN_CELLS:
             return None
         solved = _solve(one, two, on_a, on_b, prior, free)
         if max(np.abs(solved.x[3:6]).max(), np.sqrt(solved.covariance[3:, 3:].trace()) / _VAGUE) > spacing_m:
@@ -107,14 +107,13 @@ class _Solved:
 def _summed(
     beams: Beams, cells: Cells, lookup: Lookup, T: Pose, moves: bool
 ) -> tuple[Floats, Int64[ndarray, " m"], Int64[ndarray, " m"]]:
-    known, cell = (lookup.edge_m, lookup.keys, lookup.first, lookup.cells), cells
-    pose, axes = np.ascontiguousarray(T), np.ascontiguousarray(cells.axes)
+    pose = np.ascontiguousarray(T)
     bounds = [len(beams.points_m) * k // _SHARES for k in range(_SHARES + 1)]
 
     def share(k: int) -> tuple[Floats, Int64[ndarray, " m"], Int64[ndarray, " m"]]:
         some = slice(bounds[k], bounds[k + 1])
-        beam = (beams.points_m[some], beams.eye_m, beams.joint_rad[some], beams.frame)
-        return sum_beams(*beam, pose, moves, *known, cell.low_m, cell.edge_m, cell.centre_m, axes, cell.reach_m)
+        run = BeamRun(beams.points_m[some], beams.eye_m, beams.joint_rad[some], beams.frame, pose, moves)
+        return sum_beams(run, cells, lookup)
 
     shares = in_chunks(lambda some: [share(k) for k in range(_SHARES)[some]], _SHARES, smallest=1)
     sums, on, off = zip(*chain.from_iterable(shares), strict=True)

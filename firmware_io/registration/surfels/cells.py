@@ -1,19 +1,19 @@
 """Flat pieces of the surfaces that two stands have in common: cubes of an octree in which all points lie on a plane.
 
-The planes found here are a start only. Which beams belong to a piece is decided by where they cross its plane
-(`firmware_io.registration.surfels.beams`), never by where their noise put the point: the cube behind a wall, which
-catches the far tail of the noise, would else count as a wall of its own.
+The planes found here are a start only. A beam belongs to a piece if it crosses the piece's plane there
+(`firmware_io.registration.surfels.beams`), whatever its noise did to the point: else the cube behind a wall, which
+catches the far tail of the noise, would count as a wall of its own.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
-from scanwright.design.arrays import Floats
+from scanwright.design.arrays import Floats, Ints
 
 _LEVELS = 4  # edges of 1, 2, 4 and 8 spacings
 _FINEST = 2.5  # times the spacing: the edge of the smallest cubes
@@ -25,9 +25,8 @@ _FEW = 10  # points of either stand
 _BITS = 21  # of a cell along each axis: three of them fit an int64
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cells:
-    """Pieces of surface in the frame of the first stand; those that come first are asked first.
+class Cells(NamedTuple):
+    """Pieces of surface in the frame of the first stand, in the order in which a beam is tested against them.
 
     Attributes:
         low_m: lowest corner of the cube, shape (n, 3).
@@ -37,13 +36,15 @@ class Cells:
         reach_m: how far off its plane a beam of a piece may end.
     """
 
-    low_m: Float64[ndarray, "n 3"]
-    edge_m: Float64[ndarray, " n"]
-    centre_m: Float64[ndarray, "n 3"]
-    axes: Float64[ndarray, "n 3 3"]
+    low_m: Floats
+    edge_m: Floats
+    centre_m: Floats
+    axes: Floats
     reach_m: float
 
-    def __len__(self) -> int:
+    @property
+    def number(self) -> int:
+        """How many."""
         return len(self.edge_m)
 
     def select(self, keep: Bool[ndarray, " n"]) -> Cells:
@@ -59,12 +60,11 @@ class Cells:
         u = u - np.einsum("ij,ij->i", u, tilted)[:, None] * tilted
         u /= np.linalg.norm(u, axis=1)[:, None]
         axes = np.stack([u, np.cross(tilted, u), tilted], axis=1)
-        return replace(self, centre_m=self.centre_m + height * normal, axes=axes, reach_m=reach_m)
+        return self._replace(centre_m=self.centre_m + height * normal, axes=axes, reach_m=reach_m)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lookup:
-    """Which pieces may a point belong to.
+class Lookup(NamedTuple):
+    """The pieces that a point may belong to, by small cubes.
 
     Attributes:
         edge_m: of the cubes that are looked up.
@@ -74,9 +74,9 @@ class Lookup:
     """
 
     edge_m: float
-    keys: Int64[ndarray, " k"]
-    first: Int64[ndarray, " k+1"]
-    cells: Int64[ndarray, " m"]
+    keys: Ints
+    first: Ints
+    cells: Ints
 
 
 def find_cells(
@@ -105,7 +105,7 @@ def find_cells(
         off = points_m - mean[cube]
         spread = _sums(cube, (off[:, :, None] * off[:, None] * counts[:, None, None]).reshape(-1, 9))
         values, vectors = np.linalg.eigh((spread / total[:, None]).reshape(-1, 3, 3))
-        axes = np.swapaxes(vectors, 1, 2)[:, ::-1]
+        axes = np.ascontiguousarray(np.swapaxes(vectors, 1, 2)[:, ::-1])
         across = np.abs(np.einsum("ij,ij->i", off, axes[cube, 2]))
         foreign = np.bincount(cube, counts * (across > reach_m))
         theirs = np.bincount(cube, counts * ~ours)
@@ -128,7 +128,7 @@ def find_cells(
 
 
 def look_up(cells: Cells) -> Lookup:
-    """Sort the pieces into small cubes: every cube within reach of a piece knows it."""
+    """Sort the pieces into small cubes: each cube lists the pieces within reach."""
     edge_m = float(cells.edge_m.min())
     keys, numbers = [], []
     for edge in np.unique(cells.edge_m):
