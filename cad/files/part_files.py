@@ -118,7 +118,7 @@ def build_parts(
         meshes=meshes_of_parts,
         t_world_rot_mm=layout.deck.t_world_rot,
         parts=tuple(reports),
-        findings=(*remarks_of(scanner, assembly), *labels.findings),
+        findings=tuple(remarks_of(scanner, assembly)),
         left_out=(*layout.left_out, *labels.left_out),
         files=tuple(sorted(files)),
     )

@@ -1,26 +1,20 @@
-"""Engraved label of a printed part: task, angles and configuration; FRONT where the lidar's front comes. Millimetres.
+"""Engraved label of a printed part: task, angles and configuration; FRONT at the lidar's front. Millimetres.
 
-The label goes where it can be read on the assembled scanner: into the largest flat face that nothing lies on or stands
-before, with room for it and a wall behind it, its lines as level as the face allows. A part with little room gets the
-configuration alone; where no face can be read, a hidden one that mates with nothing takes the label, and where there
-is none either, the part goes without. The label is the last cut: drawings, screws and moving parts know nothing of it.
-The lettering is our own (`cad/labels/glyphs.py`), so no font and no licence of one is involved.
-
-No flat named beside each part: on the best that a linkage has, the plate's underside, 13 of 16 random settings have
-room in sight, the search finds it on all 16.
+The label goes to the largest flat face with room for it and a wall behind it, preferably one that can be read on the
+assembled scanner, else one that mates with nothing there. A part with little room gets the configuration alone, and a
+part without room no label. The label is the last cut: drawings, screws and moving parts do not contain it. The
+lettering is our own (`cad/labels/glyphs.py`), so no font and no licence of one is involved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import product
 
 import cadquery as cq
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from scanwright.cad import solids
 from scanwright.cad.assembly.assembly import Assembly
@@ -29,11 +23,10 @@ from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
 from scanwright.cad.labels.engrave import Groove, engrave, groove_of
 from scanwright.cad.labels.flats import Flat, flat_at, flats_of
 from scanwright.cad.labels.lettering import Lettering, Place
-from scanwright.cad.labels.visibility import Visibility
+from scanwright.cad.labels.visibility import RoomBefore, room_before
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
-from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
@@ -42,43 +35,32 @@ MARGIN = 1.5  # of a face around its label
 HOLE_MARGIN = 3.0  # around a hole: the head of a screw may come there
 FACES = 12  # that are tried, the largest first
 LEAST_MM2 = 200.0  # of a face: the configuration alone takes more
-STEP = 2.0  # between the places that are tried on a face, and the points that an eye looks for
+READING = 200.0  # before a face: room for a head
+TOUCH = 1.0  # before a face: a nearer body lies on it
+STEP = 2.0  # between the places that are tried on a face, and the points whose room is measured
 OVERLAP = 0.01  # of the squares around these points
-PLACES = 5  # of these, the nearest to its middle, that are looked at closely
+PLACES = 5  # of these, the nearest to its middle, whose wall is measured
 LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
 FRONT_INSET = 10.0  # of its middle from the edge
-TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (-1, 0), (0, 1), (0, -1)))
+TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (0, 1)))  # lengthwise first
 
 
 @dataclass(slots=True)
 class Labelled:
-    """What came of the labels of one scanner.
+    """The labels of one scanner.
 
     Attributes:
         parts: with their labels, by name.
         meshes: of these.
-        findings: labels that cannot be read on the assembled scanner.
         left_out: labels for which there was no room.
     """
 
     parts: dict[str, cq.Solid] = field(default_factory=dict)
     meshes: dict[str, TriMesh] = field(default_factory=dict)
-    findings: list[Finding] = field(default_factory=list)
     left_out: list[LeftOut] = field(default_factory=list)
 
 
-@dataclass(frozen=True, slots=True)
-class Label:
-    """Lettering, its place, and whether it can be read on the assembled scanner."""
-
-    place: Place
-    lines: Lettering
-    seen: bool
-
-
-Views = Callable[[Flat, Array], NDArray[np.bool_]]
-Room = tuple[Flat, shapely.Polygon]
 FRONT = Lettering(("FRONT",), HEIGHTS[0])
 
 
@@ -91,19 +73,17 @@ class Ground:
         piercing: of the part.
         groove: of the lettering.
         wall: that stays behind it.
-        up: direction in the rotation frame that is up as the scanner stands.
-        front: where FRONT stands, if it does.
+        front: place of the word FRONT, if the part has it.
     """
 
     flats: Sequence[Flat]
     piercing: Piercing
     groove: Groove
     wall: float
-    up: Array
     front: Place | None
 
     def room(self, flat: Flat) -> shapely.Polygon:
-        """What of a face the middle lines of strokes may take."""
+        """The part of a face that the middle lines of strokes may take."""
         half = self.groove.width / 2
         occupied = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
         if self.front is not None and flat.face.isSame(self.front.flat.face):
@@ -114,25 +94,6 @@ class Ground:
         outline = shapely.Polygon(flat.outline.exterior)
         return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(occupied))
 
-    def turns(self, flat: Flat) -> list[Array]:
-        """Circuits to turn lettering on a face: the more upright first, of equal ones lengthwise."""
-        return sorted(TURNS, key=lambda turn: -self.upright(flat, turn))
-
-    def upright(self, flat: Flat, turn: Array) -> float:
-        """How far the heads of lettering on a face point up: 1 upright, 0 sideways or lying."""
-        return round(float(flat.frame[:, :2] @ turn[:, 1] @ self.up), 1)
-
-    def faced(self, place: Place, size: tuple[float, float]) -> Place:
-        """The same place for lettering of a size; where it is not upright, its heads to the middle of the face.
-
-        So it is read from the edge that it is near to, by somebody who looks at the scanner.
-        """
-        centre = place.put(np.array([size]) / 2)[0]
-        if self.upright(place.flat, place.turn) != 0 or float(place.turn[:, 1] @ centre) <= 0:
-            return place
-        x, y = place.put(np.array([size]))[0]
-        return Place(place.flat, float(x), float(y), -place.turn)
-
     def is_thick(self, flat: Flat, points: Array) -> bool:
         """Whether a wall stays behind grooves, at points of a face."""
         into = -flat.frame[:, 2]
@@ -142,8 +103,7 @@ class Ground:
 
 def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
     """Engrave every printed part that has room."""
-    visibility, done = Visibility(assembly), Labelled()
-    groove, up = groove_of(scanner.printer), scanner.angles.T_world_rot(0.0)[2, :3]
+    before, done, groove = room_before(assembly), Labelled(), groove_of(scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
         if part.metal:
@@ -152,20 +112,15 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
         if part.seat is not None:
             front = _front(assembly, solid, part.seat, groove)
             if front is None:
-                why = "a hole of the seat is in the way of the word; the V in the edge says it too"
+                why = "a hole of the seat is in the way of the word; the V in the edge marks the front too"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
-        flats = [flat for flat in flats_of(solid, FACES, LEAST_MM2) if not visibility.touched(flat)]
-        ground = Ground(flats, Piercing(solid), groove, scanner.printer.min_wall_mm, up, front)
-        views = partial(visibility.views, turning=part.turns)
-        label = label_on(ground, label_texts(scanner, part, config_hash), views)
+        ground = Ground(flats_of(solid, FACES, LEAST_MM2), Piercing(solid), groove, scanner.printer.min_wall_mm, front)
+        label = label_on(ground, label_texts(scanner, part, config_hash), before)
         if label is None:
             why = "none of its flat faces that mate with nothing has room for one"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
-        elif not label.seen:
-            message = f"{name}: its label is hidden on the assembled scanner: no face in sight has room for it"
-            done.findings.append(Finding("label_hidden", "note", name, message))
         words = [] if front is None else [(front, FRONT)]
-        words += [] if label is None else [(label.place, label.lines)]
+        words += [] if label is None else [label]
         if words:
             try:
                 done.parts[name], done.meshes[name] = engraved(solid, words, groove)
@@ -175,7 +130,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
 
 
 def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]:
-    """What stands on a part: the task, the angles that shape it, the configuration."""
+    """Lines of the label of a part: the task, the angles that shape it, the configuration."""
     angles = scanner.angles.angles_deg
     shaped = {
         "none": [],
@@ -185,23 +140,22 @@ def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]
     return [scanner.angles.task[: max(LONGEST)], *shaped, config_hash[:DIGITS]]
 
 
-def label_on(ground: Ground, texts: list[str], views: Views) -> Label | None:
-    """Where a label goes, and how its texts are broken into lines; None where nothing has room.
+def label_on(ground: Ground, texts: list[str], before: RoomBefore) -> tuple[Place, Lettering] | None:
+    """Place and lines of a label; None if nothing has room.
 
     Args:
         ground: the part.
-        texts: of the label; where they do not fit, the last one alone.
-        views: which points of a face an eye before it sees, a row for each position of what turns.
+        texts: of the label; if they do not fit, the last one alone.
+        before: the room before the faces.
     """
-    rooms = [(flat, ground.room(flat)) for flat in ground.flats]
-    visible_rooms = [(flat, part) for flat, room in rooms for part in _visible_parts(flat, room, views)]
-    for seen, some, longest, height in product((True, False), (texts, texts[-1:]), LONGEST, HEIGHTS):
-        lines = Lettering(tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest)), height)
-        for place in _places(ground, visible_rooms if seen else rooms, lines.size):
-            points = place.put(_grid(lines.size))
-            reads = not seen or bool(views(place.flat, points).all(axis=1).any())
-            if reads and ground.is_thick(place.flat, points):
-                return Label(place, lines, seen)
+    for least in (READING, TOUCH):
+        rooms = [(flat, _open(flat, ground.room(flat), before, least)) for flat in ground.flats]
+        for some, longest, height in product((texts, texts[-1:]), LONGEST, HEIGHTS):
+            split = tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest))
+            lines = Lettering(split, height)
+            for place in _places(rooms, lines.size):
+                if ground.is_thick(place.flat, place.put(_grid(lines.size))):
+                    return place, lines
     return None
 
 
@@ -218,7 +172,7 @@ def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: 
 
 
 def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -> Place | None:
-    """Where FRONT stands on the plates that carry the lidar: its letters' feet to the middle, its heads to the V."""
+    """Place of FRONT on the plates that carry the lidar: the feet of its letters to the middle, the heads to the V."""
     R = assembly.layout.stack.R()
     width, letter = FRONT.size
     middle = assembly.layout.linkage.half_x - FRONT_INSET
@@ -232,25 +186,23 @@ def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -
     return place if flat.outline.contains(word) else None
 
 
-def _visible_parts(flat: Flat, room: shapely.Polygon, views: Views) -> list[shapely.Polygon]:
-    """What of a room an eye sees, to squares of STEP, for each position of what turns: the largest first."""
+def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -> shapely.Polygon:
+    """The part of a room, in squares of STEP, before which no body is nearer than `least`."""
     x0, y0, x1, y1 = flat.outline.bounds
     xs, ys = np.arange(x0 + STEP / 2, x1 + STEP / 2, STEP), np.arange(y0 + STEP / 2, y1 + STEP / 2, STEP)
     points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
     points = points[shapely.contains_xy(flat.outline, points[:, 0], points[:, 1])]
-    visible = []
-    for seen in np.unique(views(flat, points), axis=0):
-        low, high = points[seen] - STEP / 2 - OVERLAP, points[seen] + STEP / 2 + OVERLAP
-        visible.append(room if seen.all() else room.intersection(shapely.union_all(shapely.box(*low.T, *high.T))))
-    return sorted(visible, key=lambda part: -round(part.area, 1))
+    points = points[before(flat, points) > least]
+    low, high = points - STEP / 2 - OVERLAP, points + STEP / 2 + OVERLAP
+    return room.intersection(shapely.union_all(shapely.box(*low.T, *high.T)))
 
 
-def _places(ground: Ground, rooms: Sequence[Room], size: tuple[float, float]) -> Iterator[Place]:
-    """Of lettering of a size: in the first room first, the more upright way first, there nearest to its middle."""
+def _places(rooms: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
+    """Of lettering of a size: in the first room first, there nearest to its middle."""
     for flat, room in rooms:
-        for turn in ground.turns(flat):
+        for turn in TURNS:
             for x, y in _corners(room, size, turn):
-                yield ground.faced(Place(flat, x, y, turn), size)
+                yield Place(flat, x, y, turn)
 
 
 def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:

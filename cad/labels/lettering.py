@@ -1,4 +1,4 @@
-"""Lines of lettering, and where they stand on a face. Millimetres."""
+"""Lines of lettering, and their place on a face. Millimetres."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Lettering:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where lettering stands on a face: its axes are the columns of `turn` (2, 2), its origin is at (x, y)."""
+    """The place of lettering on a face: its axes are the columns of `turn` (2, 2), its origin is at (x, y)."""
 
     flat: Flat
     x: float
