@@ -109,13 +109,13 @@ def sum_beams(run: BeamRun, cells: Cells, lookup: Lookup) -> tuple[Floats, Ints,
 
 
 @_part
-def _move(T: Floats, point: Floats, out: Floats) -> None:
+def _move(T: Floats, point: _Triple, out: Floats) -> None:
     for k in range(3):
         out[k] = T[k, 3] + T[k, 0] * point[0] + T[k, 1] * point[1] + T[k, 2] * point[2]
 
 
 @_part
-def _key(p: Floats, edge_m: float) -> int:
+def _key(p: Floats, edge_m: float) -> np.int64:
     """As `cube_keys`, for one point."""
     half = np.int64(1) << 20
     a, b, c = np.int64(np.floor(p[0] / edge_m)), np.int64(np.floor(p[1] / edge_m)), np.int64(np.floor(p[2] / edge_m))
