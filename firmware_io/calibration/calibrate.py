@@ -1,4 +1,4 @@
-"""`scanwright calibrate`: recordings of scenes that stand still, and an angle set, become the calibrated angle set."""
+"""`scanwright calibrate`: recordings of static scenes and an angle set become the calibrated angle set."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def calibrate_recordings(
     """Write the calibrated angle set to `out` and what was found to `report_path(out)`.
 
     Args:
-        recordings: of scenes that stand still; each may be of another place.
-        angles: of the scanner that made them; its delta and lever arm are where the search starts.
+        recordings: of static scenes; each may be of another place.
+        angles: of the scanner that made them; the search starts at its delta and lever arm.
         out: the calibrated angle set, `.json`.
         one_place: the scanner stood still from the first recording to the last.
         own_body: beams that end on the scanner itself, to be left out.
@@ -103,7 +103,7 @@ def calibrate_recordings(
 
 
 def _late(opened: Sequence[Recording]) -> str:
-    """What recordings whose mounting errors cannot be found still tell of time; "" where they do not."""
+    """The time errors of recordings whose mounting errors cannot be found; "" if those cannot be found either."""
     for recording in opened:
         with suppress(RecordingError):
             lag = find_lag(recording)

@@ -1,9 +1,9 @@
-"""Beams near edges: where two surfaces meet, nobody can tell which of them a beam met.
+"""Beams near edges: where two surfaces meet, the surface that a beam met is unknown.
 
 A tile that reaches over an edge by a little is as flat as its neighbours, and what its last beams see on the other
 side pulls at its plane, the same way however many beams there are: with more beams the noise shrinks and this pull
 does not. So beams are left out by geometry alone, which no noise moves: those for which another surface lies within
-`_APART` standard deviations of their own. Those further over the edge then stand out, and are left out by `_OUT`.
+`_APART` standard deviations of their own. Those further over the edge are then outliers, and are left out by `_OUT`.
 """
 
 from __future__ import annotations

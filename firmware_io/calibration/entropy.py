@@ -3,7 +3,7 @@
     H = -ln mean_ij exp(-|p_i - p_j|^2 / 4 s^2),    i seen by one side, j by the other
 
 No tiles, no planes, no rejection: a cloud whose two halves fall on each other is crisp, whatever its surfaces are.
-Each point weighs the area that it stands for, so that near surfaces do not drown far ones, nor those about the axis,
+The weight of a point is the area that it covers, so that near surfaces do not drown far ones, nor those about the axis,
 where beams crowd, the rest: r^2 dOmega is r^2 times the beam's change along the fan towards the axis, db, and
 dpsi (for a fan that holds the axis: times the sine of the angle to it). The kernel is at least as wide as half the
 spacing of the points: a narrower one sees their grid, and takes a mount that lays the grids of both sides on each other
@@ -37,7 +37,7 @@ _PROBE = 3.0  # how far to either side of the result to look, in limits of each 
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """What the entropy says about a calibration; lower is crisper.
+    """The entropy of a calibration; lower is crisper.
 
     Attributes:
         width_m: of the kernel.
@@ -96,14 +96,14 @@ def _spacing_m(beams: ReturnedBeams, range_m: float) -> float:
 
 
 def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:
-    """The area across each beam that it stands for, up to a common factor, shape (n,)."""
+    """The area across each beam that it covers, up to a common factor, shape (n,)."""
     forward, left = mount.plane(x)[0][2]
     climb = np.abs(left * np.cos(beams.bearing_rad) - forward * np.sin(beams.bearing_rad))
     return beams.range_m**2 * climb * (np.ones(climb.size) if stood_still(beams) else np.abs(beams.speed_rad_s))
 
 
 def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float) -> float | None:
-    """Vertex of the parabola through three entropies, None where the middle one is not the lowest."""
+    """Vertex of the parabola through three entropies, None if the middle one is not the lowest."""
     step = _PROBE * PARAMETERS[k].limit
     shift = np.zeros(x.size)
     shift[k] = step

@@ -59,7 +59,7 @@ class Estimate:
         grouping: their surfaces.
         clear: which of their beams surely met these, and were used, shape (n,).
         noise_m: standard deviation of a range, after all.
-        bulge_m: standard deviation of the walls from planes; 0 where the noise hides it.
+        bulge_m: standard deviation of the walls from planes; 0 if the noise hides it.
         drifts: how the platform seems to have moved, recording by recording.
     """
 
@@ -190,5 +190,5 @@ def _iterated(
 
 
 def _planes(grouping: Grouping) -> Floats:
-    """The plane of each tile, shape (m, 3); of the first surface where it has none."""
+    """The plane of each tile, shape (m, 3); of the first surface if it has none."""
     return grouping.q[np.maximum(grouping.surface, 0)]

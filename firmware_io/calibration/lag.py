@@ -1,6 +1,6 @@
 """How late the angles are against the scans, from one sweep there and back.
 
-In a scene that stands still, one beam at one axis angle sees one range, on the way there and on the way back. If the
+In a static scene, one beam at one axis angle sees one range, on the way there and on the way back. If the
 joint log is late by some time, both ways are shifted against each other by twice the way the axis turns in it. The
 cost of an assumed lag is the mean difference of the two range images, each difference capped: at an edge of the scene
 ranges jump, and beyond the cap a difference says nothing about time.
@@ -73,7 +73,7 @@ def find_lag(recording: Recording) -> Lag:
     """How late the angles of a recording are, by up to a second.
 
     Raises:
-        RecordingError: its axis does not turn there and back, or its scene tells less than a quarter of a second.
+        RecordingError: its axis does not turn there and back, or its scene shows less than a quarter of a second.
     """
     curve = lag_curve(recording.scans(), recording.joint_log, _LAGS_S)
     still_s = float(np.median(np.diff(recording.stamp_ns))) / 2e9 if recording.at_rest else 0.0
@@ -113,7 +113,7 @@ def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Float64[ndarray
         back = (logged_ns > turn_ns) & (logged_ns <= last_ns)
         capped_m[k], compared[k] = _differences(joint_rad, range_m.astype(float), there, back)
     if not compared.any(axis=1).all():
-        raise RecordingError("the way there and the way back see no angle in common: no lag can be told")
+        raise RecordingError("the way there and the way back see no angle in common, so the lag cannot be measured")
     cost_m = capped_m.sum(axis=1) / compared.sum(axis=1)
     sd_s = float(np.hypot(_jackknife(lag_s, capped_m, compared), (lag_s[1] - lag_s[0]) / 7))
     return LagCurve(np.asarray(lag_s, float), cost_m, _minimum(lag_s, cost_m), sd_s)
@@ -144,7 +144,7 @@ def _there_and_back(log: JointLog) -> tuple[int, int, int]:
     before, after = position[turn::-1], position[turn:]
     steps_before, steps_after = _monotone(before), _monotone(after)
     if position[turn] < _NOISE_RAD or position[turn] - after[steps_after] < _NOISE_RAD:
-        raise RecordingError("the axis does not turn there and back: without both directions no lag can be told")
+        raise RecordingError("the axis does not turn there and back: the lag can only be measured with both directions")
     return int(log.time_ns[turn - steps_before]), int(log.time_ns[turn]), int(log.time_ns[turn + steps_after])
 
 

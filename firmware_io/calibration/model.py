@@ -1,6 +1,6 @@
-"""The scanner with its errors: where a beam starts and where it points, and what each error moves.
+"""The scanner with its errors: the origin and direction of each beam, and the effect of each error.
 
-In the frame of the axis that stands still (`rot` at joint 0), a beam of joint angle j, bearing b and range r ends at
+In the fixed frame of the axis (`rot` at joint 0), a beam of joint angle j, bearing b and range r ends at
 
     p   = o + (r + bias) d,     o = Rz(psi) t,     d = Rz(psi) exp(delta) R_designed [cos b, sin b, 0]
     psi = j(t + lag) + cos1 cos j + sin1 sin j + cos2 cos 2j + sin2 sin 2j - way backlash / 2
@@ -44,7 +44,7 @@ class Parameter:
         words: for people.
         shown: factor from SI to the unit people read.
         unit: that unit.
-        limit: standard deviation [SI] above which the scene is said not to show it.
+        limit: standard deviation [SI] above which the scene is taken as not showing it.
     """
 
     name: str
@@ -84,7 +84,7 @@ class ReturnedBeams:
         joint_rad: logged joint angle at the beam's time plus the lag that was asked for, shape (n,).
         speed_rad_s: of the joint, shape (n,).
         recording: number of the beam's recording, shape (n,).
-        place: number of the place where the scanner stood, shape (n,).
+        place: number of the scanner's place, shape (n,).
         time_ns: shape (n,).
         curves: the joint's angle over time in each recording, as `assemble` takes it: the encoder's steps smoothed.
     """
@@ -130,7 +130,7 @@ def gather(
     """All beams that returned from the scene and have an angle, and how many were left out, reason by reason.
 
     Args:
-        recordings: of scenes that stand still.
+        recordings: of static scenes.
         one_place: the scanner stood still from the first recording to the last, so that all show one scene.
         own_body: beams that end on the scanner. Its parts turn with the beams that see them: to a calibration they
             are walls that agree with every error.

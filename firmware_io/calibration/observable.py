@@ -87,7 +87,7 @@ def choose_observable(
     """Decide which parameters the recordings (all their `beams`) show, with a gear of that play.
 
     Raises:
-        RecordingError: they do not show one of the mounting errors. The message says which, and why.
+        RecordingError: they do not show one of the mounting errors. The message names it and the reason.
     """
     turned_deg = np.degrees(np.ptp(beams.joint_rad))
     twice = tiles.count[seen_twice(tiles, grouping)].sum() / tiles.count.sum()
@@ -126,7 +126,7 @@ def choose_observable(
         notes.append(f"{_geometry(tiles, grouping)}; what was found rests on the other surfaces alone")
     joined = tiles.count[grouping.used].sum() / tiles.count.sum()
     if joined < _JOINED:
-        notes.append(f"only {joined:.0%} of the flat patches join surfaces: the result may be worse than it says")
+        notes.append(f"only {joined:.0%} of the flat patches join surfaces: the true error may exceed the stated one")
     return Choice(free, tuple(fixed), tuple(notes))
 
 
@@ -137,7 +137,7 @@ def spectrum(part: Reduced, free: Int64[ndarray, " free"]) -> Float64[ndarray, "
 
 
 def _sd(part: Reduced, free: Ints) -> dict[int, float]:
-    """Standard deviation of each free parameter; infinite where nothing is known."""
+    """Standard deviation of each free parameter; infinite if nothing is known."""
     return dict(zip(free.tolist(), np.sqrt(np.diag(covariance(part))).tolist(), strict=True))
 
 
@@ -149,7 +149,7 @@ def _inside(backlash_rad: float) -> str:
 
 
 def _motion(beams: ReturnedBeams, group: tuple[int, ...], backlash_rad: float) -> str:
-    """Why the motion of the axis cannot show a parameter, "" where it can."""
+    """Why the motion of the axis cannot show a parameter, "" if it can."""
     if group not in (model.LAG, model.BACKLASH):
         return ""
     directions = set(np.unique(beams.direction).tolist()) - {0.0}

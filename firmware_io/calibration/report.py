@@ -20,7 +20,7 @@ from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_a
 _WALLS = 3  # largest ones, whose straightness is reported
 _FEW = 3  # beams that a slim thing may leave where others went through
 _RESIDUAL = 1.5  # times the noise within small patches
-_LESS_CRISP = "the entropy says that the cloud has become less crisp: do not trust this calibration"
+_LESS_CRISP = "the cloud has become less crisp (higher entropy): do not trust this calibration"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ def _straightness(result: Estimate, normal: Floats, grouping: Grouping) -> tuple
 def calibration_report(
     result: Estimate, start: Float64[ndarray, " parameters"], mount: Mount, beams: ReturnedBeams, witness: Witness
 ) -> dict[str, Any]:
-    """The record that is written beside the calibrated angle set."""
+    """The record that goes with the calibrated angle set."""
     sd = np.full(COUNT, np.nan)
     sd[result.choice.free] = np.sqrt(np.diag(result.covariance))
     applied = start.copy()
@@ -151,7 +151,7 @@ def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedB
         causes = [
             "a person walked through the scene",
             "an object was moved",
-            *["the scanner was moved between recordings (one_place says that it was not)"] * joined,
+            *["the scanner was moved between recordings (one_place excludes that)"] * joined,
         ]
         warnings.append(
             f"{views.seen_through:,} of {views.compared:,} beams ended where another view, at another time, went "
@@ -160,7 +160,7 @@ def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedB
     if residual_m > _RESIDUAL * noise_m:
         warnings.append(
             f"the ranges are off by {1e3 * residual_m:.1f} mm, their noise is {1e3 * noise_m:.1f} mm: something moved, "
-            "or the scanner has an error that no parameter here stands for"
+            "or the scanner has an error that none of these parameters describes"
         )
     return warnings
 
@@ -198,7 +198,7 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     views = record["second_looks"]
     yield (
         f"double coverage   {100 * views['compared'] // max(views['asked'], 1)} % of the beams "
-        "(motion elsewhere, and people who stand still, are not detected)"
+        "(motion elsewhere, and people who do not move, are not detected)"
     )
     for note in record["notes"]:
         yield f"warning: {note}"

@@ -1,4 +1,4 @@
-"""Beams as an image: rows of scans, columns of bearings, and which beam lies beside which."""
+"""Beams as an image: rows of scans, columns of bearings, and which beams are neighbours."""
 
 from __future__ import annotations
 

@@ -221,7 +221,7 @@ def step(part: Reduced) -> tuple[Floats, Floats]:
 
 
 def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
-    """Of the free parameters, shape (k, k); infinite where the information is singular."""
+    """Of the free parameters, shape (k, k); infinite if the information is singular."""
     scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information * np.outer(scale, scale))
     with np.errstate(divide="ignore"):
@@ -244,7 +244,7 @@ def moved_by_last(part: Reduced) -> Floats:
 
 
 def bulge_m(normal: Floats, grouping: Grouping) -> float:
-    """How far spots stand off their planes, beyond what noise does: standard deviation, from the median."""
+    """How far spots are off their planes, beyond noise: standard deviation, from the median."""
     spot, _ = _per_spot(grouping, normal[:, _U, [_U, _E]])
     spot = spot[spot[:, 0] > 0]  # those seen at grazing angles only have nothing to say
     square, noise = (spot[:, 1] / spot[:, 0]) ** 2, 1 / spot[:, 0]

@@ -115,7 +115,7 @@ def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " paramet
 
 
 def normals(tiles: FlatTiles, mount: Mount, x: Float64[ndarray, " parameters"]) -> Float64[ndarray, "tiles 3"]:
-    """Normal of each tile where the axis stands still, shape (m, 3)."""
+    """Normal of each tile in the fixed frame of the axis, shape (m, 3)."""
     columns = mount.plane(x)[0]
     R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
     return _turned(tiles.normal_laser @ R.T, axis_angle(x, tiles.middle.under(x).joint_rad, tiles.middle.direction))

@@ -25,7 +25,7 @@ from scanwright.firmware_io.samples import AxisCurve, straight
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """One image and where it was taken from.
+    """One image and the pose of its camera.
 
     Attributes:
         file: of the image.
@@ -52,7 +52,7 @@ def load_views(
         folder: that the names of files start from, the task's.
         angles: angle set of the scanner.
         recording: for the servo's angle at the time of an image.
-        poses: of the platform, where the cloud is on a map.
+        poses: of the platform, if the cloud is on a map.
         lag_s: how late the joint log's stamps are.
 
     Raises:
@@ -65,7 +65,7 @@ def load_views(
     curve = straight(recording.joint_log) if recording.at_rest else axis_curve(recording.joint_log, at_rest=False)[0]
     views = []
     for shot in shots:
-        with opened(shot.file, camera):  # what is wrong with an image is said before the work, not after
+        with opened(shot.file, camera):  # a faulty image is reported before the work, not after
             pass
         T_cloud_world = np.eye(4)
         if poses is not None:

@@ -1,10 +1,10 @@
 """Colours for clouds, from images of a camera whose lens and place the task file gives.
 
 A point gets the colour of its pixel in the image whose optical axis it lies nearest to, of those in which it is seen.
-Whether it is seen the cloud itself tells: every point is a disc that reaches to its neighbours; the discs nearest to
+The cloud itself decides whether it is seen: every point is a disc that reaches to its neighbours; the discs nearest to
 the camera are drawn into a depth image, and what lies behind them stays without colour. What the scanner has not seen
 hides nothing. Discs face the camera, so those of a slanted surface cover each other: a point may lie as much deeper as
-its surface recedes over a disc, and 5 cm. A disc also covers a little of what is beside it: along the edges of near
+its surface recedes over a disc, and 5 cm. A disc also covers a little of its surroundings: along the edges of near
 things points are left without colour rather than given a wrong one.
 """
 
@@ -33,7 +33,7 @@ from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 COLOURS = ("red", "green", "blue", "alpha")
-"""Columns of a coloured cloud, bytes; alpha is 255 where there is a colour and 0 where not."""
+"""Columns of a coloured cloud, bytes; alpha is 255 if there is a colour, else 0."""
 _AT_ONCE = 1 << 18  # rows: bounds the memory
 _NOISE_M = 0.05  # of a range: points so near behind another are not hidden
 _SLANTS = (1.0, 3.0, 10.0)  # tangent of a surface's slant to the camera: at least, where it is unknown, at most
@@ -73,7 +73,7 @@ def painter(
     """
     camera, source = loaded.task.camera, open_recording(recording)
     if camera is None:
-        raise TaskError(f"{loaded.source}: camera: this task describes no camera; `scanwright schema` says how")
+        raise TaskError(f"{loaded.source}: camera: this task describes no camera; see `scanwright schema`")
     views = load_views(camera, loaded.source.parent, angles, source, poses, lag_s)
     spacing, from_m = spacing_of(source), origin_m(source, angles, poses)
     return lambda cloud: colour_cloud(cloud, camera, views, spacing, from_m, organised=organised)
@@ -89,7 +89,7 @@ def colour_cloud(
         camera: that took all images.
         views: the images.
         spacing: of beams and scan lines.
-        from_m: where the scanner stood in the cloud, shape (3,): the farther from it, the sparser the points.
+        from_m: place of the scanner in the cloud, shape (3,): the farther from it, the sparser the points.
         organised: leave the cloud so; else rows without a point go once it is coloured.
 
     Raises:
@@ -128,7 +128,7 @@ class Spacing:
 
 
 def spacing_of(recording: Recording) -> Spacing:
-    """Beams as the sensor says, lines as the axis usually turned from scan to scan."""
+    """Beams as spaced by the sensor, lines as the axis usually turned from scan to scan."""
     scan = next(islice(recording.scans(), 1))
     joint_rad = recording.joint_log.angle_at(recording.stamp_ns)
     turned = np.abs(np.diff(joint_rad[np.isfinite(joint_rad)]))

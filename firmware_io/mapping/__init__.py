@@ -1,1 +1,1 @@
-"""Clouds as maps to drive by: where the floor is, what is free above it, and the files of it."""
+"""Clouds as maps to drive by: the floor, the free space above it, and the files."""

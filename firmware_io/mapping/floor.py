@@ -65,6 +65,6 @@ def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> 
 
 
 def _inner(squares: Int64[ndarray, "n 2"]) -> int:
-    """Squares whose four neighbours are there too; each of them stands once among `squares`, shape (n, 2)."""
+    """Squares whose four neighbours are there too; each of them is once in `squares`, shape (n, 2)."""
     there = {(int(x), int(y)) for x, y in squares}
     return sum({(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)} <= there for x, y in there)

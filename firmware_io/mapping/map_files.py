@@ -82,8 +82,8 @@ def map_files(
 
     Args:
         paths: files of clouds, z up.
-        out: YAML file to write; the image goes beside it.
-        scanner: angle set that all clouds were assembled with: its optical centre is where they were seen from.
+        out: YAML file to write; the image goes into the same folder.
+        scanner: angle set that all clouds were assembled with: they were seen from its optical centre.
         poses: TUM file, a line for each cloud, by the names in its comments or in the order of the clouds; without it
             the poses in the files.
         floor_m: height of the floor in the map; None to find it.

@@ -1,4 +1,4 @@
-"""The two files that a ROS map_server reads: YAML beside a PGM."""
+"""The two files that a ROS map_server reads: YAML and PGM."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
 
 
 def image_path(path: Path) -> Path:
-    """Where the PGM of a map stands."""
+    """The origin of the PGM of a map."""
     return path.with_suffix(".pgm")
 
 
@@ -29,7 +29,9 @@ def check_map_place(path: Path) -> None:
     """
     check_place(path, RecordingError)
     if path.suffix not in (".yaml", ".yml"):
-        raise RecordingError(f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm beside it")
+        raise RecordingError(
+            f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm in the same folder"
+        )
     check_place(image_path(path), RecordingError)
 
 

@@ -1,4 +1,4 @@
-"""Points and the beams that led to them as an occupancy grid: what stands in the way, what is free, what nobody saw."""
+"""Points and the beams that led to them as an occupancy grid: occupied, free, unknown."""
 
 from __future__ import annotations
 
@@ -86,10 +86,10 @@ def occupancy_grid(
     heights: Heights,
     resolution_m: float = 0.05,
 ) -> OccupancyGrid:
-    """What stands between two heights, and where beams passed below them without meeting anything.
+    """Cells with a point between two heights, and cells that beams crossed below without meeting anything.
 
     A cell is occupied where a point lies in it between the two heights. It is free where it is not occupied and a beam
-    crossed it below the lower height: one that passes higher says nothing of what stands under it, as a table whose
+    crossed it below the lower height: one that passes higher is no evidence of free space under it, as a table whose
     top few beams meet. A beam counts up to a cell before its point, so that its noise frees nothing behind a wall. All
     other cells are unknown.
 

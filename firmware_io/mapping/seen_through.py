@@ -1,6 +1,6 @@
 """What moved: points that hang where another stand looked through.
 
-The place of each point is looked up among the directions in which the other stand saw something. Where its nearest
+The place of each point is looked up among the directions in which the other stand saw something. If its nearest
 beams all ended well behind the point, nothing stood there then, and what the point was seen on has come or gone.
 """
 
@@ -18,7 +18,7 @@ from scanwright.design.arrays import Vector
 from scanwright.design.errors import RecordingError
 
 _BEAMS = 10  # fewer lie on one side of a point, or all miss a thin thing: benchmarks/firmware_io/mapping/
-_REACH = 2.0  # times the usual angle to the tenth beam: where they are farther off, nobody looked
+_REACH = 2.0  # times the usual angle to the tenth beam: if they are farther off, it was not observed
 _SAMPLE = 2000  # beams that show the step between neighbours
 _NEIGHBOURS = 8  # of a point: a moved surface has more than its half
 _NEAR_M = 0.15  # what is farther is of another thing
@@ -31,7 +31,7 @@ class Stand:
 
     Attributes:
         points_m: shape (n, 3), finite.
-        eye_m: where the scanner stood, shape (3,); NaN if unknown.
+        eye_m: optical centre of the scanner, shape (3,); NaN if unknown.
     """
 
     points_m: Float64[ndarray, "n 3"]
@@ -41,10 +41,10 @@ class Stand:
 def seen_through(positions: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool[ndarray, " n"]]:
     """Points of each stand where another one looked through, shape (n,) each.
 
-    A point is condemned where the ten beams of another stand that pass next to it all ended more than `beyond_m`
+    A point counts as moved if the ten beams of another stand that pass next to it all ended more than `beyond_m`
     behind it: so many surround it, so that of the surface that it lies on one ends before it, however flat the surface
-    is seen. Then it goes with the majority of its neighbours within 0.15 m. A beam that came back with nothing tells
-    nothing. What stays within `beyond_m` of what stands still, such as the soles of a foot, stays.
+    is seen. Then it goes with the majority of its neighbours within 0.15 m. A beam without a return is
+    no evidence. Points within `beyond_m` of a fixed surface, such as the soles of a foot, stay.
 
     Args:
         positions: at least two with a known eye, of one frame; others are left as they are.
@@ -114,7 +114,7 @@ def _as_neighbours(points_m: Float64[ndarray, "n 3"], moved: Bool[ndarray, " n"]
 def _nearest(
     tree: cKDTree, points: Float64[ndarray, "n 3"], count: int, reach: float
 ) -> Iterator[tuple[slice, Float64[ndarray, "m k"], Int64[ndarray, "m k"]]]:
-    """Which rows, the distances of their nearest in the tree, and their indices; inf and the tree's size where none."""
+    """Which rows, the distances of their nearest in the tree, and their indices; inf and the tree's size if none."""
     for begin in range(0, len(points), _AT_ONCE):
         here = slice(begin, begin + _AT_ONCE)
         off, index = tree.query(points[here], count, distance_upper_bound=reach, workers=-1)

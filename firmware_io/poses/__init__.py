@@ -1,1 +1,1 @@
-"""Where the platform was over time: poses from files and topics, and what its gyro says between them."""
+"""Poses of the platform over time, from files and topics, with a gyro between them."""

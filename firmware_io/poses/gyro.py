@@ -1,4 +1,4 @@
-"""Orientation between two poses, as a gyro says it.
+"""Orientation between two poses, from a gyro.
 
 From each pose on the rates are integrated (the mean of two neighbouring samples turns from the one to the other). What
 that misses the next pose by is the gyro's bias, its noise and the error of the two poses; it is spread over the time
@@ -33,7 +33,7 @@ class Gyro:
     Attributes:
         time_ns: shape (n,), n >= 2, strictly increasing.
         rate_rad_s: about the axes of the IMU, shape (n, 3).
-        frame: name of those axes; "" where it is not told.
+        frame: name of those axes; "" if unknown.
         left_out: samples that are no numbers, or of the time of another.
 
     Raises:
@@ -51,12 +51,12 @@ class Gyro:
 
 
 def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 3"]) -> tuple[Trajectory, list[str]]:
-    """Put the orientations that a gyro tells between the poses.
+    """Put the orientations of a gyro between the poses.
 
     Args:
         poses: of the platform.
-        gyro: of an IMU that stands still on it.
-        R_platform_imu: how it stands there.
+        gyro: of an IMU fixed to it.
+        R_platform_imu: its orientation there.
 
     Returns:
         The same poses and what lies between them, and what a person should know of it. Between poses without gyro the
@@ -107,7 +107,7 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
 
 
 def _informative(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
-    """Whether the gyro says all the way from each pose to the next one."""
+    """Whether the gyro covers the time from each pose to the next one."""
     gap_ns = np.diff(gyro_ns)
     long = np.append(0, np.cumsum(gap_ns > _LONG_GAP * np.median(gap_ns)))
     first = np.searchsorted(gyro_ns, pose_ns[:-1], side="right") - 1
@@ -152,7 +152,7 @@ def _fits(gyro_rad: Floats, pose_rad: Floats, gap_s: Floats) -> list[str]:
 
 
 def _hint(gyro_rad: Floats, pose_rad: Floats) -> str:
-    """How the IMU would have to stand for its rates to be the poses', or in which unit they would have to be."""
+    """The orientation of the IMU, or the unit of its rates, that would make its rates those of the poses."""
     faster = _rms(gyro_rad) / max(_rms(pose_rad), 1e-12)
     if faster > 30:
         return f"; its rates are {faster:.0f} times as fast: deg/s?"

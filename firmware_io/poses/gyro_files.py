@@ -1,4 +1,4 @@
-"""The rates of a gyro, from a topic of the recording or from a CSV file, and how its IMU stands on the platform."""
+"""The rates of a gyro, from a topic of the recording or from CSV, and the orientation of its IMU on the platform."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
     frames: set[str] = set()
     for _, data in read_messages(recording, {spec}):
         message = foreign(f"{recording}: a message of {spec}", ros_messages.decode_message, data, IMU)
-        if message.angular_velocity_covariance[0] == -1:  # so a driver says that it does not measure it (REP 145)
+        if message.angular_velocity_covariance[0] == -1:  # REP 145: not measured
             raise RecordingError(f"{recording}: {spec}: this IMU measures no rate of turn")
         rate = message.angular_velocity
         rows.append((ros_messages.stamp_ns(message.header.stamp), (rate.x, rate.y, rate.z)))
@@ -62,16 +62,16 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
 def imu_mount(
     rpy_deg: tuple[float, float, float] | None, gyro: Gyro, platform: str, recording: Path
 ) -> Float64[ndarray, "3 3"]:
-    """How an IMU stands on the platform: `R_platform_imu`.
+    """The orientation of an IMU on the platform: `R_platform_imu`.
 
     Args:
         rpy_deg: its roll, pitch and yaw, fixed axes of the platform; None to take it from the frames.
         gyro: names the IMU's frame.
         platform: the frame that the poses are of.
-        recording: whose /tf_static joins the two, where they are not the same.
+        recording: whose /tf_static joins the two, if they differ.
 
     Raises:
-        RecordingError: nothing tells how it stands.
+        RecordingError: its orientation is unknown.
     """
     if rpy_deg is not None:
         if not all(map(math.isfinite, rpy_deg)):
@@ -103,7 +103,7 @@ def _sorted(what: str, rows: list[tuple[int, Any]], frame: str) -> Gyro:
 
 
 def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
-    """Parent -> child -> `R_parent_child` of the frames that stand still, and the other way round."""
+    """Parent -> child -> `R_parent_child` of fixed frames, and the other way round."""
     topics: dict[str, dict[str, Rotation]] = {}
     if read_topics(recording).get(STATIC) != ros_messages.TRANSFORMS:
         return topics
@@ -120,7 +120,7 @@ def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
 
 
 def _path(frames: dict[str, dict[str, Rotation]], begin: str, end: str) -> Rotation | None:
-    """`R_begin_end` along the frames between; None where none lead there."""
+    """`R_begin_end` along the frames between; None if none lead there."""
     reached = {begin: Rotation.identity()}
     waiting = deque([begin])
     while waiting:

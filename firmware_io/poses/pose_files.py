@@ -29,7 +29,7 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
 
     Args:
         spec: a file, `.csv` with a header or else TUM (`t x y z qx qy qz qw` in each line, s and m); or
-            TOPIC[:PARENT:CHILD] of the recording, the frames where the topic has several (/tf).
+            TOPIC[:PARENT:CHILD] of the recording, the frames if the topic has several (/tf).
         recording: where topics are.
 
     Raises:
@@ -103,7 +103,7 @@ _POSES: dict[str, Callable[[Any], Iterator[tuple[Any, str, Any, Any]]]] = {
 def _topic(
     recording: Path, topic: str, kind: str, frames: tuple[str, ...], seen: set[tuple[str, str]]
 ) -> Iterator[Row]:
-    """The poses of a pair of frames; `seen` is told every pair that the topic has."""
+    """The poses of a pair of frames; `seen` gets every pair that the topic has."""
     for _, data in read_messages(recording, {topic}):
         message = foreign(f"{recording}: a message of {topic}", ros_messages.decode_message, data, kind)
         for header, child, p, q in _POSES[kind](message):

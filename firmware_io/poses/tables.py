@@ -1,4 +1,4 @@
-"""Tables of other people's: a time in each line and numbers beside it, by the names of their columns."""
+"""Tables of other programs: a time and numbers in each line, by the names of their columns."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 
 Row = tuple[int, Sequence[float]]
-"""Time [ns], and the numbers beside it."""
+"""Time [ns], and the numbers of its line."""
 _UNITS = re.compile(r"\s*\[.*?\]\s*$")
 _EVER_NS = 2**63  # an int64 ends there, in 2262
 _TIME_DIGITS = 20  # a decimal may have a million more, and an int of it as many
@@ -25,7 +25,7 @@ def csv_rows(path: Path, columns: Mapping[str, set[str]]) -> Iterator[Row]:
     """Times and numbers of a CSV file whose first line names its columns.
 
     Args:
-        path: of the file. Its time is in seconds, or in nanoseconds where the column's name or unit says so.
+        path: of the file. Its time is in seconds, or in nanoseconds if the column's name or unit is that.
         columns: what each wanted column may be called, in the order of the numbers.
 
     Raises:
@@ -50,9 +50,9 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
     Args:
         path: for errors.
         number: of the line.
-        time: as it stands there.
+        time: as written there.
         digits: how many decimal places of the time are nanoseconds.
-        values: as they stand there.
+        values: as written there.
 
     Raises:
         RecordingError: something is no number, or no time of nanoseconds below 2^63.

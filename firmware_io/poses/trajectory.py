@@ -52,7 +52,7 @@ class Trajectory:
         time_ns: shape (n,), n >= 2, strictly increasing.
         position_m: shape (n, 3).
         quaternion: x y z w, unit length, shape (n, 4).
-        platform: name of the frame that moves; "" where the poses do not tell.
+        platform: name of the frame that moves; "" if the poses do not name it.
         measured: the poses alone, where a gyro put more orientations between them; None where these are they.
     """
 
@@ -173,7 +173,7 @@ def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]], plat
 
 
 def at_rest(T_world_rot: Pose) -> PosePieces:
-    """A platform that stands still for ever."""
+    """A platform that never moves."""
     none = np.zeros((1, 3))
     return PosePieces(
         time_ns=np.array([-_EVER_NS, _EVER_NS]),
@@ -188,7 +188,7 @@ def at_rest(T_world_rot: Pose) -> PosePieces:
 
 
 def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"], Float64[ndarray, " k"]]:
-    """Axis (z where there is none) and angle [rad] from each orientation to the next, the short way round."""
+    """Axis (z if there is none) and angle [rad] from each orientation to the next, the short way round."""
     v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
     after, last = [1, 2, 0], [2, 0, 1]
     vector = w0 * v1 - w1 * v0 - (v0[:, after] * v1[:, last] - v0[:, last] * v1[:, after])

@@ -50,8 +50,8 @@ class DepthMap:
 
     Attributes:
         side: cells along an edge of the cube.
-        near_m: shape (6 * side * side,), +inf where nothing was seen.
-        far_m: as `near_m`, -inf where nothing was seen.
+        near_m: shape (6 * side * side,), +inf if nothing was seen.
+        far_m: as `near_m`, -inf if nothing was seen.
     """
 
     side: int

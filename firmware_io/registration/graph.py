@@ -1,8 +1,8 @@
 """Poses of all stands from the pairs between them: least squares on SE(3), with the covariance of every pose.
 
-A small motion (rotation vector w, translation v) stands on the right: T + (w, v) = (R exp(w), t + R v). The stated
+A small motion (rotation vector w, translation v) acts on the right: T + (w, v) = (R exp(w), t + R v). The stated
 covariances of the pairs are those of their noise; where pairs contradict each other by more, all are scaled up by the
-same factor, and one that stands out of all others is left out.
+same factor, and an outlier is left out.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ _SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 def merge(clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"], spacing_m: float) -> Cloud:
     """The map in the world.
 
-    Its columns: `count`, how many points a row stands for, and the mean `intensity` where every cloud has one.
+    Its columns: `count`, the number of points in a row, and the mean `intensity` if every cloud has one.
 
     Args:
         clouds: at least one point in all.

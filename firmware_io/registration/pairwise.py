@@ -1,7 +1,7 @@
-"""Where one stand is as seen from another: small_gicp from a start, all beams from there, and whether to believe it.
+"""Pose of one stand relative to another: small_gicp from a start, all beams from there, and tests of the result.
 
 The last word on the pose has an adjustment of the flat surfaces in common (`firmware_io.registration.surfels`), or
-small_gicp where there are too few. Whether to believe it is not the solver's "converged", which a wrong room reaches as
+small_gicp where there are too few. The solver's "converged" is no test, which a wrong room reaches as
 well, but three facts that a person would check: how much of either cloud lies on the other, how much of it hangs where
 the other scanner looked straight through, and whether the surfaces in common hold all six degrees of freedom.
 """
@@ -42,14 +42,14 @@ _MIN_RESIST = 0.03  # share of the points; a motion that fewer resist counts as 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """The pose of stand b in the frame of stand a, and what speaks for it.
+    """The pose of stand b in the frame of stand a, with its evidence.
 
     Attributes:
         a: name of the first cloud.
         b: name of the second.
-        T_a_b: shape (4, 4), NaN where there was nothing to start from.
+        T_a_b: shape (4, 4), NaN if there was no start.
         covariance: of a small motion (rotation vector [rad], translation [m]) on the right of `T_a_b`, shape (6, 6);
-            NaN where the surfaces in common leave a motion free.
+            NaN if the common surfaces leave a motion free.
         overlap: share of the smaller view's points that lie on the other's surfaces.
         contradiction: share of the mutually visible points that hang in space the other scanner saw to be free.
         why_not: one line for every fact that speaks against the pose; empty where it is believed.

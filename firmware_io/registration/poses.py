@@ -75,7 +75,7 @@ def read_poses(path: Path, names: Sequence[str]) -> list[Pose]:
         if sorted(notes) != sorted(names):
             raise RecordingError(
                 f"{path}: its comments name {', '.join(notes)}, the clouds are {', '.join(names)}: "
-                "leave the comments out where the order is the same"
+                "leave the comments out if the order is the same"
             )
         rows = rows[[notes.index(name) for name in names]]
     with of_file(path):

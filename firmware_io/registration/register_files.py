@@ -28,7 +28,7 @@ class RegisteredFiles:
     Attributes:
         names: of the clouds.
         registration: their poses and pairs.
-        points: of the map; 0 where there is none, as a cloud found no place.
+        points: of the map; 0 if there is none, since a cloud found no place.
         wrote: all files.
         notes: what the files could not hold, or what was not read.
     """
@@ -84,7 +84,7 @@ def register_files(
     Args:
         paths: files of clouds, at least two clouds in all.
         out: the map, in any format.
-        poses: TUM file to write; `.cov.csv` goes beside it.
+        poses: TUM file to write; `.cov.csv` goes into the same folder.
         start: TUM file of start poses, by the names in its comments or in the order of the clouds; without it the poses
             in the files, if there are any, are the start.
         spacing_m: between the points that are registered.

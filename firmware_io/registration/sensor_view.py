@@ -29,7 +29,7 @@ class Level:
 
     Attributes:
         points_m: shape (n, 3).
-        normals: unit, towards the scanner, shape (n, 3); zero where the neighbours told none.
+        normals: unit, towards the scanner, shape (n, 3); zero if the neighbours give none.
         cloud: the same with the covariances of the neighbourhoods.
         tree: nearest-neighbour search in it.
     """
@@ -42,7 +42,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorView:
-    """What one stand saw, in the frame of its scanner, whose optical centre is the origin.
+    """The view of one stand, in the frame of its scanner, whose optical centre is the origin.
 
     Attributes:
         name: for messages.

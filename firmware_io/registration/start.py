@@ -1,7 +1,7 @@
-"""Where one stand is as seen from another, without a first guess: floor plans of the two are laid over each other.
+"""Pose of one stand relative to another without a first guess: their floor plans are laid over each other.
 
 Both clouds are levelled by their floors and ceilings. Every vertical surface then becomes an arrow on a grid seen from
-above, pointing to where its scanner stood: a complex number, so that turning the plan multiplies it by a phase, and
+above, pointing to its scanner: a complex number, so that turning the plan multiplies it by a phase, and
 the correlation of two plans (one FFT for all shifts) counts walls that lie on walls and face the same way. All headings
 are tried. The height comes from the floors, ceilings and table tops in the same way.
 """
@@ -28,7 +28,7 @@ _PEAKS = 30  # looked at for each heading; neighbouring cells count
 _POINTS = 20_000  # of a view: more do not change the map of cells
 _WALL = np.sin(np.radians(30))  # a normal may point up or down by this
 _FLOOR = np.cos(np.radians([30, 15, 7, 7]))  # how far a floor's normal may be off, as the guess gets better
-_MIN_FLOOR = 0.05  # share of the points; with less of it a cloud is taken as it stands
+_MIN_FLOOR = 0.05  # share of the points; with less of it a cloud is used unlevelled
 _HEIGHT_M = 0.05  # of a bin: finer than a step of a stair
 _HEIGHTS = 1200  # bins: 30 m up and down
 _STARTS = 60  # a corridor fits itself at every metre, better than it does where there is more to disagree about
@@ -48,7 +48,7 @@ class Start:
 
     Attributes:
         T_a_b: shape (4, 4).
-        score: cosine of the angle between the two plans as vectors: 1 where they are the same.
+        score: cosine of the angle between the two plans as vectors: 1 if they are equal.
     """
 
     T_a_b: Pose

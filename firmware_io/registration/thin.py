@@ -6,7 +6,7 @@ twenty nearest neighbours of a point lie on one scan line, and the lines of one 
 
 How densely the scanner looked into each direction is counted in the cells of a cube map, which also knows what a model
 of the beams does not: shadows, dropped beams, more than one turn. With the step between neighbouring beams that gives
-the gap between the lines there, and a voxel is taken no finer than that gap on the surface it stands for.
+the gap between the lines there, and a voxel is taken no finer than that gap on its surface.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def line_gaps_rad(
 
     Args:
         points_m: shape (n, 3).
-        counts: how many beams each of them stands for, shape (n,).
+        counts: beams in each of them, shape (n,).
         step_rad: angle between neighbouring beams of one line.
     """
     cells = cells_of(points_m, _SIDE)

@@ -1,1 +1,1 @@
-"""What a calibration takes for granted: a platform, and a scene, that stand still."""
+"""The assumptions of a calibration: neither the platform nor the scene moves."""

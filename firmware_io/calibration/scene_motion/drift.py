@@ -1,4 +1,4 @@
-"""Did the platform stand still? A calibration takes it for granted, and what moved leaves traces.
+"""Did the platform move? A calibration assumes that it did not, and motion leaves traces.
 
 A platform that has moved by h(t) along a surface's normal shows the surface lower by h, as a dent of that spot would,
 but growing with time and the same over all surfaces. So drift and turning at constant rates are six more parameters,
@@ -26,7 +26,7 @@ _CHANCE = 1e-6  # of a false warning in a recording at rest
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drift:
-    """How a platform seems to have moved while it was scanning, in the frame of the axis that stands still.
+    """How a platform seems to have moved while it was scanning, in the fixed frame of the axis.
 
     Attributes:
         recording: number of the recording.

@@ -92,7 +92,7 @@ def _patches(scans: Scans, aside: Floats, square: float) -> Ints:
     """Each beam, the ones before and after it, those of scans around it, shape (5, n); -1 where one is missing.
 
     Args:
-        scans: which beam lies beside which.
+        scans: which beams are neighbours.
         aside: sine of each beam's angle to the axis, shape (n,). Near that the scans crowd.
         square: how far off those scans are at least, in units of how far off the beams are.
     """

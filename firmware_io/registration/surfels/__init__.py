@@ -1,1 +1,1 @@
-"""The last word on a pair: flat pieces that both stands saw, adjusted together with the pose, beam by beam."""
+"""Final adjustment of a pair: the flat pieces that both stands saw, together with the pose, beam by beam."""

@@ -187,6 +187,6 @@ def _apart(left: Floats, alone: list[Floats], x: Floats) -> Float64[ndarray, " m
 
 
 def _rank(A: Floats) -> Int64[ndarray, " m"]:
-    """How many of a plane's three numbers are determined: one line of beams tells two."""
+    """How many of a plane's three numbers are determined: one line of beams determines two."""
     values = np.linalg.eigvalsh(A)
     return (values > _RANK * values[:, -1:]).sum(axis=1)

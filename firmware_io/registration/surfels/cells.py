@@ -90,7 +90,7 @@ def find_cells(
 
     Args:
         points_m: means of voxels of both stands in one frame, shape (n, 3).
-        counts: how many points each stands for, shape (n,).
+        counts: points in each voxel, shape (n,).
         ours: whether they are the first stand's, shape (n,).
         eyes_m: the optical centres of both, shape (2, 3).
         spacing_m: edge of the voxels.

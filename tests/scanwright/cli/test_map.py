@@ -113,7 +113,7 @@ def test_poses_move_the_map(run, shop):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("room.ply", "-o", "room.png"), "room.png: a map_server reads room.yaml, with a .pgm beside it"),
+        (("room.ply", "-o", "room.png"), "room.png: a map_server reads room.yaml, with a .pgm in the same folder"),
         (("room.ply", "-o", "no/room.yaml"), "the folder no does not exist"),
         (("room.ply", "-o", "m.yaml", "--resolution-m", "0"), "= 0.0: allowed 0.001 to 10"),
         (("room.ply", "-o", "m.yaml", "--resolution-m", "nan"), "= nan: allowed 0.001 to 10"),
