@@ -1,9 +1,9 @@
 """Pose of one stand relative to another: small_gicp from a start, all beams from there, and tests of the result.
 
-The last word on the pose has an adjustment of the flat surfaces in common (`firmware_io.registration.surfels`), or
-small_gicp where there are too few. The solver's "converged" is no test, which a wrong room reaches as
-well, but three facts that a person would check: how much of either cloud lies on the other, how much of it hangs where
-the other scanner looked straight through, and whether the surfaces in common hold all six degrees of freedom.
+The final pose comes from an adjustment of the common flat surfaces (`firmware_io.registration.surfels`), or from
+small_gicp if these are too few. The solver's "converged" is no test, since a wrong room reaches it too. The tests are
+those of a person: the share of either cloud that lies on the other, the share that hangs where the other scanner looked
+straight through, and whether the common surfaces hold all six degrees of freedom.
 """
 
 from __future__ import annotations
