@@ -33,7 +33,7 @@ from scanwright.design.files.text_files import read_toml
 
 SHIPPED = Path(__file__).parent
 LIDAR_GROUP, SERVO_GROUP = "scanwright.lidars", "scanwright.servos"
-"""Entry points of installed packages that add a family of devices; the products stand beside the module they name."""
+"""Entry points of installed packages that add a family of devices; their products are in that module's folder."""
 
 P = TypeVar("P", bound=Product)
 KINDS: dict[str, type[Product]] = {

@@ -20,7 +20,7 @@ USABLE: tuple[Kind, ...] = ("tapped", "self_tapping", "through")
 OLD_LIDAR = ("mount_screw", "mount_holes_mm", "mount_thread_depth_mm")
 OLD_SERVO = ("case_screw", "case_holes_mm", "case_holes_z_mm", "case_rear_holes_mm", "case_rear_holes_z_mm")
 """Fields of version 0.1 that stated the holes."""
-CASE_EAR_MM = 2.0  # of a servo's case between a through hole and its nut, where no source states it
+CASE_EAR_MM = 2.0  # of a servo's case between a through hole and its nut, if no source states it
 
 
 class Hole(Record):

@@ -57,7 +57,7 @@ class Product(Record):
         return [f"{self.name}: parts printed for it will not fit the real device:", *reasons] if reasons else []
 
     def facts(self) -> dict[str, Any]:
-        """Every value, and under `provenance` where it comes from, for a program to read."""
+        """Every value, and under `provenance` its source, for a program to read."""
         sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
         values = {field: to_jsonable_python(getattr(self, field)) for field in type(self).model_fields}
         return {**values, "provenance": sources}

@@ -82,8 +82,8 @@ class Printer(Product):
     screw_clearance_mm: float = Field(ge=0, le=1)
     fit_clearance_mm: float = Field(ge=0, le=1)
     min_wall_mm: float = Field(gt=0)
-    layer_mm: float | None = Field(default=None, gt=0, description="height of layers, where it lays filament")
-    line_mm: float | None = Field(default=None, gt=0, description="width of lines, where it lays filament")
+    layer_mm: float | None = Field(default=None, gt=0, description="height of layers, if it lays filament")
+    line_mm: float | None = Field(default=None, gt=0, description="width of lines, if it lays filament")
     bed_mm: Triple
     density_g_cm3: float = Field(gt=0)
     modulus_gpa: float = Field(gt=0, description="of elasticity, printed solid")

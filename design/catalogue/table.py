@@ -24,7 +24,7 @@ class Figure:
     Attributes:
         title: with its unit.
         fields: of the record, that it comes from: a doubt about one of them is a doubt about it.
-        value: of a product; None where the product has none.
+        value: of a product; None if the product has none.
     """
 
     title: str

@@ -14,9 +14,9 @@ from scanwright.design import frames
 
 @dataclass(frozen=True, slots=True)
 class ScanLines:
-    """The scan lines of one full turn: line k stands at `k * step_rad`, k = 0 .. count - 1.
+    """The scan lines of one full turn: line k is at `k * step_rad`, k = 0 .. count - 1.
 
-    `T f` is not rounded: where it is no integer the gap behind the last line is shorter than `step_rad`.
+    `T f` is not rounded: if it is no integer, the gap behind the last line is shorter than `step_rad`.
     Where the servo stops, each line is measured `repeats` times.
     """
 

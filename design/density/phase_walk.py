@@ -114,7 +114,7 @@ def windows_at(
 def even_zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, count: int, g: Array
 ) -> tuple[Array, Array, Array, Array, Ints]:
-    """Statistics over the start phase where all gaps between lines are alike: one gap stands for all.
+    """Statistics over the start phase if all gaps between lines are equal: one gap represents all.
 
     Returned are means of g and of the count, lowest and highest count, and the entries of g that each polar angle needs
     at most, (polar angles,) each. Where g has fewer, the statistics are left 0.
@@ -168,7 +168,7 @@ def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) 
 def seam_zones(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, g: Array
 ) -> tuple[Array, Array, Array, Array, Ints]:
-    """The same where the last gap is shorter than a step; `turn` is the number of steps in a turn, no whole one.
+    """The same if the last gap is shorter than a step; `turn` is the number of steps in a turn, no whole one.
 
     In each gap an edge makes one step: ahead of it in the turn where the lines come through the seam, behind it later
     in the gap by what the seam lacks of a whole step. So when the walk passes an edge the count changes on one arc of

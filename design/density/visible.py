@@ -1,4 +1,4 @@
-"""Density of a scan of which some beams are blocked at some axis angles: by what stands still beside the laser.
+"""Density of a scan of which some beams are blocked at some axis angles: by fixed parts near the laser.
 
 Such a density is not zonal, so it is summed beam by beam: beam b sees a direction at polar angle t and azimuth p while
 the joint angle lies within `delta_b(t)` of `p - p_b` (`design.density.spin`). The mean count over the start phase is

@@ -129,7 +129,13 @@ def _boxes(
     protects = tuple(f"{branch.name}: {branch.fuse_a:g} A, {branch.feeds}" for branch in branches)
     boxes = [
         Box(
-            "supply", f"supply 12 V, {supply:g} A", ("mains side: as its maker says",), (), ("+", "-", "PE"), 0, ("PE",)
+            "supply",
+            f"supply 12 V, {supply:g} A",
+            ("mains side: as its maker states",),
+            (),
+            ("+", "-", "PE"),
+            0,
+            ("PE",),
         ),
         Box("switch", "main fuse and switch", (f"F0: {fuse:g} A, S1: both in +",), ("+ in",), ("+ out",), 1),
         Box("bus", "distribution", (*protects, "- bar: the one ground of all"), ("+", "-"), bus, 2),

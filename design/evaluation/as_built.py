@@ -1,4 +1,4 @@
-"""What a scanner sees as built: without the beams that its own parts block, and with the reference mounts beside it.
+"""The view of a scanner as built: without the beams that its own parts block, compared with the reference mounts.
 
 Console, report, studio, `evaluate` and `compare` print the numbers of this record, so that all of them state the same.
 """
@@ -67,7 +67,7 @@ class ReferenceMount:
 
 @dataclass(frozen=True, slots=True)
 class AsBuilt:
-    """A scanner, and the reference mounts beside it.
+    """A scanner and the reference mounts.
 
     Attributes:
         blocked: share of all beams that its parts block; None if the parts are not known, and nothing is left out.
@@ -157,7 +157,7 @@ def seen_of(problem: Problem, angles_rad: Setting, result: Score, shadow: SelfOc
     blind = [spot.words() for spot in spots]
     behind = result.blind_weight - sum(spot.weight for spot in spots)
     if shadow is not None and shadow.partly().any() and behind > NO_BLIND_WEIGHT:
-        blind.append(f"blind behind what stands still: about {percent(behind)} of the weight")
+        blind.append(f"blind behind fixed parts: about {percent(behind)} of the weight")
     J, J_error = rounded_to_error(result.J, result.J_error)
     return Seen(
         J=J,

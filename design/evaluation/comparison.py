@@ -1,15 +1,15 @@
-"""The optimum of a task beside what else one could mount or buy.
+"""The optimum of a task compared with other mounts and products.
 
 The reference mounts (`design.search.mounts.reference`) have the lidar, the servo and the period of the task. Two more
 scanners have products, motion and angles of their own: the shipped tasks `SCANNERS`, the one of the paper and the one
 for little money. So a dollar can be weighed: beams per ball on the geometric mean, `exp(-J) - 1`, over the price,
-beside the range and the noise that it buys. Each counts for its own time.
+next to the range and the noise that it buys. Each counts for its own time.
 
 Ready-made scanners are the `multibeam` products of the catalogue, mounted upright with x ahead. Their layers are cones
 about the axis, so their density is zonal as that of a fan whose bearings are the elevations and whose plane holds the
 axis: all that is true of a fan here is true of them. Each is judged twice, for one turn and for the whole turns that
 fit into the period of the task. Turns are not alike: the speed varies by some 3 rpm, so that the sensor "fills in the
-gaps" over time (VLS-128 User Manual, section 8.3.2), nobody says how evenly. But g is convex, so whatever the turns do,
+gaps" over time (VLS-128 User Manual, section 8.3.2); how evenly is not documented. But g is convex, so for any turns,
 
     g(n mean)  <=  < g(d_1 + .. + d_n) >  <=  < g(n d_1) >,
 
@@ -63,7 +63,7 @@ class ComparisonRow:
 
     Attributes:
         name: of the candidate.
-        setting: its mounting angles, or how it stands.
+        setting: its mounting angles or orientation.
         time_s: what it measures for; all numbers but points_per_s are of this time.
         turns: of the axis in that time.
         J: the objective of the task.
@@ -115,7 +115,7 @@ def compare(
         problem: its numbers.
         best: its answer, the first family of `search`.
         mounts: the reference mounts.
-        progress: told of each step.
+        progress: called with each step.
         built: setting [rad] of a build of the task, and the beams that its parts block: the first row.
 
     Raises:

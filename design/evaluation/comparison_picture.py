@@ -20,7 +20,7 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     """Bars of -J, blind share of the weight, widest gap, cost, and what a dollar sees, one candidate below the other.
 
     Args:
-        path: PNG to write; an SVG comes beside it.
+        path: PNG to write; an SVG of the same name is written too.
         rows: of the comparison, the optimum first; a candidate with two rows gets two bars, the shorter time below.
         title: line above all.
     """

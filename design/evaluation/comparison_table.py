@@ -54,7 +54,7 @@ def table(rows: list[ComparisonRow]) -> list[str]:
 
 
 def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
-    """What the columns mean, whose J says nothing, and which numbers are unverified."""
+    """The meaning of the columns, the J without meaning, and the unverified numbers."""
     ball = loaded.task.density.ball_radius_deg
     names = {row.name for row in rows}
     blind = dict.fromkeys(row.name for row in rows if row.blind_weight == 1)

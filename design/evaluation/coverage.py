@@ -29,7 +29,7 @@ class Coverage:
     """Shares of solid angle.
 
     Attributes:
-        blind_fraction: of the unmasked sphere, where no beam comes at any start phase.
+        blind_fraction: of the unmasked sphere without a beam at any start phase.
         masked_fraction: of the whole sphere, what the robot hides.
     """
 
@@ -70,7 +70,7 @@ def mean_density_at(
 ) -> Float[ndarray, " n"]:
     """Return the mean number of beams per ball at unit vectors (n, 3), without the beams that `shadow` blocks.
 
-    It is read from a table over the polar angle if the axis turns all around and nothing that stands still blocks a
+    It is read from a table over the polar angle if the axis turns all around and no fixed part blocks a
     beam.
 
     Raises:

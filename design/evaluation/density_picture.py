@@ -29,7 +29,7 @@ ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 def density_picture(
     path: Path, problem: Problem, settings: Mapping[str, Setting], title: str, shadow: SelfOcclusion | None = None
 ) -> None:
-    """Write `density_figure` to a PNG, and to an SVG beside it."""
+    """Write `density_figure` to a PNG and an SVG of the same name."""
     save_picture(density_figure(problem, settings, title, shadow), path)
 
 
@@ -38,7 +38,7 @@ def density_figure(
 ) -> Figure:
     """Density maps one above the other on one colour scale; of two or more, the first one over the second below them.
 
-    Densities span decades, so that a gain of a half is a shade that nobody sees: the ratio shows where it is.
+    Densities span decades, so that a gain of a half is an invisible shade: the ratio shows its place.
 
     Args:
         problem: the task as numbers.
@@ -88,7 +88,7 @@ def density_figure(
 
 
 def _short(title: str) -> str:
-    """What stands before the colon of a map's title."""
+    """The part of a map's title before the colon."""
     return title.split(":")[0]
 
 

@@ -1,4 +1,4 @@
-"""Everything that is said of one setting: its figures (`facts`, for programs) and the same in words (`lines`)."""
+"""The report on one setting: its figures (`facts`, for programs) and the same in words (`lines`)."""
 
 from __future__ import annotations
 
@@ -68,17 +68,17 @@ class Evaluation:
     Attributes:
         problem: the task as numbers.
         angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        lever: what they hold for, where the optical centre was put off the axis.
+        lever: distance for which they hold, if the optical centre is off the axis.
         score: J by the closed form.
         ball: J by the paper's ball search over simulated scans.
-        holes: where the region is blind.
+        holes: blind places of the region.
         coverage: what is blind and what is masked.
         gaps: blind cones, gaps and crossings of scan lines.
         cap: the largest empty cap of a sweep; None for a spin, whose blind cones say it.
-        interlaced_s: the period whose next turn fills the gaps of this one; None where the axis does not spin.
+        interlaced_s: the period whose next turn fills the gaps of this one; None if the axis does not spin.
         rises: by how much J rises where each angle is 1 deg off.
-        hit: the chance to hit a pole, where one was asked for.
-        surfaces: points per square metre, where the task has a scene.
+        hit: the chance to hit a pole, if the task has one.
+        surfaces: points per square metre, if the task has a scene.
         planes: what a full scan leaves on ground, ceiling and walls of the task.
         as_built: the same setting with the parts of its build, if there is one; all else is without parts.
     """

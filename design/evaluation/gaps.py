@@ -45,7 +45,7 @@ class Gaps:
         blind_cones: about the axis and about its opposite, the wider one first; none where beams reach the axis.
         line_gap_deg: widest distance between neighbouring scan lines of one family, across the lines.
         seen_twice: where both families of lines come.
-        crossing_deg: mean angle at which they cross there, 0 to 90; None where nothing is seen twice.
+        crossing_deg: mean angle at which they cross there, 0 to 90; None if nothing is seen twice.
         half_turn_misses: what half a turn does not see of what a full turn sees, in the mean over its start; None for
             a sweep.
     """
@@ -116,7 +116,7 @@ def _blind_cones(u: Vector, beam_polar: Float[ndarray, " beams"]) -> tuple[Blind
 def _around(
     problem: Problem, angles_rad: Setting
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Bool[ndarray, "2 n"]]:
-    """Polar angles, their weights, and the families that come there, where the axis turns all around."""
+    """Polar angles, their weights, and the families that come there, if the axis turns all around."""
     rule, _, _ = polar_rule(problem, angles_rad, NODES)
     return rule.polar_rad, rule.fine, _families(problem.bearings_rad, angles_rad[2:], rule.polar_rad)[0]
 
@@ -152,7 +152,7 @@ def _families(
 
 
 def _in_fan(bearings_rad: Float[ndarray, " beams"], asked_rad: Float[ndarray, "2 n"]) -> Bool[ndarray, "2 n"]:
-    """Whether a beam is no farther than half of the usual step: a fan may have a hole, where the housing stands."""
+    """Whether a beam is no farther than half of the usual step: a fan may have a hole at the housing."""
     turn = 2 * np.pi
     beams_rad, asked_rad = np.sort(_within_a_turn(bearings_rad)), _within_a_turn(asked_rad)
     around_rad = np.concatenate([beams_rad[-1:] - turn, beams_rad, beams_rad[:1] + turn])

@@ -46,7 +46,7 @@ class LandscapePanel:
 
 
 def landscape_picture(path: Path, result: SearchResult, title: str) -> Path:
-    """Map of J over alpha_laser, beta_laser and over alpha_rot, beta_rot; a curve where one of a pair is fixed.
+    """Map of J over alpha_laser, beta_laser and over alpha_rot, beta_rot; a curve if one of a pair is fixed.
 
     Args:
         path: PNG to write; `.png` is added to a name without a suffix.
@@ -89,7 +89,7 @@ def landscape_picture(path: Path, result: SearchResult, title: str) -> Path:
 
 
 def draw_landscape(axis: Axes, of: LandscapePanel) -> None:
-    """J over a pair of angles: a map, or a curve where one of them is fixed."""
+    """J over a pair of angles: a map, or a curve if one of them is fixed."""
     draw = _map if np.all(np.ptp(of.rows[:, :2], axis=0) > 0) else _curve
     draw(axis, of)
 

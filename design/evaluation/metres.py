@@ -1,6 +1,6 @@
 """What one full scan comes to on the planes of a task, in metres: points, gaps, and the smallest thing hit twice.
 
-Every beam of a simulated scan is followed to the plane of a region; what is said is read off the points where they end,
+Every beam of a simulated scan is followed to the plane of a region; the figures come from the points where they end,
 and of what lies within the practical range of the lidar.
 """
 
@@ -24,7 +24,7 @@ from scanwright.design.sphere.regions import Field
 from scanwright.design.task.shapes import LITTLE, PlaneRegion, beyond_words
 from scanwright.design.task.task import LoadedTask
 
-AT_M = 3.0  # from the optical centre, where a gap is told
+AT_M = 3.0  # from the optical centre: the distance of the stated gap
 RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie
 CELLS = 64  # along each side of a region, to begin with
 MOST_CELLS = 200_000
@@ -33,8 +33,8 @@ Nearest = Callable[[Array, list[int]], tuple[Array, Ints]]
 """Distances from points (n, 3) to those points of a scan that are so many-th nearest, and which they are."""
 
 QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
-SPOT = 0.8  # of the widest gap: narrower ones off the axis are told apart from it
-SLACK = 0.02  # of a diameter: what is told is at most this much too wide, and never too narrow
+SPOT = 0.8  # of the widest gap: narrower ones off the axis are listed apart from it
+SLACK = 0.02  # of a diameter: the stated one is at most this much too wide, and never too narrow
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +44,10 @@ class PlaneFigures:
     Attributes:
         region: in words.
         range_m: the practical range of the lidar.
-        beyond_range: share of its area that lies beyond; what follows is said of the rest.
+        beyond_range: share of its area that lies beyond; all below refers to the rest.
         points: beams that end on it.
         points_per_m2: in the mean over the part of it that no mask hides.
-        at_m: distance from the optical centre of what `gap_cm` is said of: `AT_M`, or the nearest to it in the region.
+        at_m: distance from the optical centre to which `gap_cm` refers: `AT_M`, or the nearest to it in the region.
         gap_cm: diameter of the widest disc on the plane, its middle there, that no beam hits.
         gap_off_axis_cm: the same without the spots around the axis that the fan goes around.
         twice_cm: diameter of the smallest disc on the plane that is hit at least twice wherever it lies in the region.
@@ -64,7 +64,7 @@ class PlaneFigures:
     twice_cm: float
 
     def facts(self) -> dict[str, Any]:
-        """Names with units and values, for JSON; None where no beam ends there."""
+        """Names with units and values, for JSON; None if no beam ends there."""
         facts = asdict(self)
         return facts if self.points else facts | dict.fromkeys(("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm"))
 
@@ -177,7 +177,7 @@ class _Plane:
     reach_m: float
 
     def near(self) -> _Plane:
-        """The part of it in the square around what is within reach; an empty one where nothing is."""
+        """The part of it in the square around what is within reach; an empty one if nothing is."""
         sides = np.stack([self.along, self.across])
         lengths_m = np.linalg.norm(sides, axis=1)
         foot_m = -(sides @ self.corner) / lengths_m
@@ -233,5 +233,5 @@ def _grid(cells: int) -> Float[ndarray, "n 2"]:
 
 
 def rounded(value: float) -> str:
-    """Two digits, never as a power of ten where the number is large."""
+    """Two digits, never as a power of ten if the number is large."""
     return f"{value:.2g}" if value < 100 else f"{float(f'{value:.2g}'):,.0f}"

@@ -1,4 +1,4 @@
-"""Pictures as files: PNG for whoever can show nothing else, SVG beside it for print and zoom, always the same bytes."""
+"""Pictures as files: PNG for programs without SVG, SVG for print and zoom, always the same bytes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NO_DATE = {"Date": None, "Creator": None}
 
 
 def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
-    """Write a figure to a PNG, and to an SVG of the same name beside it.
+    """Write a figure to a PNG and an SVG of the same name.
 
     Raises:
         BuildError: a file cannot be written.
@@ -28,7 +28,7 @@ def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
 
 
 def svg_bytes(figure: Figure, dpi: float = DPI) -> bytes:
-    """A figure as SVG; its letters are outlines, so that no font is missing where it is shown."""
+    """A figure as SVG; its letters are outlines, so that no font is missing."""
     stream = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "scanwright"}):  # its names are random otherwise
         figure.savefig(stream, format="svg", dpi=dpi, metadata=NO_DATE)

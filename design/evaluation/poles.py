@@ -1,8 +1,8 @@
 """The chance to hit a thin upright pole: where scan lines run along it, a fast turn passes it by (paper, Fig. 3).
 
-The pole's middle stands at the height of the optical centre. Seen from there it fills the azimuths within
+The pole's middle is at the height of the optical centre. Seen from there it fills the azimuths within
 `asin(width / (2 range))` of its own and the elevations within `atan(height / (2 range))` of the horizon; beams are
-lines without a width. For one simulated scan the poles that get at least n beams stand in a union of intervals of
+lines without a width. For one simulated scan the poles that get at least n beams are in a union of intervals of
 azimuth, one for every n hits in a row, so only the start phase is drawn.
 """
 
@@ -120,7 +120,7 @@ def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChanc
 
 
 def _standing(problem: Problem, pole: Pole) -> tuple[Array, str]:
-    """How likely a pole stands at each cell of azimuth, from -pi on, shape (cells,), and what that is taken from."""
+    """Probability of a pole in each cell of azimuth, from -pi on, shape (cells,), and its source."""
     azimuth = -np.pi + 2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS
     elevation = pole.half_height_rad * ((np.arange(HEIGHTS) + 0.5) * 2 / HEIGHTS - 1)
     p, e = (grid.ravel() for grid in np.meshgrid(azimuth, elevation, indexing="ij"))

@@ -44,7 +44,7 @@ X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """J, three standard errors of it, the least count met, and the share of weight where none was.
+    """J, three standard errors of it, the least count met, and the share of weight without any.
 
     Of `worst` the error is 0: the least count that was found. It is infinite if that of some set is: it met no beam.
     `weighted` is the share of the directions drawn that have a weight.
@@ -235,11 +235,11 @@ def _at_nodes(nodes: Nodes, cubes: list[Array]) -> tuple[Array, Array, Array, Ar
 
 
 def _weighted(layers: tuple[list[Layer], list[Layer]], cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
-    """Directions drawn from every region; of each its weight, the area it stands for, what is required, and a phase."""
+    """Directions drawn from every region; of each its weight, its area, what is required, and a phase."""
     drawing = drawn_in(layers)
     drawn = [one.drawn(u) for one, u in zip(drawing, cubes, strict=True)]
     d = np.concatenate([directions for directions, _ in drawn])
-    # as often as all regions together draw it: where they overlap each of their directions stands for less
+    # as often as all regions together draw it: where they overlap, each of their directions has less area
     often = sum(len(u) * one.chance(d, area) for one, u, (_, area) in zip(drawing, cubes, drawn, strict=True))
     value, required = value_and_required(layers, d)
     phase = np.concatenate(cubes)[:, 2]

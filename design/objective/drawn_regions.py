@@ -69,7 +69,7 @@ class Layer:
         return _of_cells(self.required, d) if isinstance(self.required, np.ndarray) else np.full(len(d), self.required)
 
     def drawn(self, u: Array) -> tuple[Array, float]:
-        """Directions (n, 3) for points of the unit cube (n, 3), and its area [sr], where they are drawn evenly."""
+        """Directions (n, 3) for points of the unit cube (n, 3), and its area [sr], if they are drawn evenly."""
         region = self.region
         if isinstance(region, ConeRegion):
             half = np.radians(region.half_angle_deg)

@@ -47,7 +47,7 @@ class BlindSpot:
     weight: float
 
     def words(self) -> str:
-        """Return where it is, and how wide."""
+        """Return its place and width."""
         x, y, z = self.centre
         angle = (
             f"{self.half_angle_deg:.2f} deg"
@@ -113,7 +113,7 @@ def heading(direction: Vector) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in percent that is never written as nothing where there is something."""
+    """A share in percent that is never written as 0 if there is something."""
     if 0 < share < 1e-6:
         return "below 0.0001%"
     return f"{100 * share:.2g}%" if share < 0.1 else f"{share:.1%}"

@@ -88,7 +88,7 @@ def beams_per_ball(objective: Objective, J: float) -> float | None:
 
 
 def kl(field: Field, loaded: LoadedTask) -> Objective:
-    """Distance to the target distribution [nat], 0 where the density is spread just as the weights are.
+    """Distance to the target distribution [nat], 0 if the density is spread just as the weights are.
 
     `J = int p ln(p / q) dO` over the directions that have a weight, p = w / int w, q = (1 + d) / int (1 + d): only how
     the beams are shared out counts, not how many they are. The phase mean is taken of the logarithm, and of the
@@ -135,7 +135,7 @@ def homogeneity(field: Field, _loaded: LoadedTask | None = None) -> Objective:
     """Evenness in the region, 0 where every ball holds the same count: `J = ln(mean_w <d^2> / (mean_w <d>)^2)`.
 
     The second moment of counts in balls is the spherical Ripley function, integrated over the overlap of two balls;
-    unlike it, it knows weights, masks and the phase of the turn.
+    unlike it, it includes weights, masks and the phase of the turn.
     """
     moments = (Moment(field, np.square), Moment(field, _itself, share=0.0))
     return Objective("homogeneity", field, moments, _dispersion)

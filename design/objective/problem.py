@@ -33,7 +33,7 @@ class Problem:
     Attributes:
         bearings_rad: of the beams, shape (beams,).
         lines: of one full turn; of a sweep, as many as one period has, the widest step apart.
-        sweep: the trajectory, where the servo sweeps.
+        sweep: the trajectory, if the servo sweeps.
         scan_rate_hz: scans of the lidar in a second.
         ball_rad: ball radius.
         objective: what is minimised.

@@ -1,4 +1,4 @@
-"""Quadrature of one setting: the polar rule of its weights, broken where its density breaks too."""
+"""Quadrature of one setting: the polar rule of its weights, broken at the breaks of its density too."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def score(problem: Problem, angles_rad: Setting) -> Score:
 
 
 def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool = True) -> Score:
-    """J of a setting on a number of nodes; `J_error` and `J_lower` are NaN where they are not to be stated.
+    """J of a setting on a number of nodes; `J_error` and `J_lower` are NaN if they are not stated.
 
     `ERROR_SHARE` of `_misfit` is stated. A missing weight changes a mean by how far g is from the mean there, so g
     counts from it.
@@ -134,7 +134,7 @@ def blind_to_sweep(
 ) -> Bool[ndarray, " n"]:
     """Whether directions of the rotation frame (n, 3) lie beyond a ball radius of all that a sweep passes over.
 
-    `mean` are their mean counts within the ball of the problem, where they are known.
+    `mean` are their mean counts within the ball of the problem, if they are known.
     """
     assert problem.sweep is not None
     # between two beams the fan is continuous: no ball is smaller than half their step
@@ -291,7 +291,7 @@ def _highest(
     fine: Float[ndarray, " n"],
     blind: Bool[ndarray, " n"],
 ) -> _MomentValue:
-    """The highest g anywhere; what every third of the nodes misses in the mean tells what all of them do.
+    """The highest g anywhere; the mean error of every third node gives that of all.
 
     All thirds may meet the same count where a sliver between two nodes has one less, so that is the least error.
     """
@@ -309,7 +309,7 @@ def _highest(
 
 
 def _one_less(moment: Moment, least: int) -> float:
-    """How much g rises where a count is one less than `least`; 0 where there is none less."""
+    """How much g rises if a count is one less than `least`; 0 if there is none less."""
     if not least:
         return 0.0
     fewer, now = moment.g(np.array([least - 1.0, least]))

@@ -23,7 +23,7 @@ from scanwright.design.task.task import LoadedTask
 SURE = 4.0 / 3.0  # times the three standard errors that a count states
 NEAR = 5e-3  # a wrong field is off by far more
 SETS = 16
-FIRST = 256  # directions of each set, in all regions together: their spread tells how many are needed
+FIRST = 256  # directions of each set, in all regions together: their spread decides how many are needed
 AIM = 0.8  # of NEAR: the spread of few directions is itself uncertain
 MOST_WORK = 2.4e5  # directions of one set times what each costs: 0.3 s of processor in all
 PER_LAYER = 4.0  # what a direction costs for each region that may contain it, in beams

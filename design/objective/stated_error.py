@@ -1,4 +1,4 @@
-"""Error bounds as they are told to people: one digit, rounded up, the same wherever a number stands."""
+"""Error bounds as printed: one digit, rounded up, the same everywhere."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def rounded_to_error(value: float, error: float) -> tuple[float, float]:
 
 
 def error_words(value: float, error: float) -> str:
-    """The bound on the error of a value in one digit; it holds where the value is rounded to that digit, too."""
+    """The bound on the error of a value in one digit; it also holds if the value is rounded to that digit."""
     return f"{rounded_to_error(value, error)[1]:.0e}"

@@ -23,7 +23,7 @@ from scanwright.design.arrays import Array, Ints
 
 Nearest: TypeAlias = Callable[[Array, Array], tuple[NDArray[np.int32], Array]]
 """Origins and unit directions, both (n, 3), to the row of the triangle that each ray hits first and its range, both
-(n,); the row is -1 where there is nothing."""
+(n,); the row is -1 if there is nothing."""
 
 _BATCH = 1 << 12  # rays; each may have hundreds of candidates, and each of those takes some 300 bytes
 _SLACK = 1e-9  # of the size of the triangle or of the scene

@@ -1,4 +1,4 @@
-"""How the robot of a URDF stands; apart from its geometry, so that a task is read without scipy."""
+"""The posture of the robot of a URDF; apart from its geometry, so that a task is read without scipy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SUFFIX = ".urdf"
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """How a robot stands.
+    """The posture of a robot.
 
     Attributes:
         joint_deg: joint that turns -> its angle; 0 for the others.

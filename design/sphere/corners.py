@@ -14,7 +14,7 @@ from scanwright.design.sphere.regions import Field, cross, frames_about
 
 LOOKS_AROUND = 12  # at what lies around a point of an edge
 LOOK_RAD = 2e-7  # how far from it: what masks leave of a region may be as thin; 1e-8 would lose tiny cones to `EDGE`
-MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments stands in for them
+MANY_EDGES = 64  # above this (maps) the edges of cells are no breaks: a grid of segments replaces them
 MOST_CORNERED = 256  # edges of bands and cones whose corners are looked for: pairs of them
 
 

@@ -1,4 +1,4 @@
-"""Sets of directions that stand for the sphere, or for the part of it that a task cares about."""
+"""Sets of directions that represent the sphere, or its part that matters to a task."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def spiral(
 ) -> Float[ndarray, "{count} 3"]:
     """Fibonacci spiral: `count` directions of equal solid angle in the cap about z that ends at a height.
 
-    Each stands for a slice of the cap; `shift` is where in it, 0 to 1. Shape (count, 3).
+    Each represents a slice of the cap; `shift` is where in it, 0 to 1. Shape (count, 3).
     """
     k = np.arange(count) + shift
     return _on_sphere(1 - (1 - lowest_z) * k / count, turn_rad + 2 * np.pi * k / GOLDEN)
@@ -58,7 +58,7 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: fl
     """About `wanted` directions or more that cover the weighted region; directions of weight zero are left out.
 
     Every painted region is covered by itself, so however small one is, it gets its share. If several regions hold a
-    direction, it stands for the solid angle that the directions of all of them leave it.
+    direction, it represents the solid angle that the directions of all of them leave it.
 
     Raises:
         TaskError: no direction has a weight.
@@ -96,7 +96,7 @@ def sample_sets(field: Field, grid_step_deg: float | None, wanted: int, count: i
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:
     """The set of that number: sets share no ring of the spiral, so no two cut a region's edges alike.
 
-    Nor do they stand at the same place in the slices of a cap: what the middle of each misses of a density that is
+    Nor are they at the same place in the slices of a cap: what the middle of each misses of a density that is
     zonal about the cap would be common to all, and their spread would not tell of it.
 
     With a grid step it is the paper's grid, the same for every number.

@@ -59,7 +59,7 @@ def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _masked(x: float, y: float, z: float, rows: Array, tables: Array) -> bool:
-    """Whether any mask hides the direction: masks unite, and a table hides only where it is above 0."""
+    """Whether any mask hides the direction: masks unite, and a table hides only directions with a value above 0."""
     for i in range(rows.shape[0]):  # noqa: SIM110 - numba compiles no generator
         if _holds(x, y, z, rows[i]) and _of_cell(x, y, z, rows[i], tables) > 0.0:
             return True

@@ -14,7 +14,7 @@ from scanwright.design.sphere.directions import EMPTY, Samples, equal_angle_grid
 from scanwright.design.sphere.outline import reach_about
 from scanwright.design.sphere.regions import Field
 
-FEW_EDGES = 16  # above this (maps) directions stand for the field: circles would be slower
+FEW_EDGES = 16  # above this (maps) directions represent the field: circles would be slower
 DIRECTIONS = 20_000  # that do so
 MISSED = 0.05  # share of the weight that circles may miss or count twice
 

@@ -23,7 +23,7 @@ STRIPS = 2048  # of the solid angle's sum: an even number
 
 @dataclass(frozen=True, slots=True)
 class SeenRectangle:
-    """The frame of a rectangle and where it is in it.
+    """The frame of a rectangle and its bounds there.
 
     Attributes:
         frame: rows e1, e2, n, shape (3, 3).
@@ -75,7 +75,7 @@ def edge_normals(corners_m: Float[ndarray, "4 3"]) -> Float[ndarray, "4 3"]:
 
 
 def seen_rectangle(normals: Float[ndarray, "4 3"]) -> SeenRectangle:
-    """The rectangle between four such planes; its scale, which nobody sees, is left open."""
+    """The rectangle between four such planes; its scale, which has no effect, is left open."""
     corners = _unit(np.cross(np.roll(normals, 1, axis=0), normals))
     corners *= np.sign(corners[0] @ normals[1])  # corner 0 lies between sides 3 and 0, and inside of side 1
     e1, e2 = _unit(np.cross(normals[0], normals[2])), _unit(np.cross(normals[1], normals[3]))

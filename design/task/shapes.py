@@ -120,7 +120,7 @@ class Placed(Record):
 
     @property
     def posture(self) -> Posture:
-        """How the robot of a URDF stands."""
+        """The posture of the robot of a URDF."""
         return AS_IT_IS
 
 
@@ -137,7 +137,7 @@ class MeshRegion(Placed):
 
     @property
     def posture(self) -> Posture:
-        """How the robot of a URDF stands."""
+        """The posture of the robot of a URDF."""
         return Posture(self.joint_deg, self.joint_mm, self.frame, self.omit)
 
 

@@ -31,8 +31,8 @@ class Combination:
         number: its place in the study.
         name: of the task record, and of its build folder.
         group: the number of its task: only candidates of one task compete.
-        choice: what was chosen on each axis, empty where the task decides.
-        loaded: the task, None where it is refused.
+        choice: the value chosen on each axis, empty if the task decides.
+        loaded: the task, None if it is refused.
         refused: why these products can never do this task.
     """
 

@@ -18,7 +18,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
     """Draw the first column of the front against each other one; returns the number of rows not drawn.
 
     Args:
-        path: PNG to write; an SVG comes beside it.
+        path: PNG to write; an SVG of the same name is written too.
         table: CSV to read.
         title: above the picture.
         front: columns of the front.

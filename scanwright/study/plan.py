@@ -20,8 +20,8 @@ def plan_study(study: Path, out: Path | None, results: Path | None, progress: Pr
 
     Args:
         study: file, or name of a shipped study.
-        out: folder of tables and winners; out/STUDY if not told.
-        results: folder of results; OUT/results if not told. It may not even exist.
+        out: folder of tables and winners; by default out/STUDY.
+        results: folder of results; by default OUT/results. It may not even exist.
         progress: progress callback.
 
     Raises:

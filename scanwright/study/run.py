@@ -1,6 +1,6 @@
 """A run of a study: search, bound, make the candidates that no bound excludes, and report each one's status.
 
-The answer does not depend on who finished first. A candidate is left out where its bound is beaten by a finished one;
+The answer does not depend on who finished first. A candidate is left out if its bound is beaten by a finished one;
 what beats it is itself on the final front, or beaten by one that is. So a candidate counts as `dominated` where the
 final front beats its bound, also if it happened to be made before that was known, and every other one has been made.
 """
@@ -49,16 +49,16 @@ def run_study(
 
     Args:
         study: file, or name of a shipped study.
-        out: folder of tables and winners; out/STUDY if not told.
-        results: folder of results, shared with the workers or not; OUT/results if not told.
+        out: folder of tables and winners; by default out/STUDY.
+        results: folder of results, shared with the workers or not; by default OUT/results.
         scheduler: address of a running Dask scheduler; None for processes of this computer.
-        processes: of this computer; one for each core if not told.
+        processes: of this computer; by default one for each core.
         progress: progress callback.
 
     Raises:
         InstallError: the CAD kernel, or Dask for a scheduler, is not there.
         TaskError: the study is malformed, or the scheduler is not there.
-        BuildError: a folder cannot be written, or nobody can do the work any more.
+        BuildError: a folder cannot be written, or no worker is left.
     """
     require_kernel("study")
     crossing = Crossing(load_study(study))
@@ -120,7 +120,7 @@ class StudyRun:
     fronts: list[Front] = field(init=False)
     _bounds: Array = field(init=False)
     _failures: dict[str, str] = field(default_factory=dict)
-    _at_work: dict[str, list[int]] = field(default_factory=dict)  # address -> candidates that it stands for
+    _at_work: dict[str, list[int]] = field(default_factory=dict)  # address -> its candidates
 
     def __post_init__(self) -> None:
         columns = len(self.crossing.loaded.study.front)

@@ -44,7 +44,7 @@ class Done:
 
     Attributes:
         result: of the unit.
-        seconds: it took, None where the result was there.
+        seconds: it took, None if the result existed.
         memory_mb: the most that the worker has ever had; 0 if the system does not tell.
         stored: whether the result is in the results folder.
     """
@@ -70,7 +70,7 @@ class Crew:
 
     Attributes:
         executor: takes the units.
-        width: how many of them can be at work now; raises BuildError where nobody will come.
+        width: how many of them can be at work now; raises BuildError if none will come.
     """
 
     executor: Executor
@@ -96,7 +96,7 @@ def finished(
         tick: called in a long silence with the width of the crew.
 
     Raises:
-        BuildError: nobody can do the work any more, or somebody's results would differ.
+        BuildError: no worker is left, or the results of one would differ.
     """
     waiting = ((unit, 1) for unit in units)
     again: list[tuple[Unit, int]] = []
@@ -176,7 +176,7 @@ _lock = threading.Lock()
 def _limited(limit_s: float) -> Iterator[None]:
     """End the process if the block takes longer, by an alarm of the system.
 
-    A process that no other one has made is the client itself, or a worker that nobody would start again: none there.
+    A process without a parent is the client itself, or a worker that would not be started again: none there.
     """
     if multiprocessing.parent_process() is None:
         yield

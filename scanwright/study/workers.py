@@ -32,7 +32,7 @@ def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractCont
 
     Args:
         scheduler: address such as tcp://HOST:PORT; None for this computer.
-        processes: of this computer; as many as it has cores if not told.
+        processes: of this computer; by default one for each core.
 
     Raises:
         InstallError: Dask is not installed.
@@ -45,7 +45,7 @@ def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractCont
 class SingleProcesses(Executor):
     """Processes, each in a separate pool, so that one that dies does not stop the others.
 
-    In one pool the death of a worker ends all the others, and nobody can tell whose unit it was that killed it.
+    In one pool the death of a worker ends all the others, and the unit that killed it is unknown.
     """
 
     def __init__(self, processes: int) -> None:
@@ -85,7 +85,7 @@ def _at_scheduler(address: str) -> Iterator[Crew]:
 
     if not ADDRESS.fullmatch(address):
         raise TaskError(f"scheduler = '{address}': must be tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
-    for name in ("distributed", "distributed.client"):  # deaths are told in the table, or in one line
+    for name in ("distributed", "distributed.client"):  # deaths are in the table, or in one line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
