@@ -82,7 +82,7 @@ def test_the_record_is_of_the_scanner_with_its_parts_and_of_mounts_without(motio
     assert again == found
     assert all(line.startswith("with parts") for line in found.lines())
     assert all(line.startswith("without parts") for line in bare.lines())
-    assert any("blind behind what stands still" in line for line in found.lines())
+    assert any("blind behind fixed parts" in line for line in found.lines())
 
 
 def test_points_on_a_plane_are_those_that_no_part_blocks():
