@@ -107,7 +107,7 @@ ENTRIES = (
     Entry(
         "mine",
         "A mine: all around a cart",
-        "--lidar UTM-30LX --servo MX-64R --height-m 1.2 --see around:60:-45 --scan-s 10",
+        "--lidar UTM-30LX --servo MX-64R --height-m 1.2 --see around:60:45 --scan-s 10",
         worlds.gallery_of_a_mine,
         1.2,
         lambda p: (p[:, 1] > -1.0) & (abs(p[:, 0]) < 11),
@@ -120,7 +120,7 @@ ENTRIES = (
     Entry(
         "forest_plot",
         "A forest plot: stems around a tripod",
-        "--lidar UST-20LX --servo XM430-W350 --height-m 1.4 --see around:75:-40 --scan-s 30",
+        "--lidar UST-20LX --servo XM430-W350 --height-m 1.4 --see around:75:40 --scan-s 30",
         worlds.forest,
         1.4,
         lambda p: p[:, 2] < 9,

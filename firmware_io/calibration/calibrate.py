@@ -28,13 +28,13 @@ from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """What was found.
+    """A result.
 
     Attributes:
         angles: the calibrated angle set.
-        record: errors with their sigmas, residuals before and after, as in the report beside the angle set.
-        out: file of the angle set.
-        frames: what it means to a robot's frames, one sentence each.
+        record: errors with their sigmas, residuals before and after, as in the report file.
+        out: file of the angle set, written if the result is not `faulty`.
+        frames: the effect on a robot's frames, one sentence each.
     """
 
     angles: AngleSet
@@ -42,10 +42,19 @@ class Calibration:
     out: Path
     frames: tuple[str, ...] = ()
 
+    @property
+    def faulty(self) -> bool:
+        """Whether the platform moved, or the cloud became worse."""
+        return bool(self.record["faults"])
+
     def lines(self, in_full: bool = False) -> list[str]:
         """Return the same as lines; the commands that publish the frames only `in_full`."""
+        if self.faulty:
+            wrote = [f"did not write {self.out}, as the result is wrong; wrote {report_path(self.out)}"]
+        else:
+            wrote = [f"wrote {self.out} and {report_path(self.out).name}"]
         frames = self.frames if in_full else [line for line in self.frames if not line.startswith((" ", "as "))]
-        return [*lines(self.record), f"wrote {self.out} and {report_path(self.out).name}", *frames]
+        return [*lines(self.record), *wrote, *frames]
 
 
 def calibrate_recordings(
@@ -57,7 +66,7 @@ def calibrate_recordings(
     own_body: OwnBody | None = None,
     progress: Progress = no_progress,
 ) -> Calibration:
-    """Write the calibrated angle set to `out` and what was found to `report_path(out)`.
+    """Write the calibrated angle set to `out`, unless the result is faulty, and the record to `report_path(out)`.
 
     Args:
         recordings: of static scenes; each may be of another place.
@@ -96,9 +105,11 @@ def calibrate_recordings(
         **calibration_report(result, start, mount, beams, seen),
     }
     calibration = Calibration(calibrated(angles, result), record, out)
-    with atomic_write(out, RecordingError) as part, atomic_write(report_path(out), RecordingError) as report_part:
-        part.write_text(calibration.angles.to_json(), encoding="utf-8")
-        report_part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    with atomic_write(report_path(out), RecordingError) as part:
+        part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        if not calibration.faulty:
+            with atomic_write(out, RecordingError) as angles_part:
+                angles_part.write_text(calibration.angles.to_json(), encoding="utf-8")
     return calibration
 
 
@@ -107,6 +118,8 @@ def _late(opened: Sequence[Recording]) -> str:
     for recording in opened:
         with suppress(RecordingError):
             lag = find_lag(recording)
+            if abs(lag.late_s) < 2 * lag.sd_s:
+                return f". Its angles are late by 0 within the error of {lag.sd_s:.3f} s"
             return (
                 f". There and back, {recording.path.name} agrees best with angles {lag.late_s:.3f} +- {lag.sd_s:.3f} s "
                 f"late, in which 0.1 deg of backlash would be {math.radians(0.05) / lag.speed_rad_s:.3f} s"

@@ -32,6 +32,7 @@ _SAMPLE = 15_000  # points of each side
 _REACH = 4.0  # widths: pairs farther apart add nothing
 _SPACINGS = 0.5  # of the points, in a kernel: of their grid exp(-10) is left
 _SURE = 3.0  # sampling errors: less is no change
+_LEAST = 0.01  # nats: walls thicker by 1 %, which no one can see
 _PROBE = 3.0  # how far to either side of the result to look, in limits of each parameter
 
 
@@ -56,8 +57,8 @@ class Witness:
 
     @property
     def less_crisp(self) -> bool:
-        """Whether the cloud has become less crisp beyond what another sample of its points might say."""
-        return self.after - self.before > _SURE * self.change_sd
+        """Whether the cloud has become visibly less crisp, and by more than another sample of its points would."""
+        return self.after - self.before > max(_LEAST, _SURE * self.change_sd)
 
 
 def witness(

@@ -93,9 +93,10 @@ def choose_observable(
     twice = tiles.count[seen_twice(tiles, grouping)].sum() / tiles.count.sum()
     if twice < _TWICE:
         raise RecordingError(
-            f"nothing is seen twice: {twice:.1%} of the flat surface is seen by both sides of the fan (needed: "
-            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg, and without a second look mounting errors cannot "
-            "be told from the shape of the scene: turn it a full turn"
+            f"too little is seen twice: {twice:.1%} of the flat surface is seen by both sides of the fan (needed: "
+            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg. Mounting errors then look like a scene of another "
+            "shape: record a full turn. A scanner that can only tilt shows them only where both ends of its fan see "
+            f"the same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches"
         )
     free = np.array(MOUNT)
     sd = _sd(reduced(normal, grouping, free, BUILDERS_BULGE_M), free)

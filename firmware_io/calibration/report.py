@@ -20,7 +20,8 @@ from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_a
 _WALLS = 3  # largest ones, whose straightness is reported
 _FEW = 3  # beams that a slim thing may leave where others went through
 _RESIDUAL = 1.5  # times the noise within small patches
-_LESS_CRISP = "the cloud has become less crisp (higher entropy): do not trust this calibration"
+_LESS_CRISP = "the cloud has become less crisp (higher entropy)"
+_SURE = 2.0  # standard deviations, from which on a delay is a result
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ def _straightness(result: Estimate, normal: Floats, grouping: Grouping) -> tuple
 def calibration_report(
     result: Estimate, start: Float64[ndarray, " parameters"], mount: Mount, beams: ReturnedBeams, witness: Witness
 ) -> dict[str, Any]:
-    """The record that goes with the calibrated angle set."""
+    """The record that goes with the calibrated angle set; it has `faults` if the result is wrong."""
     sd = np.full(COUNT, np.nan)
     sd[result.choice.free] = np.sqrt(np.diag(result.covariance))
     applied = start.copy()
@@ -101,8 +102,8 @@ def calibration_report(
         "notes": [
             *result.choice.notes,
             *_motion_warnings(result, views, beams, fit["after"].residual_m),
-            *([_LESS_CRISP] if witness.less_crisp else []),
         ],
+        "faults": [*_moved(result), *([_LESS_CRISP] if witness.less_crisp else [])],
         "drift": [
             {
                 "recording": drift.recording,
@@ -136,16 +137,19 @@ def calibration_report(
     }
 
 
-def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedBeams, residual_m: float) -> list[str]:
-    """What a person should know of it, one line each."""
-    warnings, noise_m = [], result.tiles.noise_m
+def _moved(result: Estimate) -> Iterator[str]:
     for drift in result.drifts:
         if drift.sure:
             mm_s, deg_s = 1e3 * np.linalg.norm(drift.velocity_m_s), np.degrees(np.linalg.norm(drift.turn_rad_s))
-            warnings.append(
+            yield (
                 f"the platform moved during recording {drift.recording + 1}, by about {mm_s:.2g} mm/s and "
-                f"{deg_s:.2g} deg/s: do not trust this calibration; scan again with the scanner held still"
+                f"{deg_s:.2g} deg/s: scan again with the scanner held still"
             )
+
+
+def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedBeams, residual_m: float) -> list[str]:
+    """One line each."""
+    warnings, noise_m = [], result.tiles.noise_m
     if views.seen_through > _FEW:
         joined = len(beams.curves) > 1 and not beams.place.any()
         causes = [
@@ -202,6 +206,8 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     )
     for note in record["notes"]:
         yield f"warning: {note}"
-    by_name = {one["name"]: one for one in record["parameters"]}
-    if "lag_s" in by_name:
-        yield f"the angles are late: assemble with lag_s = {by_name['lag_s']['value'] / 1e3:.6f}"
+    for fault in record["faults"]:
+        yield f"error: {fault}"
+    for one in record["parameters"]:
+        if one["name"] == "lag_s" and abs(one["value"]) > _SURE * one["sd"]:
+            yield f"the angles are late: `{one['applied_by']} {one['value'] / 1e3:.6f}` corrects it"

@@ -175,6 +175,8 @@ def calibrate(
 ) -> Calibration:
     """Estimate a scanner's mounting errors from recordings of static scenes with walls; no targets needed.
 
+    If the platform moved or the cloud became worse, only the report is written, and the result is `faulty`.
+
     If own_body.npz is next to the file of the angle set, beams that end on the scanner itself are dropped. If
     scanner.urdf is there, scanner.calibrated.urdf is written next to `out`.
 
@@ -209,6 +211,8 @@ def calibrate(
         robot_frames.with_frames(robot_frames.read_urdf(designed), before, str(designed))  # refused before the work
     paths = [Path(recording) for recording in recordings]
     result = calibrate_recordings(paths, before, target, one_place=one_place, own_body=own_body, progress=progress)
+    if result.faulty:
+        return result
     if designed:
         robot_frames.write_calibrated_urdf(designed, urdf, result.angles)
     fixed = robot_frames.fixed_frames(result.angles)

@@ -98,7 +98,10 @@ def assemble(
     show_result(summary.lines, summary, as_json)
 
 
-@app.command(example="calibrate rec.mcap --angles out/t/angles.json -o out/t/angles.calibrated.json")
+@app.command(
+    example="calibrate rec.mcap --angles out/t/angles.json -o out/t/angles.calibrated.json",
+    no="the platform moved, or the cloud became worse",
+)
 def calibrate(
     recordings: Annotated[list[Path], Argument(metavar="RECORDING", help="Recordings of static scenes.")],
     angles: Angles,
@@ -116,6 +119,7 @@ def calibrate(
 
     result = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
     show_result(lambda: result.lines(verbosity() is Verbosity.VERBOSE), result.record, as_json)
+    raise typer.Exit(1 if result.faulty else 0)
 
 
 @app.command(example="register a.ply b.ply -o merged.ply", no="a cloud could not be aligned")

@@ -276,6 +276,7 @@ class Calibrated:
         singular_values: of the normalised problem; a small one marks errors that are hard to tell apart.
         held: parameters that were not estimated: names, words and why.
         notes: warnings.
+        faults: reasons why the result is wrong; the angle set is then not written.
         drift: for each recording: motion of the platform, with chi2 of 6 degrees of freedom.
         second_looks: double coverage: beams asked for, compared, and in conflict (`seen_through`).
         range_noise_mm: noise of a range.
@@ -297,6 +298,7 @@ class Calibrated:
     singular_values: list[float]
     held: list[dict[str, Any]]
     notes: list[str]
+    faults: list[str]
     drift: list[dict[str, Any]]
     second_looks: dict[str, int]
     range_noise_mm: float

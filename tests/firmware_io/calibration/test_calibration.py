@@ -150,7 +150,7 @@ LOW = {"beams": 180, "position_m": (0.2, 0.1, 1.2)}
     ("setup", "room", "says"),
     [
         (Setup(beams=180, laser_deg=(0.5, 0.0)), FURNISHED, r"flat fan: the scan plane is 0\.50 deg from"),
-        (HALF, FURNISHED, r"nothing is seen twice: .* turned 180 deg"),
+        (HALF, FURNISHED, r"too little is seen twice: .* turned 180 deg"),
         (Setup(**LOW), EMPTY_HALL, r"does not show .*offset along x .*: empty hall: .*\(0\.00, 0\.00, 1\.00\)"),
         (Setup(**LOW), Room(EMPTY_HALL.walls, range_max_m=1.0), "none of the"),
     ],
@@ -192,7 +192,7 @@ def test_what_the_scanner_sees_of_itself_does_not_count(tmp_path, command):
     (tmp_path / "own_body.npz").unlink()
     code, _, complaints = command(*words)  # now the plate passes for most of the room
     assert code == 2
-    assert "nothing is seen twice" in complaints[0]
+    assert "too little is seen twice" in complaints[0]
 
 
 def test_recordings_of_two_places_are_two_scenes(room, tmp_path):
@@ -229,10 +229,8 @@ def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, 
     angles = "design/angle_sets/tilting_urg.json"
     code, _, complaints = command("calibrate", tmp_path / "r.mcap", "--angles", angles, "-o", tmp_path / "a.json")
     assert (code, len(complaints)) == (2, 1)
-    assert "nothing is seen twice" in complaints[0]
+    assert "too little is seen twice" in complaints[0]
     assert "turned 60 deg" in complaints[0]
-    late_s, sd_s, play_s = map(float, re.findall(r"-?\d\.\d{3}", complaints[0]))
-    assert abs(late_s) < 0.1
+    (sd_s,) = map(float, re.findall(r"late by 0 within the error of (\d\.\d{3}) s", complaints[0]))
     assert 0.05 < sd_s < 0.08  # of the tenth of a second between two scans, half
-    assert play_s == pytest.approx(0.05 / (2 * 60 / 161.2), abs=2e-3)
     assert not (tmp_path / "a.json").exists()

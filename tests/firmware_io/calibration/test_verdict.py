@@ -1,4 +1,4 @@
-"""What a calibration says of itself: crispness that weighs areas, platforms that moved, people that walked."""
+"""The verdict of a calibration on itself: crispness that weighs areas, platforms that moved, people that walked."""
 
 from dataclasses import replace
 
@@ -46,7 +46,8 @@ def crept(tmp_path_factory):
 
 def test_a_pitching_scanner_that_is_right_is_not_warned_of(tmp_path):
     record = calibrated(tmp_path, Unrest())
-    assert record["notes"] == []
+    assert record["notes"] == record["faults"] == []
+    assert (tmp_path / "a.json").is_file()
     assert record["drift"][0]["chi2_of_6"] < chi2.isf(1e-4, 6)
     assert record["second_looks"]["seen_through"] == 0
     entropy = record["entropy"]
@@ -54,8 +55,8 @@ def test_a_pitching_scanner_that_is_right_is_not_warned_of(tmp_path):
 
 
 def moved(record):
-    (said,) = [note for note in record["notes"] if "platform moved during recording 1" in note]
-    return f"warning: {said}" in list(lines(record))
+    (fault,) = record["faults"]
+    return "platform moved during recording 1" in fault and f"error: {fault}" in list(lines(record))
 
 
 def test_a_platform_that_creeps_is_named_with_its_speed(crept):
@@ -64,14 +65,15 @@ def test_a_platform_that_creeps_is_named_with_its_speed(crept):
     assert crept["drift"][0]["velocity_mm_s"] == pytest.approx([1, 0, 0], abs=0.15)
 
 
-def test_a_platform_that_drives_is_named(tmp_path):
+def test_a_platform_that_drives_is_named_and_no_angle_set_is_written(tmp_path):
     assert moved(calibrated(tmp_path, Unrest(velocity_m_s=(0.05, 0.0, 0.0))))
+    assert [path.name for path in tmp_path.glob("a.*")] == ["a.report.json"]
 
 
 def test_people_that_walk_are_named(tmp_path):
     record = calibrated(tmp_path, Unrest(walkers=2))
     assert any("a person walked" in note for note in record["notes"])
-    assert not any("platform" in note for note in record["notes"])
+    assert record["faults"] == []
 
 
 def looked(beams):
@@ -178,6 +180,7 @@ def test_a_wrong_answer_is_less_crisp(beams):
     seen = witness(mount, beams, fan_side(beams, mount), TRUE, start, 0.01)
     assert seen.less_crisp
     assert not witness(mount, beams, fan_side(beams, mount), start, TRUE, 0.01).less_crisp
+    assert not replace(seen, before=5.0, after=5.001, change_sd=1e-5).less_crisp  # sure, but nobody can see it
 
 
 def test_grids_that_fall_on_each_other_are_no_crispness(tmp_path):
