@@ -27,7 +27,7 @@ HEADER = "kind,part,number,quantity,total_usd,low_usd,high_usd,mass_g,note\n"
 
 
 def ground_task():
-    keys = {"name": "t", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "UH1256-02-0610-06S"}
+    keys = {"name": "t", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "SNU11-P0210"}
     return load_task(keys | {"motion": {"period_s": 18.0}, "weight": [GROUND]})
 
 
