@@ -66,9 +66,10 @@ def bell_spec(place: Placement) -> PartSpec | None:
     leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
     words = (
         f"With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, {leads}and lower the cage "
-        f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once around "
-        "so that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the epoxy set "
-        "before anything hangs on the shaft: it fills what the print leaves, and the bearing is where the shaft runs."
+        f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once "
+        "around, so that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the "
+        "epoxy set before anything hangs on the shaft: it fills what the print leaves, and the bearing is where the "
+        "shaft runs."
     )
     return PartSpec(
         name=BEARING_CAGE,

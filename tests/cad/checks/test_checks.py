@@ -18,7 +18,6 @@ from scanwright.cad.checks.clearance import together_check, turning_check
 from scanwright.cad.checks.limits import at_least, at_most
 from scanwright.cad.checks.loads.mechanics import mechanics_checks
 from scanwright.cad.checks.printing import islands_check, islands_of, printing_checks, thin_walls
-from scanwright.cad.checks.products import known_errors
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
@@ -55,19 +54,6 @@ def turned(mesh, angle):
 def least_room(rotor, stator):
     """Of a turning and a standing body, over a whole turn."""
     return turning_check({"rotor": rotor, "stator": stator}, {"rotor"}).value
-
-
-def test_a_product_that_parts_do_not_fit_is_a_warning_for_each_wrong_value_and_no_other_is():
-    catalogue = load_catalogue()
-    checks = known_errors(
-        [catalogue.named(name) for name in ("SNU11-P0210", "UTM-30LX", "MX-64R", "RPLIDAR A1", "RPLIDAR C1")]
-    )
-    assert Counter((check.subject, check.severity) for check in checks) == {
-        ("RPLIDAR A1", "warning"): 1,
-        ("RPLIDAR C1", "note"): 1,
-    }
-    assert checks[0].message.endswith("the printed parts will not fit")
-    assert "is wrong: the device has x from -61.5 to 35.8" in checks[0].message
 
 
 def test_the_distance_over_a_turn_of_bodies_known_by_arithmetic():

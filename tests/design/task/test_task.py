@@ -482,12 +482,6 @@ def test_a_map_has_theta_down_and_phi_to_the_right_and_its_values_in_the_cells(t
                     assert field.weight_at(direction(t, p)) == pytest.approx(expected, rel=1e-6), (t, p)
 
 
-def test_a_task_names_the_products_that_printed_parts_do_not_fit_and_no_shipped_one_has_any(tmp_path):
-    assert not any(load_task(task).misfits() for task in shipped_tasks())
-    head, _ = load_text(tmp_path, BASE.replace("UTM-30LX", "RPLIDAR A1")).misfits()
-    assert head == "RPLIDAR A1: parts printed for it will not fit the real device:"
-
-
 def test_a_spinning_servo_that_cannot_read_all_around_is_told(tmp_path):
     assert load_text(tmp_path, BASE).warnings() == []
     (warning,) = load_text(tmp_path, BASE.replace('"MX-64R"', '"AX-12A"')).warnings()
