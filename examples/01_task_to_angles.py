@@ -10,7 +10,7 @@ TASK = {
     "name": "floor_around",
     "sensor": "UST-10LX",
     "servo": "MX-64R",
-    "slip_ring": "UH1256-02-0610-06S",
+    "slip_ring": "SNU11-P0210",
     "motion": {"mode": "spin", "period_s": 4.0},
     "angles": {"alpha_rot_deg": 0, "beta_rot_deg": 0, "step_deg": 10},  # the other two are searched
     "weight": [{"shape": "band", "theta_deg": [95, 150]}],  # theta: 0 is up, 90 the horizon, 180 down

@@ -14,7 +14,7 @@ TASK = {
     "name": "twins",
     "sensor": "UTM-30LX",
     "servo": "MX-64R",
-    "slip_ring": "UH1256-02-0610-06S",
+    "slip_ring": "SNU11-P0210",
     "motion": {"mode": "spin", "period_s": 2.0},
     "angles": {"alpha_rot_deg": 0, "beta_rot_deg": 0, "alpha_laser_deg": -50, "beta_laser_deg": 35},
     "weight": [{"shape": "all"}],

@@ -13,7 +13,7 @@ TASK = {
     "name": "by_hand",
     "sensor": "UTM-30LX",
     "servo": "MX-64R",
-    "slip_ring": "UH1256-02-0610-06S",
+    "slip_ring": "SNU11-P0210",
     "motion": {"mode": "spin", "period_s": 1.0},
     "angles": {f"{name}_deg": value for name, value in ANGLES_DEG.items()},
     "weight": [{"shape": "all"}],

@@ -37,7 +37,7 @@ TASK = """
 name = "own_lidar"
 sensor = "MY-LIDAR"
 servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 catalogue = ["my_lidar.toml"]
 [motion]
 period_s = 10.0

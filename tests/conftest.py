@@ -83,7 +83,7 @@ SMALL = """
 name = "small"
 sensor = "UTM-30LX"
 servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 [motion]
 period_s = 2.0
 [angles]
@@ -262,7 +262,7 @@ TILTED = """
 name = "tilted"
 sensor = "UTM-30LX"
 servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 printer = "fdm-0.4"
 [motion]
 period_s = 18.0

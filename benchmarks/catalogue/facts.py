@@ -4,8 +4,7 @@
 
 The table has the columns file, field, found_value, source and certainty. Rows whose value is a number, or a list of
 numbers, are compared with the record of that file; the others need a person. Prints every difference with source and
-certainty. A difference that the product file itself states (`known_wrong`) is printed with the effect given there;
-any other one gives exit code 1.
+certainty; one gives exit code 1.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ class Row:
     """One fact that was compared.
 
     Attributes:
-        verdict: agrees, differs, stated (differs, and the file says why), or no value.
+        verdict: agrees, differs, or no value.
         line: file, field, both values, certainty and source, for a person.
     """
 
@@ -91,20 +90,18 @@ def compared(rows: Iterator[dict[str, str]], folder: Path = SHIPPED) -> Iterator
             continue
         product = load_product(path)
         value = value_of(product, row["field"])
-        reasons = [error for error in product.known_wrong if error.field == row["field"]]
         if value is None:
             verdict = "no value"
         elif same(value, fact):
             verdict = "agrees"
         else:
-            verdict = "stated" if reasons else "differs"
-        why = f"; {reasons[0].effect or reasons[0].device}" if reasons else ""
-        shown = f"{row['file']} {row['field']}: catalogue {value}, device {fact}{why}"
+            verdict = "differs"
+        shown = f"{row['file']} {row['field']}: catalogue {value}, device {fact}"
         yield Row(verdict, f"{verdict}: {shown} [{row['certainty']}; {row['source']}]")
 
 
 def main() -> None:
-    """Print the differences and a count; exit 1 if a difference has no reason."""
+    """Print the differences and a count; exit 1 if there is one."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("facts", type=Path, help="table of facts, CSV")
     with parser.parse_args().facts.open(encoding="utf-8", newline="") as file:

@@ -108,7 +108,6 @@ def random_lidar(random: np.random.Generator) -> Lidar:
         "ears_mm": ears or None,
         "cable_z_mm": float(random.uniform(0.1, 0.4) * tall),
         "cable_diameter_mm": float(random.uniform(3.0, 7.0)),
-        "known_wrong": (),
     }
     return Lidar.model_validate(values)
 

@@ -122,7 +122,7 @@ def random_task(
     """
     field = field or drawn(rng, FIELDS)
     files: dict[str, Array | Boxes] = {}
-    table: dict[str, Any] = {"name": "random", "slip_ring": "UH1256-02-0610-06S", "limits": _limits(rng)}
+    table: dict[str, Any] = {"name": "random", "slip_ring": "SNU11-P0210", "limits": _limits(rng)}
     weight, mask = _regions(rng, field, files)
     if field == "scene":
         table["scene"] = placed(rng, "room.stl")

@@ -211,8 +211,6 @@ Each picture shows the scanner on the left, and one full scan of a simulated wor
 the data sheet. The red ball is the scanner, larger than in reality. `python -m benchmarks.scanwright.gallery` makes
 this page: tasks, parts, scans, pictures and figures.
 
-**Do not print the parts with a slip ring of Senring.** The real UH1256 is longer than that of the catalogue, and its
-leads are thicker. `build` prints a warning for each such product, and `scanwright catalogue NAME` has the reasons.
 Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real
 devices have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and
 scans do not depend on the holes.

@@ -83,13 +83,16 @@ def servo_horn(servo: Servo, z: float) -> cq.Solid:
 
 def ring_stator(ring: SlipRing, low: float, high: float) -> cq.Solid:
     """Of a through-bore ring; the split to its rotor is not in any drawing."""
-    stator = solids.upright(ring.outer_diameter_mm / 2, low + 1.0, high - 1.0)
+    stator = solids.upright(ring.outer_diameter_mm / 2, low, high - 1.0)
     return stator.cut(solids.upright(_split(ring), low - 1.0, high + 1.0)).Solids()[0]
 
 
 def ring_rotor(ring: SlipRing, low: float, high: float) -> cq.Solid:
     """Of a through-bore ring."""
-    rotor = solids.upright(_split(ring) - 0.2, low, high)
+    rotor: cq.Shape = solids.upright(_split(ring) - 0.2, low + 1.0, high)
+    if ring.rotor is not None:
+        high += ring.rotor.length_mm
+        rotor = rotor.fuse(solids.upright(ring.rotor.diameter_mm / 2, high - ring.rotor.length_mm, high)).clean()
     return rotor.cut(solids.upright(ring.bore_mm / 2, low - 1.0, high + 1.0)).Solids()[0]
 
 

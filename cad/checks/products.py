@@ -1,4 +1,4 @@
-"""Values of the products that are wrong or unverified, and required modules that have no place."""
+"""Unverified values of the products, and required modules that have no place."""
 
 from __future__ import annotations
 
@@ -21,21 +21,6 @@ SHAPING = {
     "servo.holes": "the screws of the servo's case",
 }
 SHOWN_CHARS = 60  # of a value in a message; a longer one is cut
-
-
-def known_errors(products: Iterable[Product]) -> list[Finding]:
-    """Return a warning for each wrong value for which the parts do not fit the device, a note for the others."""
-    fit = {True: "the printed parts still fit", False: "the printed parts will not fit"}
-    return [
-        Finding(
-            "known_error",
-            "note" if error.fits else "warning",
-            product.name,
-            f"{product.name}: {error.words(product)}; {fit[error.fits]}",
-        )
-        for product in products
-        for error in product.known_wrong
-    ]
 
 
 def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Finding]:

@@ -21,7 +21,7 @@ from scanwright.cad.checks.loads.mount import mount_checks
 from scanwright.cad.checks.loads.retention import retention_checks
 from scanwright.cad.checks.loads.vibration import vibration_checks
 from scanwright.cad.checks.printing import printing_checks
-from scanwright.cad.checks.products import known_errors, module_checks, unverified
+from scanwright.cad.checks.products import module_checks, unverified
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.cad.layout.drive import products_of
 from scanwright.design.findings import Finding
@@ -65,7 +65,6 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
     bent, linkage = deflection_checks(scanner, assembly, bodies, meshes)
     leans, mount = mount_checks(scanner, assembly, bodies, meshes)
     checks = [
-        *known_errors(products),
         *clearance_checks(assembly),
         *access_checks(assembly),
         *beam_checks(scanner, shadow, triangles, assembly.carriers()),

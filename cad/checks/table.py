@@ -30,7 +30,6 @@ class CheckRow(NamedTuple):
 
 NOISE = "range noise of the lidar, as an angle at 10 m"
 TABLE = (
-    CheckRow("known_error", "product whose record is known to be wrong"),
     CheckRow("unverified", "value of a product that shapes a part and is not verified"),
     CheckRow("module", "module that the task requires", "has a place", "task"),
     CheckRow(

@@ -30,7 +30,6 @@ from scanwright.design.scanner import Scanner
 
 Body = Literal["base", "rotor", "horn"]
 Point = tuple[float, float, float]
-BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
 Record = TypeVar("Record")
 
 
@@ -159,15 +158,15 @@ class Bundle:
 
 @dataclass(frozen=True, slots=True)
 class StatorExit:
-    """Where the leads of the ring's stator leave.
+    """Where the leads of the ring's stator leave: by its end, along -z.
 
     Attributes:
-        places: point and direction, shape (3,) each; any of them will do.
+        start: shape (3,).
         inside: how far they run inside of what surrounds the ring.
         stiff: whether they are straight there.
     """
 
-    places: tuple[tuple[Array, Array], ...]
+    start: Array
     inside: float
     stiff: bool
 

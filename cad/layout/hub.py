@@ -6,6 +6,7 @@ it beside the axis.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
@@ -19,10 +20,13 @@ HUB_HEIGHT = 14.0
 HUB_WALL = 12.0  # around the spigot: between the heads of the cross screws and the shaft
 CUP_HUB_WALL = 6.0  # likewise around a cup, which is wide enough to hold it stiffly
 NECK_ON_RIM = 1.5  # how far the neck stays inside a cup's rim
-HUB_GAP = 10.0  # the rotor's wires leave here
+HUB_GAP = 10.0  # least height between a ring and the hub
+BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
 SPIGOT = 11.0  # length of the shaft inside the hub
 CROSS_ABOVE_BOTTOM = 6.25  # of the cross screws, from the hub's lower face: a wall below their washers
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
+JOURNAL_WALL = 2.2  # of the sleeve between bore and leads
+LEANING = 1.15  # width of a lead across the axis, over its diameter, where it bends outwards
 JOURNAL_END = 1.0  # of the sleeve below the bearing
 
 Axis = Literal["x", "y"]
@@ -43,6 +47,9 @@ class Hub(ABC):
     shaft_diameter: float
     bearing: Bearing | None  # on a sleeve of the shaft, below the hub
     sub_plate: Axis | None  # of the laser frame, along which its ears stick out
+    lead_count: int = 0  # bundles of leads from the ring to the lidar
+    lead_diameter: float = 0.0  # of one of them
+    lead_radius: float = 0.0  # least one of its bends
     cup_bore: float = 0.0  # diameter inside a printed shaft (`cad/layout/direct/cup.py`); 0 of a turned one
 
     @property
@@ -69,6 +76,26 @@ class Hub(ABC):
     def hub_bottom(self) -> float:
         """Height of the lower end of hub, or of the sleeve below it."""
         return self.shoulder - self.journal
+
+    @property
+    def leads_corner(self) -> float:
+        """Height at which leads that leave through the sleeve of a bearing turn outwards: above it, clear of it."""
+        assert self.bearing is not None
+        reach = self.bearing.bore_mm / 2 - BUNDLE_GAP - LEANING * self.lead_diameter / 2
+        aside = (self.lead_count - 1) / 2 * (self.lead_diameter + BUNDLE_GAP)  # of the outermost bundle
+        outwards = math.sqrt(max(reach**2 - aside**2, 0.0)) - self.leads_radius  # before it leaves the bearing
+        straight = max(self.lead_radius - max(outwards, 0.0), 0.0)
+        return self.bearing_top + self.lead_radius - math.sqrt(self.lead_radius**2 - straight**2)
+
+    @property
+    def leads_radius(self) -> float:
+        """Distance of the leads from the axis where they run up through the sleeve of a bearing."""
+        return self.shaft_diameter / 2 + JOURNAL_WALL + self.lead_diameter / 2 + BUNDLE_GAP
+
+    @property
+    def leads_half_width(self) -> float:
+        """Of the room of all bundles side by side."""
+        return (self.lead_count * (self.lead_diameter + BUNDLE_GAP) + BUNDLE_GAP) / 2
 
     @property
     def cross(self) -> float:

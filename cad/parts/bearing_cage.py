@@ -63,11 +63,13 @@ def bell_spec(place: Placement) -> PartSpec | None:
     p = place.drive.of(BearingCage)
     if p is None:
         return None
+    leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
     words = (
-        "With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, and lower the cage over "
-        f"the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once around, so "
-        "that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the epoxy set before "
-        "anything hangs on the shaft: it fills what the print leaves, and the bearing stands where the shaft runs."
+        f"With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, {leads}and lower the cage "
+        f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once "
+        "around, so that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the "
+        "epoxy set before anything hangs on the shaft: it fills what the print leaves, and the bearing is where the "
+        "shaft runs."
     )
     return PartSpec(
         name=BEARING_CAGE,
@@ -187,8 +189,9 @@ def cage_base(p: BearingCage) -> cq.Solid:
         around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
         boss = solids.upright(stack.cage_inner - p.fit / 2, p.low, p.high)
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
-        body = body.cut(solids.upright(ears.opening, p.low - 1.0, p.high + 1.0))
-        body = checked(body)
+        half, reach = p.lead_hole
+        leads = [solids.box((-half, 0.0, p.low - 1.0), (half, reach, p.high + 1.0))] if half else []
+        body = checked(body.cut(solids.upright(ears.opening, p.low - 1.0, p.high + 1.0), *leads))
     with building(CAGE_BASE, "feet and screw holes", "holes", ears.holes) as checked:
         feet = [solids.upright(FOOT_RADIUS, seats, p.low + 1.0, x, y) for x, y in ears.holes]
         body = body.fuse(*feet)

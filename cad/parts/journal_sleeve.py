@@ -13,9 +13,8 @@ from functools import partial
 import cadquery as cq
 
 from scanwright.cad import solids
-from scanwright.cad.layout.direct.loads import JOURNAL_WALL
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.hub import BEARING_STEP
+from scanwright.cad.layout.hub import BEARING_STEP, JOURNAL_WALL
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
@@ -26,7 +25,7 @@ from scanwright.cad.solids import building
 SLIDES = 0.02  # in the inner ring: the lower end of g6
 BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills
 UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
-WIRES_HALF_WIDTH = 5.0
+BESIDE_LEADS = 0.4  # on either side of them in their channel
 COMPOUND = "retaining compound for metal, medium strength"
 RETAINING = "groove of the shaft, under the bearing's sleeve"
 
@@ -39,7 +38,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
     words = (
         f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
         "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's way "
-        "out for the wires; pull the rotor's leads up through the channel. Let it set."
+        "out for the leads; lay the rotor's leads into the channel. Let it set."
     )
     seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
     bore = ToleratedDiameter(stack.shaft_diameter + BOND, True, "±0.01", "bonded to the shaft")
@@ -79,8 +78,9 @@ def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
         body: cq.Shape = solids.upright((stack.bearing.bore_mm - SLIDES) / 2, low, high)
         cuts: list[cq.Shape] = [solids.upright(bore, low - 1.0, high + 1.0)]
         if stack.ring_length > 0:
-            corner = (stack.shaft_diameter / 2 + JOURNAL_WALL, -WIRES_HALF_WIDTH, low - 1.0)
-            channel = solids.box(corner, (stack.bearing.bore_mm, WIRES_HALF_WIDTH, high + 1.0))
+            half = stack.leads_half_width + BESIDE_LEADS
+            corner = (stack.shaft_diameter / 2 + JOURNAL_WALL, -half, low - 1.0)
+            channel = solids.box(corner, (stack.bearing.bore_mm, half, high + 1.0))
             turn = math.degrees(sum(p.cross_azimuths) / 2)
             cuts.append(channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), turn))
         return checked(body.cut(*cuts).clean())

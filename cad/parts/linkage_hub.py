@@ -11,12 +11,11 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.direct.loads import JOURNAL_WALL
+from scanwright.cad.layout.hub import JOURNAL_WALL
 from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
-WIRES_HALF_WIDTH = 4.2  # leaves a wall beside the heads of the cross screws
-WIRES_ABOVE = 7.0  # height of the wires' way out above the bearing
+OVER_LEADS = 1.5  # height of the channel over its leads
 IN_HUB = 0.5  # where that height ends, before the slots of a tongue
 EAR_CORNER = 0.3  # of its half width
 
@@ -83,11 +82,12 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
-    low, out = (inner, -WIRES_HALF_WIDTH, stack.shoulder - 1.0), stack.hub_radius + 20.0
-    ends = [(out, stack.shoulder + WIRES_ABOVE)]
+    half, roof = stack.leads_half_width, stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS
+    low, out = (inner, -half, stack.shoulder - 1.0), stack.hub_radius + 20.0
+    ends = [(out, roof)]
     if p.hub_tie is not None:  # lower where the leads are tied
-        ends = [(stack.hub_radius - IN_HUB, stack.shoulder + WIRES_ABOVE), (out, p.hub_tie.low)]
-    channels = [solids.box(low, (end, WIRES_HALF_WIDTH, high)) for end, high in ends]
+        ends = [(stack.hub_radius - IN_HUB, roof), (out, p.hub_tie.low)]
+    channels = [solids.box(low, (end, half, high)) for end, high in ends]
     return [each.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p))) for each in channels]
 
 

@@ -29,6 +29,9 @@ from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.catalogue.servo import Servo
 
+OF_RING = tuple(
+    f"slip_ring.{field}" for field in ("bore_mm", "length_mm", "rotor", "lead_diameter_mm", "lead_bend_radius_mm")
+)
 LINKAGE_ON_SHAFT = (
     "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way only, "
     f"and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
@@ -67,7 +70,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         material=TURNED_FROM if stack.bearing is None else ALUMINIUM.name,
         why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",
         sheet=OnSheet(fits, (*cross_words(stack), *_waist_words(stack))),
-        shaped_by=(*HORN, "servo.horn_diameter_mm", "slip_ring.bore_mm", "slip_ring.length_mm"),
+        shaped_by=(*HORN, "servo.horn_diameter_mm", *OF_RING),
         joints=(on_horn(scanner.servo, stack, SERVO_SHAFT),),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft", LINKAGE_ON_SHAFT, SEATED)},
     )

@@ -33,11 +33,12 @@ from scanwright.design.catalogue.servo import Servo
 
 RING_STEP = Step(
     "Slip ring",
-    "Lower the ring over the shaft, the rotor's leads upwards, and clamp its rotor to the shaft with its own set "
-    "screws. A cable tie in the grooves of the adapter holds the stator: it may move a little, it may not turn.",
+    "Pass the plugs of the stator's leads down on the side of the index, and lower the ring over the shaft, its "
+    "collar upwards. Clamp the collar to the shaft with its own set screws. Turn the stator until its leads hang "
+    "straight, and hold it by a cable tie in the grooves of the adapter: it may move a little, it may not turn.",
     "turned by hand, the shaft takes the rotor along and the stator stays; no lead is pulled",
 )
-OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm")
+OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead_diameter_mm", "slip_ring.plug_mm")
 
 
 def adapter_spec(place: Placement) -> PartSpec | None:

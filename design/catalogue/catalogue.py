@@ -4,9 +4,8 @@ One TOML file per product. Every value is written with its source and whether it
 
     mass_g = { value = 370.0, source = "Hokuyo UTM-30LX data sheet", verified = true }
 
-so that a build can list its unverified dimensions. `known_wrong` lists values that do not agree with
-the real device and that the record cannot hold right yet: a build warns of them. A user's own catalogue file adds
-products or replaces shipped ones of the same name.
+so that a build can list its unverified dimensions. A user's own catalogue file adds products or replaces shipped ones
+of the same name.
 """
 
 from __future__ import annotations
@@ -126,7 +125,7 @@ def load_product(path: Path) -> Product:
     provenance: dict[str, Provenance] = {}
     faults: list[Fault] = []
     for key, entry in with_holes(table).items():
-        if key in ("kind", "name", "maker", "known_wrong"):
+        if key in ("kind", "name", "maker"):
             values[key] = entry
         elif isinstance(entry, dict) and entry.keys() == {"value", "source", "verified"}:
             values[key] = entry["value"]

@@ -1,4 +1,4 @@
-"""What all records of the catalogue share: provenance, known errors, cables. Millimetres, grams."""
+"""What all records of the catalogue share: provenance, cables. Millimetres, grams."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr
 from pydantic_core import to_jsonable_python
 
-from scanwright.design.catalogue.known_error import KnownError
 from scanwright.design.files.record import Record
 
 Pair = tuple[float, float]
@@ -30,12 +29,11 @@ class Provenance(Record):
 
 
 class Product(Record):
-    """Base of the catalogue records: name, maker, the provenance of each value, and the values known to be wrong."""
+    """Base of the catalogue records: name, maker, and the provenance of each value."""
 
     kind: str
     name: str
     maker: str
-    known_wrong: tuple[KnownError, ...] = Field(default=(), exclude=True, description="shapes no part")
     _provenance: dict[str, Provenance] = PrivateAttr(default_factory=dict)
 
     def provenance(self) -> dict[str, Provenance]:
@@ -51,11 +49,6 @@ class Product(Record):
         origin = self._provenance.get(field)
         return "" if origin is None or origin.verified else " (not verified: measure yours)"
 
-    def misfit(self) -> list[str]:
-        """A warning that printed parts will not fit this product, a line for each reason below it; empty if they do."""
-        reasons = [f"  {error.words(self)}" for error in self.known_wrong if not error.fits]
-        return [f"{self.name}: parts printed for it will not fit the real device:", *reasons] if reasons else []
-
     def facts(self) -> dict[str, Any]:
         """Every value, and under `provenance` its source, for a program to read."""
         sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
@@ -68,10 +61,8 @@ class Product(Record):
         for field, origin in self._provenance.items():
             value = json.dumps(to_jsonable_python(getattr(self, field)))
             values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
-        wrong = [f"  ! {error.words(self)}   [{error.source}]" for error in self.known_wrong]
         mark = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
-        known = ["  ! does not agree with the real device"] if wrong else []
-        return [f"{self.name} ({self.maker})", *values, *wrong, mark, *known]
+        return [f"{self.name} ({self.maker})", *values, mark]
 
 
 Rating = Literal["usb2", "ethernet100", "none"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field, model_validator
@@ -29,7 +30,7 @@ class Flange(Record):
 
 
 class Rotor(Record):
-    """The stub of a capsule's rotor, out of which its leads come; mm."""
+    """The rotor beyond the body, where its leads leave: the stub of a capsule, the clamping collar of a bore; mm."""
 
     diameter_mm: float = Field(gt=0)
     length_mm: float = Field(gt=0)
@@ -49,13 +50,16 @@ class SlipRing(Product):
         default=None, exclude=True, description="circuits by current; shapes no part"
     )
     lead_diameter_mm: float | None = Field(
-        default=None, gt=0, exclude=True, description="of the bundle that goes to one outlet; shapes no part"
+        default=None, gt=0, exclude_if=absent, description="of all leads of one side as one bundle"
     )
     lead_bend_radius_mm: float | None = Field(
-        default=None, gt=0, exclude=True, description="least one of its middle; shapes no part"
+        default=None, gt=0, exclude_if=absent, description="least one of its middle"
     )
-    stator_exit: Literal["side", "end"] | None = Field(
-        default=None, exclude=True, description="where the stator's leads leave, at its lower end; shapes no part"
+    plug_mm: Pair | None = Field(
+        default=None, exclude_if=absent, description="width and thickness of the largest plug moulded to its leads"
+    )
+    stator_exit: Literal["end"] = Field(
+        default="end", exclude=True, description="where the stator's leads leave: the end opposite its rotor"
     )
     price_usd: float | None = Field(default=None, gt=0)
     friction_nm: Pair | None = Field(
@@ -64,6 +68,10 @@ class SlipRing(Product):
     data: Rating | None = Field(default=None, exclude=True, description="fastest data it is rated for; shapes no part")
     flange: Flange | None = Field(default=None, exclude_if=absent)
     rotor: Rotor | None = Field(default=None, exclude_if=absent)
+
+    def leads_mm(self, outlets: int) -> float:
+        """Return the diameter of the leads to one of some outlets, which share the bundle; 0 if it is unknown."""
+        return round((self.lead_diameter_mm or 0.0) / math.sqrt(max(1, outlets)), 2)
 
     @model_validator(mode="after")
     def _capsules_have_a_flange(self) -> SlipRing:

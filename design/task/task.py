@@ -201,11 +201,6 @@ class LoadedTask:
         """Return warnings: what the scanner of this task does less well than expected."""
         return [*self.unread_angles(), *self._out_of_range()]
 
-    def misfits(self) -> list[str]:
-        """Return a line for each product that printed parts do not fit, with the reason."""
-        names = (self.task.sensor, self.task.servo, self.task.slip_ring)
-        return [line for name in names if name for line in self.products.products[name].misfit()]
-
     def _out_of_range(self) -> list[str]:
         """Return warnings of planes outside the lidar's range; none with a scene, which has all ranges."""
         if self.task.scene is not None:

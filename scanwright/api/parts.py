@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +16,6 @@ from scanwright.pipeline.manifest import require_as_built
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
     from scanwright.design.findings import Finding
-
-_LOG = logging.getLogger(__name__)
 
 
 @with_say
@@ -73,8 +70,6 @@ def make_parts(task: TaskLike, angles: AnglesLike, *, progress: Progress = no_pr
     from scanwright.cad.assembly.make import make_parts
 
     loaded = as_task(task)
-    for line in loaded.misfits():
-        _LOG.warning("%s", line)
     progress("making the parts")
     return make_parts(loaded.scanner(as_angle_set(angles)))
 

@@ -79,11 +79,6 @@ def new(
     )
     path = out or Path(f"{answers.name}.toml")
     warnings = write_task_file(path, task_text(answers, products, _command(answers, path), path))
-    warnings += [
-        f"{name}: parts printed for it will not fit the real device: `scanwright catalogue '{name}'` gives the reasons"
-        for name in (answers.lidar, answers.servo)
-        if products.named(name).misfit()
-    ]
     warn(warnings)
     show_result(lambda: [f"wrote {path}"], Created(path, answers.name, warnings), as_json)
     hint(f"next: `scanwright build {path}` (or `scanwright optimise {path}` for the angles only)")

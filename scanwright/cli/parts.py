@@ -23,7 +23,6 @@ from scanwright.cli.console import (
     show_json,
     show_result,
     verbosity,
-    warn,
 )
 from scanwright.cli.help import Commands
 from scanwright.design.errors import notes_of, require
@@ -65,17 +64,14 @@ def build(
         built.folder,
         built.files,
         built.warnings,
-        built.misfits,
         [CheckEntry(**entry) for entry in entries_of(built.checks)],
     )
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
-    _warn_of_misfits(built.misfits)
     report = built.folder / "report.html"
     if built.failed:
         hint(f"next: read the failed checks in {report}, and change the task")
         raise typer.Exit(1)
-    coupon = f"then print {built.folder / 'print/fit_coupon.3mf'} and try it"
-    hint(f"next: open {report}; {'do not print parts yet (see the warnings)' if built.misfits else coupon}")
+    hint(f"next: open {report}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
 
 
 @app.command(example="report out/ground_ahead")
@@ -103,13 +99,11 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     checks = api.check(out, progress=ConsoleProgress())
     loaded = api.load_task(out / "task.toml")
     _print_failed_checks(checks)
-    _warn_of_misfits(loaded.misfits())
     lines = [_tally(Counter(each.severity for each in checks))]
     if verbosity() is Verbosity.VERBOSE:
         lines += [f"{each.severity:7} {sentence(each)}" for each in checks if each.severity != "error"]
     else:
-        named = ("unverified", "known_error")  # a line sums them up
-        warnings = [each for each in checks if each.severity == "warning" and each.code not in named]
+        warnings = [each for each in checks if each.severity == "warning" and each.code != "unverified"]  # summed up
         lines += finding_lines(warnings, checks, in_full=False)
     show_result(
         lambda: lines, Checked(loaded.task.name, [CheckEntry(**entry) for entry in entries_of(checks)]), as_json
@@ -182,14 +176,6 @@ def study(
     except KeyboardInterrupt:
         print_note("stopped; run the same command to continue")
         raise typer.Exit(130) from None
-
-
-def _warn_of_misfits(misfits: Sequence[str]) -> None:
-    """Print which products the printed parts do not fit; the reasons, which are indented, only with -v."""
-    if verbosity() is Verbosity.VERBOSE:
-        warn(misfits)
-    else:
-        warn(f"{line.rstrip(':')} (-v lists why)" for line in misfits if not line.startswith(" "))
 
 
 def _print_failed_checks(checks: Sequence[Finding]) -> None:

@@ -85,7 +85,6 @@ class Build:
         warnings: what the task can do, but not as well as its author may think.
         checks: of its parts, as in `checks.json`.
         made: what was done; None if the folder was current and there was nothing to do.
-        misfits: products that the printed parts do not fit, and why, in lines.
     """
 
     folder: Path
@@ -93,7 +92,6 @@ class Build:
     warnings: tuple[str, ...]
     checks: tuple[Finding, ...]
     made: Made | None
-    misfits: tuple[str, ...] = ()
 
     @property
     def failed(self) -> tuple[Finding, ...]:
@@ -157,7 +155,7 @@ def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
     checks = read_checks(target / "checks.json")
-    return Build(target, listed_files(target), tuple(loaded.warnings()), checks, made, tuple(loaded.misfits()))
+    return Build(target, listed_files(target), tuple(loaded.warnings()), checks, made)
 
 
 def difference_when_rebuilt(folder: Path, progress: Progress) -> str | None:

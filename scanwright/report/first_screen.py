@@ -167,15 +167,12 @@ def _capital(words: str) -> str:
 
 
 def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
-    """Return what to do before any part is made: failed checks, wrong values, values to measure."""
+    """Return what to do before any part is made: failed checks, values to measure."""
     todo = []
     if failed := [finding for finding in findings if finding.severity == "error"]:
         text = "Change the task until no check fails: each check states what to change."
         todo.append(ToDo(f"Fix {count(len(failed), 'failed check')}", text, ("#checks", "task.toml")))
     how = "Copy the device's catalogue file, change the values, name the copy in task.toml, and build again."
-    if wrong := [each for each in findings if each.code == "known_error" and each.severity == "warning"]:
-        text = f"Parts made with these values do not fit the real devices. {how}"
-        todo.append(ToDo(f"Correct {count(len(wrong), 'wrong value')}", text, ("#checks", "task.toml")))
     if unverified := tuple(each for each in findings if each.code == "unverified"):
         text = f"These values are not from a drawing. A wrong one makes a part that does not fit. {how}"
         todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("task.toml",), unverified))

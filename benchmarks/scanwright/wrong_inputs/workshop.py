@@ -26,7 +26,7 @@ _TASK = """
 name = "small"
 sensor = "UTM-30LX"
 servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 [motion]
 period_s = 2.0
 [angles]
@@ -51,7 +51,7 @@ name = "two"
 tasks = ["task.toml"]
 sensors = ["UTM-30LX", "UST-10LX"]
 servos = ["MX-64R"]
-slip_rings = ["UH1256-02-0610-06S"]
+slip_rings = ["SNU11-P0210"]
 front = ["J", "mass_g"]
 winners = 1
 """

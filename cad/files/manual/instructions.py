@@ -65,7 +65,6 @@ def instructions_text(
         "upright, or the lidar's axis if the step is on the bench. `exploded.glb` shows the scanner in 3D; `bom.csv` "
         "lists what you need.",
         "",
-        *_misfits(products_of(scanner, assembly.layout.drive)),
         "Try the hole patterns before you print parts: print `template.pdf` at 100 %, measure its scale of 100 mm, and "
         f"lay each page on its device. Then print `print/{TEST_PLATE}.3mf` and screw it to lidar and servo.",
         "",
@@ -109,13 +108,6 @@ def _joined(assembly: Assembly) -> str:
     leads = assembly.layout.leads
     laid = leads and all(lead.path is not None for lead in leads)
     return TO_COMPUTER if laid else THROUGH_RING
-
-
-def _misfits(products: Sequence[Product]) -> Iterator[str]:
-    """Yield lines about products that the parts do not fit."""
-    for product in products:
-        if reasons := product.misfit():
-            yield from (f"**Caution: {reasons[0]}**", "", *(f"- {reason.strip()}" for reason in reasons[1:]), "")
 
 
 def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:

@@ -27,7 +27,6 @@ from scanwright.cad.layout.belt.stack import (
 )
 from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, BearingTower, tower_of
 from scanwright.cad.layout.drive import (
-    BUNDLE_GAP,
     Body,
     Bundle,
     Cuboid,
@@ -39,7 +38,7 @@ from scanwright.cad.layout.drive import (
     StatorExit,
 )
 from scanwright.cad.layout.envelope import Envelope
-from scanwright.cad.layout.hub import BEARING_STEP
+from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.slip_ring import SlipRing
@@ -91,7 +90,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         leads_leave="by the shaft's window",
         tied_to="shaft",
         no_hub_tie="the leads leave the hollow shaft below the hub: they are tied around it",
-        stator_exit=_stator_exit(stack, ring, mounted.rear),
+        stator_exit=StatorExit(np.array([0.0, 0.0, stack.ring_bottom]), stack.ring_bottom - mounted.rear, stiff=False),
         bears=_bears,
         built=BUILT,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
@@ -194,13 +193,6 @@ def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth:
         side = sign * (bundle.half + BUNDLE_GAP)
         ends.append((np.array([[side, 0.0, low], [side, 0.0, middle]]), np.array([sign, 0.0, 0.0])))
     yield LeadExit(tie, tuple(ends))
-
-
-def _stator_exit(stack: BeltStack, ring: SlipRing, rear: float) -> StatorExit | None:
-    if ring.stator_exit is None:
-        return None
-    end = (np.array([0.0, 0.0, stack.ring_bottom]), np.array([0.0, 0.0, -1.0]))
-    return StatorExit((end,), stack.ring_bottom - rear, stiff=False)
 
 
 def _around_belt(stack: BeltStack) -> Cuboid:

@@ -24,15 +24,14 @@ from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array
 
-BUNDLED = 1.2  # diameter of a bundle of bundles, over that of one and the root of their number
 LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # of its device, before the first bend
 ON_FOOT = 1.0  # between foot or deck and a cable that lies on it
 BEYOND = 8.0  # the edge of the foot, where a cable ends
 CLEAR = 1.0  # of what it leaves, beside its own radius
-LONGER = (2.0, 8.0, 16.0)  # than a cable lies on the foot, before its last bend
-STEP = 12.0  # of the points that a cable may turn at
+LONGER = (2.0, 8.0, 12.0, 16.0)  # than a cable lies on the foot, before its last bend
+STEP = 9.0  # of the points that a cable may turn at
 AROUND = 20.0  # of these, beyond the ends
-FROM_CASE = 20.0  # where a cable ends on a flat deck
+FROM_CASE = 24.0  # where a cable ends on a flat deck
 THROUGH_DECK = 15.0
 FROM_SLOT = 0.2
 
@@ -63,18 +62,16 @@ class FixedCable:
 
 @dataclass(frozen=True, slots=True)
 class Leaving:
-    """A cable before it has a way: from where it leaves, one of some places with their directions.
-
-    `inside` is how far it runs inside of what surrounds its device, and `stiff` whether it is straight there.
-    """
+    """A cable before it has a path: where it leaves, and how far it runs inside of what surrounds its device."""
 
     name: str
     device: str
     diameter: float
     radius: float
-    places: tuple[tuple[Array, Array], ...]
+    start: Array
+    out: Array
     inside: float = 0.0
-    stiff: bool = False
+    stiff: bool = False  # whether it is straight there
 
 
 def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
@@ -93,23 +90,22 @@ def _leaving(place: Placement) -> Iterator[Leaving]:
     at, out, wide, radius = servo.cable_exit_mm, servo.cable_out, servo.cable_diameter_mm, servo.cable_bend_radius_mm
     if at is not None and out is not None and wide is not None and radius is not None:
         R, t = place.drive.servo_pose
-        yield Leaving(SERVO_CABLE, servo.name, wide, radius, ((R @ np.array(at) + t, R @ np.array(out)),))
+        yield Leaving(SERVO_CABLE, servo.name, wide, radius, R @ np.array(at) + t, R @ np.array(out))
     if ring is None or stator is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
         return
-    count = max(1, len(place.scanner.lidar.cable_y_mm))
-    wide = round(ring.lead_diameter_mm * (1.0 if count == 1 else BUNDLED * math.sqrt(count)), 2)
-    radius, inside = ring.lead_bend_radius_mm, stator.inside
-    yield Leaving(STATOR_LEADS, ring.name, wide, radius, stator.places, inside, stator.stiff)
+    wide, radius, down = ring.lead_diameter_mm, ring.lead_bend_radius_mm, np.array([0.0, 0.0, -1.0])
+    yield Leaving(STATOR_LEADS, ring.name, wide, radius, stator.start, down, stator.inside, stator.stiff)
 
 
 def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Path | None:
     deck, half = place.deck, leaving.diameter / 2
-    start, out = leaving.places[0]
-    if deck.flat and out @ np.array(deck.normal) < -0.5:  # by a hole of the deck
+    start, out, normal = leaving.start, leaving.out, np.array(deck.normal)
+    on_deck = deck.flat and (start - np.array(deck.centre)) @ normal < half
+    if on_deck and out @ normal < -0.5:  # by a hole of the deck
         return Path((triple(start), triple(start + THROUGH_DECK * out)), leaving.radius)
     lengths, clamped = tuple(leaving.inside + length for length in LEAVES), leaving.inside + half + CLEAR
     used = clamped if leaving.stiff else 0.0
-    starts = [Ending(point[None], out, lengths, used, clamped) for point, out in leaving.places]
+    starts = [Ending(start[None], out, lengths, used, clamped)]
     goals = _next_to_case(place.drive.mounted, half) if deck.flat else _on_foot(deck, half, lane)
     if not goals:
         return None
@@ -146,5 +142,5 @@ def _next_to_case(mounted: Mounted, half: float) -> list[Ending]:
         out = sign * np.eye(3)[axis]
         reach = float((corners @ out).max()) + FROM_CASE
         end = reach * out + np.array([0.0, 0.0, z])
-        ends.append(Ending(end[None], -out, (9.0, 14.0), half, half))
+        ends.append(Ending(end[None], -out, (9.0, 14.0, 19.0), half, half))
     return ends

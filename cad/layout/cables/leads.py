@@ -20,7 +20,8 @@ from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.cables.room import RotorRoom, room_of
 from scanwright.cad.layout.cables.route import Ending, lattice_about_axis, short_path
-from scanwright.cad.layout.drive import BUNDLE_GAP, Bundle
+from scanwright.cad.layout.drive import Bundle
+from scanwright.cad.layout.hub import BUNDLE_GAP
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.arrays import Array
@@ -72,8 +73,8 @@ def leads_of(place: Placement, avoid: Iterable[Shape]) -> tuple[RotorLead, ...]:
     ring, lidar = scanner.slip_ring, scanner.lidar
     if ring is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
         return ()
-    half, radius, room = ring.lead_diameter_mm / 2, ring.lead_bend_radius_mm, room_of(place, avoid)
-    numbers = range(len(lidar.cable_y_mm))
+    numbers, radius, room = range(len(lidar.cable_y_mm)), ring.lead_bend_radius_mm, room_of(place, avoid)
+    half = ring.leads_mm(len(numbers)) / 2
     best: tuple[RotorLead, ...] = ()
     # who comes first takes the short way, and may bar it to the others: then they come first, or change places
     for places, order in product((numbers, numbers[::-1]), repeat=2):

@@ -27,7 +27,9 @@ CAGE_SCREW = SCREWS["M3"]
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
 UNDER_CAGE_HEAD = 3.5  # of a leg
 TRAP_WALL = 3.0  # of the boss outside a nut
-WINDOW_HALF_WIDTH = 11.5  # the adapter's arms stand in the windows at +-x, the ring's wires leave at +-y
+WINDOW_HALF_WIDTH = 11.5  # the adapter's arms stand in the windows at +-x; by those at +-y a tie is closed
+TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator beside it
+PLUG_PLAY = 1.0  # around a plug that is passed through a hole
 PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
 POISSON = 0.35
 
@@ -56,6 +58,7 @@ class BearingCage:
     thread: Thread  # of the radial screws, in the boss
     legs: tuple[float, ...]  # azimuths of the bell's radial screws
     fit: float  # diametral clearance of a sliding fit
+    lead_hole: tuple[float, float]  # half width and end in y of the base's hole for leads and plugs; 0, 0 without
 
     @property
     def low(self) -> float:
@@ -112,15 +115,35 @@ def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | N
     thread = thread_in_part(CAGE_SCREW, printer, carries=True)
     if thread.trap is not None and not has_room(thread.trap, stack, _base_low(stack, ears), printer.min_wall_mm):
         thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False, carries=True)
+    hole = lead_hole(scanner, stack)
+    avoid = (*ears.holes, *((x, hole[1]) for x in (-hole[0], hole[0]) if hole[0]))
     return BearingCage(
         stack=stack,
         bearing=stack.bearing,
         ears=ears,
         cage_hole=passing_hole(CAGE_SCREW, printer),
         thread=thread,
-        legs=tuple(_leg_screw(middle, ears.holes, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
+        legs=tuple(_leg_screw(middle, avoid, stack.cage_inner) for middle in (45.0, 135.0, 225.0, 315.0)),
         fit=printer.fit_clearance_mm,
+        lead_hole=hole,
     )
+
+
+def stator_leads_y(scanner: Scanner, stack: DirectStack) -> float:
+    """Distance from the axis of the leads of a ring's stator: beside the flange and the case, at +y."""
+    half = 0.0 if scanner.slip_ring is None else (scanner.slip_ring.lead_diameter_mm or 0.0) / 2
+    return max(stack.flange_radius, scanner.servo.case_max_mm[1]) + TURNS_CLEAR + half
+
+
+def lead_hole(scanner: Scanner, stack: DirectStack) -> tuple[float, float]:
+    """Half width and end in y of a hole that a ring's leads and their plugs pass at +y; zeros without a ring."""
+    ring = scanner.slip_ring
+    if ring is None:
+        return 0.0, 0.0
+    lead = ring.lead_diameter_mm or 0.0
+    wide, thick = ring.plug_mm or (lead, lead)
+    y = max(stack.flange_radius + TURNS_CLEAR + thick, stator_leads_y(scanner, stack) + lead / 2) + PLUG_PLAY
+    return max(wide, lead) / 2 + PLUG_PLAY, y
 
 
 def plate_half_x(servo: Servo, screw: Screw) -> float:

@@ -91,7 +91,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         leads_leave=leads_leave,
         tied_to="neck",
         no_hub_tie="",
-        stator_exit=stator_exit(scanner, stack, mounted.rear),
+        stator_exit=None if scanner.slip_ring is None else stator_exit(scanner, stack, cage),
         bears=partial(_bears, scanner, stack),
         built=BUILT,
         left_out=tuple(_left_out(scanner, stack)),

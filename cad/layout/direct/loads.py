@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.hub import BUNDLE_GAP, JOURNAL_WALL
 from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
@@ -23,14 +24,15 @@ from scanwright.cad.layout.loads import (
     trusted_moment_nm,
     weight_of,
 )
+from scanwright.cad.layout.names import BEARING_CAGE
 from scanwright.design.catalogue.products import Bearing
+from scanwright.design.errors import BuildError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up
 LINKAGE_OFF_AXIS_MM = 20.0
-JOURNAL_WALL = 1.8  # of the bearing's sleeve between bore and wires
-WIRE_DEPTH = 6.0  # least depth of the channel for the ring's wires
+LEADS_DEPTH = 6.0  # least depth of the channel for the ring's leads
 HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
 SHEAR_SHARE = 0.9  # of a round section that carries shear
 
@@ -73,10 +75,23 @@ class Supported:
 
 
 def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
-    """The smallest bearing that fits around shaft and wires and under the hub; None where the catalogue has none."""
-    least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * WIRE_DEPTH)
+    """Return the smallest bearing around shaft and leads and under the hub; None without a ring if there is none.
+
+    Raises:
+        BuildError: the leads of the ring need more room than any bearing leaves.
+    """
+    depth = max(LEADS_DEPTH, stack.lead_diameter + 2 * BUNDLE_GAP)
+    least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * depth)
     most = 2 * (stack.hub_radius - HUB_STEP)
-    return next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
+    fit = next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
+    ring = scanner.slip_ring
+    if fit is None and ring is not None:
+        raise BuildError(
+            f"{BEARING_CAGE}: slip_ring {ring.name}: lead_diameter_mm = {ring.lead_diameter_mm}"
+            f"{ring.caution('lead_diameter_mm')}: the axis needs a bearing around shaft and leads with a bore of "
+            f"{least:.1f} to {most:.1f} mm, and the catalogue has none; take a ring with fewer circuits"
+        )
+    return fit
 
 
 def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:

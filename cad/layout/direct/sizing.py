@@ -51,6 +51,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
+    ring, count = scanner.slip_ring, len(scanner.lidar.cable_y_mm)
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     alone = DirectStack(
@@ -59,6 +60,10 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         ring_length=length,
         ring_radius=radius,
         ring_bore=bore,
+        ring_collar=0.0 if ring is None or ring.rotor is None else ring.rotor.length_mm,
+        lead_count=count,
+        lead_diameter=0.0 if ring is None else ring.leads_mm(count),
+        lead_radius=0.0 if ring is None else ring.lead_bend_radius_mm or 0.0,
         shaft_diameter=shaft,
         flange_radius=flange_radius,
         flange_thickness=flange_thickness,

@@ -8,8 +8,9 @@ ring's top, everything that stands still beside the shaft stays below it: cleara
     -h                top of the linkage's hub
     shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
     hub_bottom        the shoulder, or below it the lower end of the sleeve that sits in a bearing
-    ring_top          HUB_GAP below: the rotor's wires leave here
-    ring_bottom       the ring's length below
+    leads_low         HUB_GAP, or what the bend of its leads needs, below: the end of the ring's rotor collar
+    ring_top          the collar's length below
+    ring_bottom       the length of the ring's stator below
                       RING_GAP, or the shaft's waist, below: top of the shaft's collar
     horn              the servo's horn face
 
@@ -30,7 +31,7 @@ from scanwright.cad.layout.names import HORN_CUP, SERVO_SHAFT
 from scanwright.design.arrays import Array
 
 RING_GAP = 3.0
-STATOR_EXIT = 5.0  # over a ring's lower end, of leads that leave the side of its stator
+BELOW_HUB = 0.85  # between the hub, or its slotted tab, and a lead that leaves under it
 CUP_GAP = 0.5  # between hub and flange of a cup: the cup's rim carries the hub
 APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
 # DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts
@@ -69,6 +70,7 @@ class DirectStack(Hub):
     """The scanner along its axis with the servo on it: horn, shaft through the ring, hub (rotation frame, mm)."""
 
     ring_bore: float
+    ring_collar: float = 0.0  # of the rotor, beyond the stator
     flange_radius: float
     flange_thickness: float
     collar_radius: float
@@ -122,9 +124,15 @@ class DirectStack(Hub):
         return self.cage_seat - CAGE_LIP - (self.cage_inner - self.bearing.outer_mm / 2 + CAGE_LIP)
 
     @property
+    def leads_low(self) -> float:
+        """Height of the upper end of the ring's rotor, where its leads leave."""
+        bend = self.lead_radius + self.lead_diameter / 2 + BELOW_HUB
+        return self.hub_bottom - (max(HUB_GAP, bend) if self.bearing is None else HUB_GAP)
+
+    @property
     def ring_top(self) -> float:
-        """Height of the ring's upper face."""
-        return self.hub_bottom - HUB_GAP
+        """Height of the upper face of the ring's stator."""
+        return self.leads_low - self.ring_collar
 
     @property
     def ring_bottom(self) -> float:
@@ -138,7 +146,8 @@ class DirectStack(Hub):
             return self.shoulder - CUP_GAP - self.flange_thickness
         if self.bearing is None:
             return self.ring_bottom - RING_GAP - self.collar_height
-        return self.ring_bottom - max(0.0, APART - self.ring_length) - self.waist_length - self.collar_height
+        apart = max(0.0, APART - self.ring_length - self.ring_collar)
+        return self.ring_bottom - apart - self.waist_length - self.collar_height
 
     @property
     def retaining_ring(self) -> int:

@@ -22,8 +22,7 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-CHANNEL_LOW = 4.2  # height over the hub's lower face that the leads of a bearing's sleeve leave by
-LEAD = 3.75  # room of a bundle between the slots
+OVER_LEADS = 0.55  # between the leads of a bearing's sleeve and a tongue
 THICK = 4.0  # of a tongue of the hub with nothing over it
 ROOT = 3.0  # of it inside the hub
 FROM_SIDE = 1.2  # of the slots, from hub or plate
@@ -74,12 +73,11 @@ def hub_tie_of(scanner: Scanner, drive: DriveLayout, p: LinkageBody, ear: Ear | 
         ear: of a counterweight.
         neck: corners of the linkage's neck, shape (n, 3).
     """
-    count = len(scanner.lidar.cable_y_mm)
-    if scanner.slip_ring is None or count == 0:
+    if scanner.slip_ring is None or not scanner.lidar.cable_y_mm:
         return _without(HUB_TIE, "no leads leave a ring below the hub")
     if drive.no_hub_tie:
         return _without(HUB_TIE, drive.no_hub_tie)
-    free = next((seat for seat in _candidates(p, ear, count) if _has_room(seat, p, neck)), None)
+    free = next((seat for seat in _candidates(p, ear) if _has_room(seat, p, neck)), None)
     return free or _without(HUB_TIE, "plate, fan or the way of what is put in is where it would be")
 
 
@@ -87,11 +85,11 @@ def _without(which: str, why: str) -> LeftOut:
     return LeftOut(which, why, 1, "tongues")
 
 
-def _candidates(p: LinkageBody, ear: Ear | None, count: int) -> Iterator[TieSeat]:
+def _candidates(p: LinkageBody, ear: Ear | None) -> Iterator[TieSeat]:
     """Between the cross screws, where the leads of a bearing's sleeve leave; else on the free sides of these too."""
     stack, free = p.stack, sum(p.cross_azimuths) / 2
     wired = stack.bearing is not None
-    low = stack.shoulder + (CHANNEL_LOW if wired else 0.0)
+    low = stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS if wired else stack.shoulder
     for turn in (0.0,) if wired else (0.0, math.pi / 2, -math.pi / 2, math.pi):
         high = low + THICK
         near = ear is not None and abs((ear.azimuth - free - turn + math.pi) % (2 * math.pi) - math.pi) < NEAR_EAR
@@ -103,7 +101,7 @@ def _candidates(p: LinkageBody, ear: Ear | None, count: int) -> Iterator[TieSeat
             first=stack.hub_radius + FROM_SIDE,
             low=low,
             high=high,
-            half=count * LEAD / 2 + 0.15,
+            half=stack.leads_half_width,
             grooved=near,
         )
 

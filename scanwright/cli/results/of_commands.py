@@ -55,14 +55,12 @@ class Built:
         folder: the folder.
         files: files in it, relative to it.
         warnings: limits of the task that can surprise.
-        misfits: products that the printed parts do not fit, with reasons, as lines.
         checks: all checks of the parts.
     """
 
     folder: Path
     files: tuple[str, ...]
     warnings: tuple[str, ...]
-    misfits: tuple[str, ...]
     checks: list[CheckEntry]
 
 

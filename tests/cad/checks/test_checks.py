@@ -18,7 +18,6 @@ from scanwright.cad.checks.clearance import together_check, turning_check
 from scanwright.cad.checks.limits import at_least, at_most
 from scanwright.cad.checks.loads.mechanics import mechanics_checks
 from scanwright.cad.checks.printing import islands_check, islands_of, printing_checks, thin_walls
-from scanwright.cad.checks.products import known_errors
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
@@ -41,7 +40,7 @@ def scanner_for(alpha_rot, beta_rot, alpha, beta, lidar="UTM-30LX", servo="MX-64
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
         sensor=lidar,
         servo=servo,
-        slip_ring="UH1256-02-0610-06S",
+        slip_ring="SNU11-P0210",
     )
     scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
     return replace(scanner, slip_ring=scanner.slip_ring.model_copy(update={"friction_nm": friction_nm}))
@@ -55,18 +54,6 @@ def turned(mesh, angle):
 def least_room(rotor, stator):
     """Of a turning and a standing body, over a whole turn."""
     return turning_check({"rotor": rotor, "stator": stator}, {"rotor"}).value
-
-
-def test_a_product_that_parts_do_not_fit_is_a_warning_for_each_wrong_value_and_no_other_is():
-    catalogue = load_catalogue()
-    checks = known_errors([catalogue.named(name) for name in ("SNU11-P0210", "UTM-30LX", "MX-64R", "RPLIDAR C1")])
-    assert Counter((check.subject, check.severity) for check in checks) == {
-        ("SNU11-P0210", "warning"): 2,
-        ("RPLIDAR C1", "note"): 1,
-    }
-    assert checks[0].message.endswith("the printed parts will not fit")
-    (ring, *_) = known_errors([catalogue.named("UH1256-02-0610-06S")])
-    assert "length_mm = 45.0 is wrong: the device has a stator 88.5 mm long" in ring.message
 
 
 def test_the_distance_over_a_turn_of_bodies_known_by_arithmetic():
@@ -336,7 +323,7 @@ def test_a_file_that_no_build_wrote_is_an_error(content, tmp_path):
 TASK = """name = "small"
 sensor = "URG-04LX"
 servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 printer = "fdm-0.4"
 [motion]
 mode = "spin"

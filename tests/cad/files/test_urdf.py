@@ -43,7 +43,7 @@ def test_the_chain_is_that_of_the_angle_set(name, tmp_path):
         task=name,
         sensor="UTM-30LX",
         servo="MX-64R",
-        slip_ring="UH1256-02-0610-06S",
+        slip_ring="SNU11-P0210",
         **case | {"angles_deg": Angles(**dict(zip(NAMES, case["angles_deg"], strict=True)))},
     )
     offset = mount_offset_mm(scanner_of(angles, "fdm-0.4", load_catalogue()))
@@ -63,8 +63,8 @@ def test_the_chain_is_that_of_the_angle_set(name, tmp_path):
 @pytest.mark.parametrize(
     ("ring", "motion", "ends"),
     [
-        ("UH1256-02-0610-06S", {"mode": "spin", "period_s": 18.0}, None),
-        ("UH1256-02-0610-06S", {"mode": "sweep", "limits_deg": (-90.0, 80.0), "period_s": 12.0}, None),
+        ("SNU11-P0210", {"mode": "spin", "period_s": 18.0}, None),
+        ("SNU11-P0210", {"mode": "sweep", "limits_deg": (-90.0, 80.0), "period_s": 12.0}, None),
         (None, {"mode": "sweep", "limits_deg": (-90.0, 80.0), "period_s": 12.0}, (-90.0, 80.0)),
     ],
 )

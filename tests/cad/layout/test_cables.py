@@ -15,7 +15,7 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import scanner_of
 
-BORE, CAPSULE = "UH1256-02-0610-06S", "SRC022A-6"
+BORE, CAPSULE = "SNU11-P0210", "SRC022A-6"
 SETTINGS = {  # servo on the axis, upright and lying lidar; with a bearing; a hollow shaft
     "upright": ((0, 0, 0, 0), "UTM-30LX", BORE),
     "lying": ((0, 0, 90, 0), "UTM-30LX", BORE),

@@ -22,7 +22,7 @@ SCREW_HOLE = {"M3": 3.4, "M4": 4.4, "M5": 5.4, "M6": 6.4}  # with the 0.4 mm of 
 TASK = """name = "holes"
 sensor = "UTM-30LX"
 servo = "MX-64R"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 [motion]
 period_s = 18.0
 """
@@ -34,7 +34,7 @@ def scanner_for(alpha_rot, beta_rot, deck):
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=20, beta_laser=-40),
         sensor="UTM-30LX",
         servo="MX-64R",
-        slip_ring="UH1256-02-0610-06S",
+        slip_ring="SNU11-P0210",
     )
     return scanner_of(angles, "fdm-0.4", load_catalogue(), deck)
 

@@ -50,7 +50,7 @@ def test_an_xm430_is_laid_out_with_a_frame_and_every_lidar_by_the_holes_it_has(l
 
 
 def test_every_screw_into_a_device_meets_a_hole_and_one_that_does_not_is_found():
-    for servo, lidar, ring in (("XL430-W250", "STL27L", None), ("MX-64R", "UST-10LX", "UH1256-02-0610-06S")):
+    for servo, lidar, ring in (("XL430-W250", "STL27L", None), ("MX-64R", "UST-10LX", "SNU11-P0210")):
         layout = laid_out(scanner_for(servo, lidar, ring, (0, 0, 0, 50)))
         assert list(screws_without_a_hole(layout)) == []
     turned = layout.scanner.lidar.model_copy(update={"holes": CATALOGUE.products["RPLIDAR C1"].holes})
@@ -132,7 +132,7 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
 
 
 def test_a_ring_still_asks_for_a_turned_shaft():
-    stack = drive_of(scanner_for("MX-64R", "UTM-30LX", "UH1256-02-0610-06S")).stack
+    stack = drive_of(scanner_for("MX-64R", "UTM-30LX", "SNU11-P0210")).stack
     assert stack.cup_bore == 0 and stack.shaft_diameter == 12.65 and stack.shaft == "servo_shaft"
 
 

@@ -98,7 +98,7 @@ def inner_circle(mesh, z, diameter):
 
 def test_a_capsule_gets_the_belt_and_a_bore_the_shaft():
     assert isinstance(drive_of(scanner_for()).stack, BeltStack)
-    assert isinstance(drive_of(scanner_for(ring="UH1256-02-0610-06S")).stack, DirectStack)
+    assert isinstance(drive_of(scanner_for(ring="SNU11-P0210")).stack, DirectStack)
     assert isinstance(drive_of(replace(scanner_for(), slip_ring=None)).stack, DirectStack)
 
 
@@ -126,7 +126,7 @@ def test_what_it_is_made_of(made):
     assert stack.upper_middle - stack.lower_middle >= 30
     assert (stack.tube_diameter - stack.shaft_bore) / 2 >= 4
     # the spigot is keyed and crossed as in direct drive, where the bore of the ring sets its diameter
-    direct = drive_of(scanner_for(ring="UH1256-02-0610-06S")).stack
+    direct = drive_of(scanner_for(ring="SNU11-P0210")).stack
     assert stack.cross - stack.shoulder == direct.cross - direct.shoulder
     assert stack.shaft_diameter / 2 - stack.flat == direct.shaft_diameter / 2 - direct.flat
 
@@ -461,7 +461,7 @@ def test_a_capsule_that_contradicts_itself_is_refused(change, words):
 
 
 def test_a_ring_with_a_bore_keeps_its_digest():
-    ring = load_catalogue().get("UH1256-02-0610-06S", SlipRing)
+    ring = load_catalogue().get("SNU11-P0210", SlipRing)
     assert "flange" not in ring.model_dump() and "rotor" not in ring.model_dump()
     assert SCREWS[load_catalogue().get(CAPSULE, SlipRing).flange.screw].nominal == 5.0
 

@@ -51,7 +51,7 @@ def scanner_for(alpha, beta, lidar="UTM-30LX", servo="MX-64R", alpha_rot=0.0, be
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
         sensor=lidar,
         servo=servo,
-        slip_ring="UH1256-02-0610-06S",
+        slip_ring="SNU11-P0210",
     )
     return scanner_of(angles, "fdm-0.4", load_catalogue())
 

@@ -14,8 +14,7 @@ import trimesh
 import scanwright
 from scanwright.cli import app
 from scanwright.design.angles import Angles, AngleSet
-from scanwright.design.task.task import SHIPPED, load_task
-from scanwright.pipeline.build import Build
+from scanwright.design.task.task import SHIPPED
 
 GROUND = (SHIPPED / "ground_ahead.toml").read_text()
 RING = """kind = "slip_ring"
@@ -262,17 +261,6 @@ def test_results_that_cannot_be_written_are_told_of_standard_output(words, unbuf
             env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )
     assert (done.returncode, done.stderr) == (2, "error: standard output: No space left on device\n")
-
-
-def test_build_warns_on_standard_error_of_products_that_the_parts_do_not_fit(command, tmp_path, monkeypatch):
-    built = Build(tmp_path, (), (), (), None, tuple(load_task("ground_ahead").misfits()))
-    monkeypatch.setattr("scanwright.api.build", lambda *_, **__: built)
-    code, out, complaints = command("build", "low_cost", "--quiet")
-    assert code == 0 and "will not fit" not in out
-    heads = [line for line in complaints if line.startswith("warning: ")]
-    assert heads == ["warning: UH1256-02-0610-06S: parts printed for it will not fit the real device (-v lists why)"]
-    _, out, _ = command("build", "low_cost", "--json")
-    assert json.loads(out)["folder"] == str(tmp_path) and json.loads(out)["misfits"]
 
 
 def test_a_bug_shows_its_traceback(command, monkeypatch):

@@ -15,7 +15,7 @@ TASK = """
 name = "heavy"
 sensor = "{sensor}"
 servo = "XM540-W270"
-slip_ring = "UH1256-02-0610-06S"
+slip_ring = "SNU11-P0210"
 [motion]
 mode = "spin"
 period_s = 10.0

@@ -121,13 +121,13 @@ def test_a_check_knows_its_bodies():
     names = ["alignment_linkage", "base_mount", "lidar_body", "lidar_cap", "ring_rotor", "servo_case", "servo_horn"]
     turning = {"alignment_linkage", "lidar_body", "lidar_cap", "ring_rotor", "servo_horn"}
     bodies = {name: PlacedBody(np.zeros((1, 3, 3)), name in turning) for name in [*names, "servo_shaft"]}
-    bought = {"UTM-30LX": "lidar", "MX-64R": "servo", "UH1256": "slip ring"}
+    bought = {"UTM-30LX": "lidar", "MX-64R": "servo", "SNU11": "slip ring"}
     for where, expected in {
         "base_mount": {"base_mount"},
         "servo_shaft and ring_rotor": {"servo_shaft", "ring_rotor"},
         "servo": {"servo_case", "servo_horn"},
         "MX-64R": {"servo_case", "servo_horn"},
-        "UH1256": {"ring_rotor"},
+        "SNU11": {"ring_rotor"},
         "UTM-30LX": {"lidar_body", "lidar_cap"},
         "rotor": turning,
         "fdm-0.4": set(),

@@ -17,7 +17,7 @@ GROUND = {"shape": "ground", "from_m": 0.5, "to_m": 3.0, "width_m": 2.0, "height
 
 
 def task(**keys):
-    told = {"name": "t", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "UH1256-02-0610-06S"}
+    told = {"name": "t", "sensor": "UTM-30LX", "servo": "MX-64R", "slip_ring": "SNU11-P0210"}
     return load_task(told | {"motion": {"period_s": 18.0}, "weight": [GROUND]} | keys)
 
 
