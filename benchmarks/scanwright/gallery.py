@@ -92,7 +92,7 @@ ENTRIES = (
     Entry(
         "quadruped",
         "A quadruped: ground 0.5 to 5 m ahead, and the ceiling",
-        "--lidar UST-10LX --servo XM430-W350 --height-m 0.4 --see ground:0.5:5 --see ceiling "
+        "--lidar UST-20LX --servo XM430-W350 --height-m 0.4 --see ground:0.5:5 --see ceiling "
         "--robot box:0.7:0.35:0.3 --ahead-m 0.25 --scan-s 4",
         worlds.lobby,
         0.4,
@@ -175,7 +175,7 @@ ENTRIES = (
     Entry(
         "landing_pad",
         "A landing pad, from a drone 4 m over it",
-        "--lidar LMS111 --servo MX-106 --height-m 4 --see ground:-3:3:6 --scan-s 4",
+        "--lidar UTM-30LX --servo MX-64R --height-m 4 --see ground:-3:3:6 --scan-s 4",
         worlds.landing_place,
         4.0,
         lambda p: np.hypot(p[:, 0], p[:, 1]) < 4.5,
@@ -209,11 +209,8 @@ Eight tasks for eight uses, with the scanner that was built for each. Choose the
 
 Each picture shows the scanner on the left, and one full scan of a simulated world on the right, with the noise of
 the data sheet. The red ball is the scanner, larger than in reality. `python -m benchmarks.scanwright.gallery` makes
-this page: tasks, parts, scans, pictures and figures.
-
-Four scanners below turn a ring with a servo of the X series, and one carries an LMS111 by its base. The real
-devices have no holes for that: `new` writes a sweep for the four, and rejects the LMS111. Angles, densities and
-scans do not depend on the holes.
+this page: tasks, parts, scans, pictures and figures. No slip ring fits servos of the X series, so `new` writes a sweep
+for them.
 """
 
 
