@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from scanwright.design.angles import angles_words
 from scanwright.design.arrays import Array, Ints, Mask, Setting
 from scanwright.design.concurrency.blocked_product import product
 from scanwright.design.concurrency.parallel import in_chunks
@@ -125,7 +126,6 @@ def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str
     """Why limits on the scan plane leave parts of the region blind, from the best setting without that sees all."""
     planes_rad = np.radians(angles_deg[None, 2:])
     gap_deg, cone_deg = float(line_gaps_deg(problem, planes_rad)[0]), float(blind_cones_deg(problem, planes_rad)[0])
-    setting = ", ".join(f"{angle:g}" for angle in angles_deg)
     if limits.max_line_gap_deg is not None and gap_deg > limits.max_line_gap_deg:
         limit = f"max_line_gap_deg = {limits.max_line_gap_deg:g}"
         lines = np.ceil(2 * np.pi / problem.lines.step_rad * gap_deg / limits.max_line_gap_deg - 1e-9)
@@ -135,8 +135,8 @@ def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str
         limit = f"max_blind_cone_deg = {limits.max_blind_cone_deg:g}"
         cure = f"a blind cone of {cone_deg:.3g} deg that the region does not reach"
     return (
-        f"limits.{limit}: every scan plane that keeps it leaves a part of the region blind; ({setting}) sees all of it "
-        f'and has {cure}; change the limit, or set angles.holes = "allow"'
+        f"limits.{limit}: every scan plane that keeps it leaves a part of the region blind; "
+        f'{angles_words(angles_deg)} sees all of it and has {cure}; change the limit, or set angles.holes = "allow"'
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.angles import AngleSet, angles_words, standard_settings
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.evaluation.landscape_picture import LandscapePanel, draw_landscape
 from scanwright.design.evaluation.picture_files import svg_bytes
@@ -91,10 +91,9 @@ def _mount(space: SearchSpace, angles_deg: Setting) -> OtherMount:
 
 
 def _alone(problem: Problem, mount: OtherMount, J: float) -> str:
-    angles = ", ".join(f"{angle:g}" for angle in mount.angles_deg)
     blind = "; ".join(hole.words() for hole in holes(problem, np.radians(mount.angles_deg)))
     return (
-        f"Without blind spots and limits, ({angles}) with J = {mount.J:.4f} would be best, which "
+        f"Without blind spots and limits, {angles_words(mount.angles_deg)} with J = {mount.J:.4f} would be best, which "
         f"{f'is {blind}' if mount.blind else 'breaks the limits of the task'}. "
         f"Keeping the requirements of the task costs {price(problem, J, mount.J)}."
     )
