@@ -14,6 +14,7 @@ x and y. Rotation about the axis and translation along it are gauges.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -34,6 +35,11 @@ from scanwright.design.motion import Motion
 
 STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.0, 0.0)}
 """(alpha_rot, beta_rot, alpha_laser, beta_laser) of the standard alignments: R_world_laser is Rx or Ry(gamma)."""
+
+
+def angles_words(angles_deg: Iterable[float]) -> str:
+    """Return angles as they are shown to people, `(0, 90, 0, -90)`."""
+    return "(" + ", ".join(f"{angle:g}" for angle in angles_deg) + ")"
 
 
 def standard_settings() -> dict[str, Setting]:

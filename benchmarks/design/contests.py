@@ -19,9 +19,9 @@ from scanwright.design.errors import TaskError
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score, score
 from scanwright.design.objective.stated_error import error_words
-from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import EQUAL, Family
 from scanwright.design.search.search import search
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.task import Limits, LoadedTask
 
@@ -71,12 +71,12 @@ def contest(
     found = search(problem, ranges)
     low, high = np.array([ranges.limits(name) for name in NAMES]).T
     free = high > low
-    required = Requirements(problem, Limits(), ranges.holes == "avoid" and found.least_blind is None)
+    space = SearchSpace(problem, ranges, Limits(), ranges.holes == "avoid" and found.least_blind is None)
 
     def J(moved: Array) -> float:
         setting = low.copy()
         setting[free] = moved
-        return required.J(setting, LOOKS[0][0])
+        return space.J(setting, LOOKS[0][0])
 
     bounds = np.column_stack([low, high])[free]
     end = process_time() + budget_s
@@ -95,22 +95,22 @@ def contest(
     rivals = {}
     if draws:
         drawn = np.random.default_rng(seed).uniform(low, high, (draws, 4))
-        rivals[f"{draws:,} random settings"] = best_of(required, drawn)
-    at_evolved = required.score(setting)
+        rivals[f"{draws:,} random settings"] = best_of(space, drawn)
+    at_evolved = space.score(setting)
     if at_evolved is not None:
         rivals[f"differential evolution, {evolved.nfev:,} settings"] = (setting, at_evolved)
     J_found = np.sort([family.score.J for family in found.best])
     return Contest(found.best[0], rivals, bool((np.diff(J_found) > EQUAL).all()), min(problem.tolerance, MOST_LOST))
 
 
-def best_of(required: Requirements, settings_deg: Array) -> tuple[Array, Score]:
+def best_of(space: SearchSpace, settings_deg: Array) -> tuple[Array, Score]:
     """The best of many settings that are no refused ones: all looked at roughly, the best more closely, then scored."""
     left = settings_deg
     for nodes, kept in LOOKS:
-        J = [required.J(setting, nodes) for setting in left]
+        J = [space.J(setting, nodes) for setting in left]
         left = left[np.argsort(J)[:kept]]
-    scores = [score(required.problem, setting) for setting in np.radians(left)]
-    best = int(np.argmin([s.J if required.keeps(s, at) else np.inf for s, at in zip(scores, left, strict=True)]))
+    scores = [score(space.problem, setting) for setting in np.radians(left)]
+    best = int(np.argmin([s.J if space.keeps(s, at) else np.inf for s, at in zip(scores, left, strict=True)]))
     return left[best], scores[best]
 
 

@@ -25,6 +25,7 @@ from scanwright.design.objective.ball_search import scan_tree
 from scanwright.design.objective.named_objectives import Moment, log_density
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.search.coarse_nodes import Circles
 from scanwright.design.search.plane_axis_product import BothOrientations, both_orientations
 from scanwright.design.search.search import search
 from scanwright.design.sphere.directions import equal_angle_grid, weighted_samples
@@ -84,7 +85,7 @@ def main() -> None:
     mapped = planes * (build + whole) + covered * per_sum
 
     products = Products()
-    with patch("scanwright.design.search.coarse.both_orientations", products.counting):
+    with patch.object(Circles, "orientations", staticmethod(products.counting)):
         counted = search(problem, ranges).seconds
     machine = plain_matmul(products.largest)
     reached = products.flops / products.seconds

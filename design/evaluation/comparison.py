@@ -26,6 +26,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from scanwright.design.angles import angles_words
 from scanwright.design.arrays import Array, Counts, Setting
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.products import Multibeam
@@ -239,7 +240,7 @@ def _rotating(
     known = [price for price in prices if price is not None]
     return ComparisonRow(
         name=name,
-        setting="(" + ", ".join(f"{angle:g}" for angle in np.degrees(angles_rad).round(2) + 0.0) + ")",
+        setting=angles_words(np.degrees(angles_rad).round(2) + 0.0),
         time_s=loaded.task.motion.duration_s,
         turns=1,
         J=judged.J,

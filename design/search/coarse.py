@@ -16,23 +16,14 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from scanwright.design.arrays import Array, Ints, Mask
-from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
-from scanwright.design.density.spin import mean_count, zones
 from scanwright.design.objective.named_objectives import Objective
-from scanwright.design.objective.problem import Problem
 from scanwright.design.progress import Progress
-from scanwright.design.search.constraints import AtMost, Constraint, NoHole, fan_reach
-from scanwright.design.search.grid_classes import Folded
-from scanwright.design.search.plane_axis_product import Lowest, both_orientations, gathered, lowest
-from scanwright.design.sphere.outline import reach_about
-from scanwright.design.sphere.polar_weights import weights_over_polar
+from scanwright.design.search.coarse_nodes import Circles, Directions, Nodes
+from scanwright.design.search.constraints import AtMost, Constraint
+from scanwright.design.search.plane_axis_product import Lowest, gathered, lowest
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.sphere.regions import Field
-from scanwright.design.task.task import Limits
 
-FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg
-MOST_NODES = 1441  # for balls below half a degree
-BATCH = 64  # planes whose exact densities are computed before the bound is asked again
 MARGIN = 0.15  # what the coarse J of the search may be off by: 0.134 was seen, for a ball of 0.5 deg
 BLIND_MARGIN = 0.02  # what a blind share told from nodes may be off by: the few best settings are asked exactly
 REPORT = 1000  # planes between two lines of progress
@@ -45,6 +36,8 @@ class Landscape:
     """Coarse J over all planes and axes, as the factors of its products and the lowest along each side.
 
     Attributes:
+        space: the mounts.
+        nodes: what the factors are over.
         objective: how moments become J.
         g: `<g(d)>` of each moment and plane class over the polar nodes, or its bound, (moments, planes, nodes).
         weights: share of each moment's weight about each axis class over the nodes, (axes, nodes) each.
@@ -54,6 +47,8 @@ class Landscape:
         feasible: lowest J of those that keep the constraints.
     """
 
+    space: SearchSpace
+    nodes: Nodes
     objective: Objective
     g: Array
     weights: tuple[Array, ...]
@@ -94,69 +89,56 @@ class Effort:
 USUAL = Effort()
 
 
-def coarse_landscape(
-    problem: Problem,
-    planes: Folded,
-    axes: Folded,
-    progress: Progress,
-    limits: Limits,
-    avoid_holes: bool,
-    effort: Effort = USUAL,
-) -> tuple[Landscape, int]:
+def coarse_landscape(space: SearchSpace, progress: Progress, effort: Effort = USUAL) -> tuple[Landscape, int]:
     """Coarse J of everything, and how many planes of it are exact.
 
     The others keep their bound, g of the mean count: it is above the best by more than the search may be off.
+
+    Raises:
+        TaskError: no direction has a weight, or the grid of a sweep has too many mounts.
     """
-    few = len(axes.first) <= FEW_AXES
-    # caustics are as wide as the ball: a node every quarter of it, and every 0.5 deg at least
-    usual = max(180, 2 * np.pi / problem.ball_rad) if few else 90
-    half = min((MOST_NODES - 1) // 2, int(effort.fineness * usual))
-    nodes = 2 * half + 1  # odd: one at the equator, which turning round leaves where it is
-    circles = nodes - 1
-    polar = np.linspace(0, np.pi, nodes)
+    problem, limits, planes, axes = space.problem, space.limits, space.planes, space.axes
     moments = problem.objective.moments
+    nodes = (Circles if problem.sweep is None else Directions)(space, effort.fineness)
     over: dict[int, Array] = {}  # moments share fields
 
     def weights_of(field: Field) -> Array:
         if id(field) not in over:
-            over[id(field)] = weights_over_polar(field, axes.representatives, nodes, circles, problem.grid_step_deg)
+            over[id(field)] = nodes.weights(field)
         return over[id(field)]
 
-    progress("weights and outline of the region")
+    progress(f"weights of the region and mean densities of {len(planes.first):,} scan planes")
     weights = tuple(weights_of(moment.field) for moment in moments)
-    shown = np.radians(planes.settings_deg[planes.first])
-    means = in_chunks(lambda chunk: _means(problem, polar, shown[chunk]), len(shown), smallest=8)
-    mean = np.concatenate(means)
+    mean = nodes.means()
     g = np.stack([moment.g(mean) for moment in moments])
-    least = np.floor(mean / problem.lines.repeats + 1e-9) * problem.lines.repeats  # at most, until it is exact
+    blind = nodes.blind(mean)
     thin = np.zeros((0, 0), np.float32)
-    fans = fan_reach(problem, shown)
-    blind = ((polar < fans[:, :1]) | (polar > fans[:, 1:])).astype(np.float32)
     constraints: list[Constraint] = []
-    if avoid_holes:
-        constraints.append(NoHole(fans, reach_about(problem.field, axes.representatives)))
-    if limits.min_density is not None:
+    if space.avoid_holes:
+        constraints.append(nodes.no_hole(problem.field, blind, weights_of(problem.field)))
+    if limits.min_density is not None:  # at most the mean count, until it is exact
+        least = np.floor(mean / problem.lines.repeats + 1e-9) * problem.lines.repeats
         thin = (least < limits.min_density).astype(np.float32)
-        constraints.append(AtMost(thin, _within(weights_of(problem.field)), 0.5, turns=True))
+        constraints.append(AtMost(thin, nodes.inside(weights_of(problem.field)), 0.5, nodes.turns))
     if limits.max_blind_weight is not None:
-        of_axes = weights_of(problem.field).astype(np.float32)
-        constraints.append(AtMost(blind, of_axes, limits.max_blind_weight + BLIND_MARGIN, turns=True))
+        shares = weights_of(problem.field).astype(np.float32)
+        constraints.append(AtMost(blind, shares, limits.max_blind_weight + BLIND_MARGIN, nodes.turns))
     open_planes = planes.has | planes.own
 
     def lowest_of(these: slice | Ints, every: slice) -> tuple[Lowest, Lowest]:
-        orientations = [
-            both_orientations(m, of_g[these], w[every]) for m, of_g, w in zip(moments, g, weights, strict=True)
-        ]
+        sides = zip(moments, g, weights, strict=True)
+        orientations = [nodes.orientations(moment, of_g[these], w[every]) for moment, of_g, w in sides]
         feasible = [constraint.of(these, every) for constraint in constraints]
         return lowest(problem.objective, orientations, open_planes[:, these], axes.has[:, every], feasible)
 
     def look(batch: Ints) -> None:
-        g[:, batch], least[batch] = _exact(problem, polar, shown[batch])
+        g[:, batch], least = nodes.exact(batch)
         if limits.min_density is not None:
-            thin[batch] = least[batch] < limits.min_density
+            thin[batch] = least < limits.min_density
 
-    plain, feasible, exact = settled(lowest_of, look, (g.shape[1], len(axes.first)), BATCH, effort.margin, progress)
-    return Landscape(problem.objective, g, weights, blind, tuple(constraints), plain, feasible), exact
+    size = g.shape[1], len(axes.first)
+    plain, feasible, exact = settled(lowest_of, look, size, nodes.batch, effort.margin, progress)
+    return Landscape(space, nodes, problem.objective, g, weights, blind, tuple(constraints), plain, feasible), exact
 
 
 def settled(
@@ -211,38 +193,9 @@ def _may_win(bounds: Float[ndarray, "2 planes"], best: Float[ndarray, " 2"]) -> 
     return (np.isfinite(bounds) & (bounds <= best[:, None])).any(axis=0)
 
 
-def _within(weights: Array) -> Array:
-    """Nodes that lie in the region and not at its edge, 1 or 0, (axes, nodes)."""
-    there = weights > 0
-    there[:, 1:-1] &= there[:, :-2] & there[:, 2:]
-    return there.astype(np.float32)
-
-
 def _batches(bounds: Float[ndarray, "2 planes"], size: int) -> list[Ints]:
     """Planes by how far their bounds are above the lowest: the first alone, as they set the mark for all others."""
     finite = np.isfinite(bounds)
     lowest_of_all = np.where(finite.any(axis=1), np.where(finite, bounds, np.inf).min(axis=1), 0.0)
     order = np.argsort((bounds - lowest_of_all[:, None]).min(axis=0), kind="stable")
     return [order[:1], order[1:2], *(order[i : i + size] for i in range(2, len(order), size))]
-
-
-def _means(problem: Problem, polar: Array, planes_rad: Array) -> Array:
-    """Mean counts of scan planes (n, 2) at polar angles, shape (n, nodes)."""
-    beams = polar_of_planes(problem.bearings_rad, planes_rad)
-    return np.stack([mean_count(polar, row, problem.lines, problem.ball_rad) for row in beams])
-
-
-def _exact(problem: Problem, polar: Array, planes_rad: Float[ndarray, "n 2"]) -> tuple[Array, Array]:
-    """`<g(d)>` of scan planes (n, 2) at polar angles, (moments, n, nodes), and the least count there, (n, nodes)."""
-
-    def rows(plane: Array) -> tuple[Array, Array]:
-        beams, azimuths = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, *plane))
-        out = []
-        for moment in problem.objective.moments:
-            z = zones(polar, beams, azimuths, problem.lines, problem.ball_rad, moment.g)
-            out.append(z.mean_g if moment.gathered == "mean" else moment.g(z.least))
-        return np.stack(out), z.least
-
-    parts = in_chunks(lambda chunk: [rows(plane) for plane in planes_rad[chunk]], len(planes_rad), smallest=1)
-    result = [row for part in parts for row in part]
-    return np.stack([g for g, _ in result], axis=1), np.stack([least for _, least in result])

@@ -1,29 +1,29 @@
-"""What pairs of scan plane and axis must keep whatever their J, asked of the whole grid at once.
+"""What scan planes, and pairs of scan planes and axes, must keep whatever their J, for the whole grid at once.
 
-A setting is free of holes where its fan, a ball radius wider, reaches from the lowest polar angle of the region about
-the axis to the highest: two numbers of the plane, two of the axis, two comparisons a pair. A lowest density, a share
-that may be blind, and all that a sweep must not miss are sums over nodes: one more product each.
+A plane alone decides its line gaps and its blind cones, so the search never computes J of planes that break their
+limits. A pair has no hole if its fan, a ball radius wider, reaches from the lowest polar angle of the region about the
+axis to the highest: two comparisons a pair. A lowest density, a share that may be blind, and all that a sweep must not
+miss are sums over nodes: one more product each.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from scanwright.design.angles import angles_words
 from scanwright.design.arrays import Array, Ints, Mask, Setting
 from scanwright.design.concurrency.blocked_product import product
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.frames import R_rot_laser, R_world_rot
-from scanwright.design.objective.holes import NO_BLIND_WEIGHT
+from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_of_planes
+from scanwright.design.errors import TaskError
+from scanwright.design.frames import R_rot_laser
 from scanwright.design.objective.problem import Problem
-from scanwright.design.objective.score import Score, score, score_on
-from scanwright.design.search.limits import planes_keep
-from scanwright.design.sphere.outline import reach_about
-from scanwright.design.sphere.polar_rule import has_all_breaks
+from scanwright.design.search.grid_classes import Folded
 from scanwright.design.task.task import Limits
 
 TOUCHING_RAD = 1e-6  # rounding of what a fan and a region reach
@@ -99,45 +99,81 @@ def _extremes(bearings_rad: Float[ndarray, " beams"], planes_rad: Float[ndarray,
     return np.asarray(np.arctan2(np.hypot(x, y), z).T)
 
 
-@dataclass(frozen=True, slots=True)
-class Requirements:
-    """Scores settings in degrees, and refuses those that break what a search may not break."""
+def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
+    """The scan planes of the grid that keep the limits on gaps and blind cones.
 
-    problem: Problem
-    limits: Limits
-    avoid_holes: bool
-    _known: dict[tuple[float, ...], Score] = field(default_factory=dict, init=False, repr=False, compare=False)
+    Raises:
+        TaskError: none does.
+    """
+    if limits.max_line_gap_deg is None and limits.max_blind_cone_deg is None:
+        return planes
+    shown = np.radians(planes.settings_deg[planes.first])
+    gap, cone = line_gaps_deg(problem, shown), blind_cones_deg(problem, shown)
+    for name, values, limit in (
+        ("max_line_gap_deg", gap, limits.max_line_gap_deg),
+        ("max_blind_cone_deg", cone, limits.max_blind_cone_deg),
+    ):
+        if limit is not None and values.min() > limit * (1 + 1e-9) + 1e-9:
+            hint = "; a longer period narrows it" if name == "max_line_gap_deg" else ""
+            raise TaskError(f"limits.{name} = {limit:g}: the scan planes of this task reach {values.min():.3g}{hint}")
+    keep = planes_keep(problem, shown, limits)
+    if not keep.any():
+        raise TaskError("limits: no scan plane keeps max_line_gap_deg and max_blind_cone_deg at once")
+    return _only(planes, keep)
 
-    def score(self, angles_deg: Setting) -> Score | None:
-        """The exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None where it is refused.
 
-        Kept, as the steps of a search ask for the same: that of a sweep takes seconds where its J is to be exact.
-        """
-        named = tuple(np.asarray(angles_deg).tolist())
-        if named not in self._known:
-            self._known[named] = score(self.problem, np.radians(angles_deg))
-        result = self._known[named]
-        return result if self.keeps(result, angles_deg) and self._reaches_all(np.radians(angles_deg)) else None
+def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str:
+    """Why limits on the scan plane leave parts of the region blind, from the best setting without that sees all."""
+    planes_rad = np.radians(angles_deg[None, 2:])
+    gap_deg, cone_deg = float(line_gaps_deg(problem, planes_rad)[0]), float(blind_cones_deg(problem, planes_rad)[0])
+    if limits.max_line_gap_deg is not None and gap_deg > limits.max_line_gap_deg:
+        limit = f"max_line_gap_deg = {limits.max_line_gap_deg:g}"
+        lines = np.ceil(2 * np.pi / problem.lines.step_rad * gap_deg / limits.max_line_gap_deg - 1e-9)
+        period = f"{lines:.0f} lines in a turn, a period_s of {lines / problem.scan_rate_hz:.6g}"
+        cure = f"lines {gap_deg:.3g} deg apart: the limit takes {period}"
+    else:
+        limit = f"max_blind_cone_deg = {limits.max_blind_cone_deg:g}"
+        cure = f"a blind cone of {cone_deg:.3g} deg that the region does not reach"
+    return (
+        f"limits.{limit}: every scan plane that keeps it leaves a part of the region blind; "
+        f'{angles_words(angles_deg)} sees all of it and has {cure}; change the limit, or set angles.holes = "allow"'
+    )
 
-    def J(self, angles_deg: Setting, nodes: int) -> float:
-        """J on a number of nodes; inf where the setting is refused."""
-        result = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
-        return result.J if self.keeps(result, angles_deg) else np.inf
 
-    def _reaches_all(self, angles_rad: Setting) -> bool:
-        """Whether a fan reaches all of a region of many edges: between directions that stand for it is some of it."""
-        problem = self.problem
-        if not self.avoid_holes or problem.sweep is not None or has_all_breaks(problem.field):
-            return True
-        axis = R_world_rot(angles_rad[0], angles_rad[1])[None, :, 2]
-        both = NoHole(fan_reach(problem, angles_rad[None, 2:]), reach_about(problem.field, axis))
-        return not both.broken(slice(None), slice(None))[0].any()
+def planes_keep(problem: Problem, planes_rad: Float[ndarray, "n 2"], limits: Limits) -> Bool[ndarray, " n"]:
+    """Whether scan planes (n, 2) keep the limits on gaps and blind cones, shape (n,)."""
+    keep = np.ones(len(planes_rad), dtype=bool)
+    if limits.max_line_gap_deg is not None:
+        keep &= line_gaps_deg(problem, planes_rad) <= limits.max_line_gap_deg * (1 + 1e-9)
+    if limits.max_blind_cone_deg is not None:
+        keep &= blind_cones_deg(problem, planes_rad) <= limits.max_blind_cone_deg + 1e-9
+    return keep
 
-    def keeps(self, result: Score, angles_deg: Setting) -> bool:
-        """Whether a scored setting keeps the limits and, where they are to be avoided, has no hole."""
-        blind = 0.0 if self.avoid_holes else self.limits.max_blind_weight
-        if blind is not None and result.blind_weight > blind + NO_BLIND_WEIGHT:
-            return False
-        if result.least < (self.limits.min_density or 0):
-            return False
-        return bool(planes_keep(self.problem, np.radians(angles_deg[None, 2:]), self.limits)[0])
+
+def blind_cones_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
+    """Half angle of the wider blind cone about the axis, of scan planes (n, 2), shape (n,)."""
+    polar = polar_of_planes(problem.bearings_rad, planes_rad)
+    return np.degrees(np.maximum(polar.min(axis=1), np.pi - polar.max(axis=1)))
+
+
+def line_gaps_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
+    """Widest distance between neighbouring scan lines of one family, across them, of scan planes (n, 2), shape (n,)."""
+    spacings = [line_spacing(beam_directions_rot(problem.bearings_rad, *plane), plane) for plane in planes_rad]
+    return np.degrees(problem.lines.step_rad * np.array(spacings))
+
+
+def _only(planes: Folded, keep: Bool[ndarray, " classes"]) -> Folded:
+    """The classes that are kept, with their settings."""
+    numbers = np.cumsum(keep) - 1
+    feasible = keep[planes.classes]
+    places = np.cumsum(feasible) - 1
+    return replace(
+        planes,
+        settings_deg=planes.settings_deg[feasible],
+        points=planes.points[feasible],
+        classes=numbers[planes.classes[feasible]],
+        flip=planes.flip[feasible],
+        first=places[planes.first[keep]],
+        has=planes.has[:, keep],
+        own=planes.own[keep],
+    )

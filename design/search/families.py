@@ -11,33 +11,30 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.objective.problem import NODES, Problem
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import NODES
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_within
 from scanwright.design.progress import Progress, no_progress
 from scanwright.design.search.coarse import Landscape
-from scanwright.design.search.constraints import Requirements
-from scanwright.design.search.grid_classes import Folded
 from scanwright.design.search.refinement import (
     INDIFFERENT,
     NARROW,
-    VALLEY_J,
-    VALLEY_RAD,
     WIDE,
     Descent,
     allowed_setting,
     buildable_setting,
     descended,
-    same_valley,
     walked,
 )
-from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.search.space import SearchSpace
 
 FAMILIES = 10
 EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only
 SINGLE = 2e-6  # rounding of a landscape's lowest values, which are made in single precision
 MOST_WALKS = 0, 1, 16  # from each minimum, by the rounds of refinement
-NEAR_RAD = VALLEY_RAD  # nearer planes about nearer axes are neighbours
+VALLEY_J = 2e-2
+NEAR_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one result, nearer planes about them neighbours
 PIECE = 128  # planes whose J are made together
 MOST_TRIES = 80  # for local minima, before the list is left shorter
 MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
@@ -80,16 +77,15 @@ class Candidate:
     every_axis: bool
 
 
-def find_candidates(
-    land: Landscape, planes: Folded, axes: Folded, mirrors: Float[ndarray, "mirrors 2 2"], required: Requirements
-) -> list[Candidate]:
-    """Local minima of J over what keeps the constraints, lowest first, then settings on their slopes.
+def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
+    """Local minima of J over what keeps the constraints, lowest first, then mounts on their slopes.
 
     Equal ones are one. A minimum takes its valley with it: settings about nearly the same axis with nearly the same J,
     whatever the plane. What turns out to break a constraint between the nodes of the landscape is left out.
     """
+    planes, axes = land.space.planes, land.space.axes
     pieces = [slice(i, i + PIECE) for i in range(0, len(planes.first), PIECE)]
-    J = np.concatenate([_feasible_J(land, planes, axes, piece) for piece in pieces])
+    J = np.concatenate([_feasible_J(land, piece) for piece in pieces])
     every = _distinct(axes.points)
     left = J.reshape(len(J), -1).copy()
     low = left.min(axis=1)  # of each plane
@@ -110,12 +106,12 @@ def find_candidates(
         around |= np.stack([side[same[1]].any(axis=0) for side in (opposite, next_to)])
         near = [
             np.ix_(np.linalg.norm(q - sign * q[c] @ mirror, axis=1) <= NEAR_RAD, there.ravel())
-            for mirror in mirrors
+            for mirror in land.space.mirrors
             for sign, there in ((1, around), (-1, around[::-1]))
         ]
         beaten = any((J.reshape(left.shape)[block] < lowest - EQUAL).any() for block in near)
-        candidate = _candidate(J[c], planes, axes, c, orientation, axis, every)
-        exact = None if beaten else required.score(candidate.angles_deg)
+        candidate = _candidate(J[c], land, c, orientation, axis, every)
+        exact = None if beaten else space.score(candidate.angles_deg)
         if not beaten and exact is None:
             J[c][same] = left[c][same.ravel()] = np.inf
             low[c] = left[c].min()
@@ -134,28 +130,26 @@ def find_candidates(
     return minima + slopes
 
 
-def best_candidate(
-    land: Landscape, planes: Folded, axes: Folded, required: Requirements, feasible: bool = True
-) -> Candidate | None:
+def best_candidate(land: Landscape, space: SearchSpace, feasible: bool = True) -> Candidate | None:
     """The lowest entry of a landscape too large to be looked at whole, or of all that keep no constraint.
 
     None where the first `MOST_REFUSED` all break a constraint between the nodes of the landscape.
     """
     lowest = (land.feasible if feasible else land.plain).by_plane.min(axis=0)
     rows: dict[int, Array] = {}
-    every = _distinct(axes.points)
+    every = _distinct(land.space.axes.points)
     refused = 0
     while refused < MOST_REFUSED and np.isfinite(lowest.min()):
         c = int((lowest <= lowest.min() + SINGLE).argmax())
         if c not in rows:
-            rows[c] = _feasible_J(land, planes, axes, slice(c, c + 1), feasible)[0]
+            rows[c] = _feasible_J(land, slice(c, c + 1), feasible)[0]
         J = rows[c]
         if J.min() > lowest[c] + SINGLE:  # what was lowest has been refused
             lowest[c] = J.min()
             continue
         orientation, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
-        candidate = _candidate(J, planes, axes, c, int(orientation), int(axis), every)
-        exact = required.score(candidate.angles_deg)
+        candidate = _candidate(J, land, c, int(orientation), int(axis), every)
+        exact = space.score(candidate.angles_deg)
         if exact is not None:
             return replace(candidate, score=exact)
         J[J.min() + EQUAL >= J] = np.inf
@@ -164,8 +158,9 @@ def best_candidate(
     return None
 
 
-def _feasible_J(land: Landscape, planes: Folded, axes: Folded, piece: slice, feasible: bool = True) -> Array:
+def _feasible_J(land: Landscape, piece: slice, feasible: bool = True) -> Array:
     """Coarse J of a piece of the plane classes, (planes, ways round, axes): inf where the grid has none, or breaks."""
+    planes, axes = land.space.planes, land.space.axes
     p = planes.has[:, piece, None]
     there = np.stack(
         [(p[0] & axes.has[orientation]) | (p[1] & axes.has[1 - orientation]) for orientation in (0, 1)], axis=1
@@ -178,14 +173,13 @@ def _distinct(points: Float[ndarray, "n 3"]) -> int:
     return len(np.unique(np.round(points, 9) + 0.0, axis=0))
 
 
-def _candidate(
-    J: Array, planes: Folded, axes: Folded, plane: int, orientation: int, axis: int, every: int
-) -> Candidate:
+def _candidate(J: Array, land: Landscape, plane: int, orientation: int, axis: int, every: int) -> Candidate:
     """All grid settings that equal one entry by symmetry, shown by the one that builds best.
 
     `J` is that of the plane class about all axes, shape (2, axes); `orientation` is 1 if just one of plane and axis is
     flipped; `every` is how many different axes the grid has.
     """
+    planes, axes = land.space.planes, land.space.axes
     same = np.abs(J - J[orientation, axis]) <= EQUAL
     p = np.flatnonzero(planes.classes == plane)
     orientations = planes.flip[p][:, None] ^ axes.flip[None, :]
@@ -212,12 +206,7 @@ def _candidate(
 
 
 def refine_candidates(
-    problem: Problem,
-    ranges: AngleRanges,
-    candidates: list[Candidate],
-    required: Requirements,
-    rounds: int = 2,
-    progress: Progress = no_progress,
+    space: SearchSpace, candidates: list[Candidate], rounds: int = 2, progress: Progress = no_progress
 ) -> tuple[Family, ...]:
     """Refine the minima: in one round by a walk each, in two as long as walks pay, and the best of them finely.
 
@@ -226,29 +215,37 @@ def refine_candidates(
     minima = list({tuple(each.angles_deg): each for each in candidates if each.score is not None}.values())
     starts = [(candidate.angles_deg, candidate.every_axis) for candidate in minima]
     apart: list[Descent] = []
-    for descent in descended(ranges, starts, required, MOST_WALKS[rounds], progress):
+    for descent in descended(space, starts, MOST_WALKS[rounds], progress):
         if not any(same_valley(descent.angles_deg, descent.J, better.angles_deg, better.J) for better in apart):
             apart.append(descent)
 
     def finished(descent: Descent, nodes: int = WIDE.nodes) -> Family:
-        return _finished(ranges, descent, minima[descent.start], required, nodes)
+        return _finished(space, descent, minima[descent.start], nodes)
 
     parts = in_chunks(lambda some: [finished(descent) for descent in apart[some]], len(apart), smallest=1)
     ready = list(chain.from_iterable(parts))
     if MOST_WALKS[rounds] > 1:  # which is the best, exact scores tell; within a tolerance of the mounting the walks do
-        k = 0 if ranges.tolerance_deg else int(np.argmin([family.score.J for family in ready]))
-        ready[k] = finished(walked(ranges, apart[k], NARROW, required), NARROW.nodes)
+        k = 0 if space.ranges.tolerance_deg else int(np.argmin([family.score.J for family in ready]))
+        ready[k] = finished(walked(space, apart[k], NARROW), NARROW.nodes)
     families: list[Family] = []
     for family in sorted(ready, key=lambda family: family.score.J):
         if _is_apart(family.angles_deg, family.score.J, families):
             families.append(family)
     for candidate in candidates:
         if candidate.score is None and _is_apart(candidate.angles_deg, candidate.J_coarse, families):
-            result = required.score(candidate.angles_deg)
+            result = space.score(candidate.angles_deg)
             families += [] if result is None else [_family(candidate.angles_deg, result, candidate)]
-    if ranges.tolerance_deg:
-        return _by_the_worst(problem, families, np.radians(ranges.tolerance_deg))
+    if space.ranges.tolerance_deg:
+        return _by_the_worst(space, families)
     return tuple(sorted(families, key=lambda family: family.score.J))
+
+
+def same_valley(angles_deg: Setting, J: float, other_deg: Setting, other_J: float) -> bool:
+    """Whether two mounts have nearly the same axis and nearly the same J: the scan plane is then indifferent."""
+    if not abs(J - other_J) <= VALLEY_J:
+        return False
+    u, v = (R_world_rot(*np.radians(each[:2]))[:, 2] for each in (angles_deg, other_deg))
+    return bool(abs(u @ v) >= np.cos(NEAR_RAD))
 
 
 def _is_apart(angles_deg: Array | tuple[float, ...], J: float, families: list[Family]) -> bool:
@@ -257,24 +254,23 @@ def _is_apart(angles_deg: Array | tuple[float, ...], J: float, families: list[Fa
     return not known and len(families) < FAMILIES
 
 
-def _finished(
-    ranges: AngleRanges, descent: Descent, candidate: Candidate, required: Requirements, nodes: int
-) -> Family:
+def _finished(space: SearchSpace, descent: Descent, candidate: Candidate, nodes: int) -> Family:
     """A refined candidate, rounded and scored exactly; or itself, as rounder angles are better if J is as low."""
     exact = candidate.score
     assert exact is not None
-    refined = buildable_setting(ranges, descent, nodes, required, candidate.angles_deg)
-    refined, again = allowed_setting(refined, candidate.angles_deg, required)
-    if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not ranges.tolerance_deg):
+    refined = buildable_setting(space, descent, nodes, candidate.angles_deg)
+    refined, again = allowed_setting(space, refined, candidate.angles_deg)
+    if again is None or (again.J + again.J_error + INDIFFERENT >= exact.J and not space.ranges.tolerance_deg):
         return _family(candidate.angles_deg, exact, candidate)
     return _family(refined, again, candidate)
 
 
-def _by_the_worst(problem: Problem, families: list[Family], off_rad: float) -> tuple[Family, ...]:
+def _by_the_worst(space: SearchSpace, families: list[Family]) -> tuple[Family, ...]:
     """Families in the order of their highest J when one angle is off by the tolerance of the mounting."""
-    worst = [worst_within(problem, family.angles_rad, off_rad, NODES) for family in families]
+    off_deg = space.ranges.tolerance_deg
+    worst = [worst_within(space.problem, family.angles_rad, np.radians(off_deg), NODES) for family in families]
     order = np.argsort(worst, kind="stable")
-    text = [f"J <= {J:.4f} within {np.degrees(off_rad):g} deg" for J in worst]
+    text = [f"J <= {J:.4f} within {off_deg:g} deg" for J in worst]
     words = [", ".join(filter(None, [family.word, more])) for family, more in zip(families, text, strict=True)]
     return tuple(replace(families[i], word=words[i]) for i in order)
 

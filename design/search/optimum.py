@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from scanwright.design.angles import AngleSet
+from scanwright.design.angles import AngleSet, angles_words
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Shortest
@@ -200,7 +200,7 @@ def _told(family: Family) -> str:
 
 
 def _shown(family: Family) -> str:
-    return "(" + ", ".join(f"{angle:g}" for angle in np.round(family.angles_deg, 2) + 0.0) + ")"
+    return angles_words(np.round(family.angles_deg, 2) + 0.0)
 
 
 def _row(family: Family) -> str:

@@ -20,11 +20,11 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Array, Rotation, Setting, Vector
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.frames import R_world_rot
+from scanwright.design.frames import R_rot_laser, R_world_rot
 from scanwright.design.objective.score import Score
 from scanwright.design.objective.tolerance import worst_off
 from scanwright.design.progress import Progress
-from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.sphere.regions import frames_about
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 
@@ -33,37 +33,31 @@ FINEST_DEG = 0.01
 STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
 LITTLE, LUCK = 1e-3, 0.25  # of J: less is not worth a walk; what is left of a gain after a walk that gains less
 NEARLY_DEG, INDIFFERENT = 0.25, 1e-4  # to an angle of the grid; of J: about its error, 0.01 % of the beams
-VALLEY_RAD, VALLEY_J = np.radians(12.5), 2e-2  # nearer axes with nearly the same J are one answer
 PAIRS = slice(0, 2), slice(2, 4)  # of the axis, and of the scan plane
 
 
 @dataclass(frozen=True, slots=True)
-class Enough:
-    """When a simplex is small enough: in every coordinate and in its values; and the most values of its steps."""
-
-    size: float
-    spread: float
-    values: int
-
-
-@dataclass(frozen=True, slots=True)
 class Walk:
-    """A simplex: its first step in steps of the grid, the quadrature nodes of J, and its end (deg, J, values an angle).
+    """A simplex: how it begins, and when it ends.
 
     Attributes:
         reach: the first step along each coordinate, in steps of the grid.
-        nodes: of the quadrature.
-        enough: when it ends, with the values an angle.
+        nodes: of the quadrature of J.
+        size_deg: it ends if it is no larger in any coordinate,
+        spread: and if its values differ by no more.
+        values: it takes at most so many for each coordinate.
     """
 
     reach: float
     nodes: int
-    enough: Enough
+    size_deg: float
+    spread: float
+    values: int
 
 
-WIDE = Walk(0.5, 243, Enough(0.1, 1e-4, 60))
+WIDE = Walk(0.5, 243, 0.1, 1e-4, 60)
 SHRUNK = 1.0, 0.3, 0.1  # the reach of one walk after another
-NARROW = Walk(0.1, 1215, Enough(0.005, 1e-7, 30))
+NARROW = Walk(0.1, 1215, 0.005, 1e-7, 30)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +79,7 @@ class Descent:
     gain: float = np.inf
 
 
-def descended(
-    ranges: AngleRanges, starts: list[tuple[Setting, bool]], required: Requirements, most: int, progress: Progress
-) -> list[Descent]:
+def descended(space: SearchSpace, starts: list[tuple[Setting, bool]], most: int, progress: Progress) -> list[Descent]:
     """Walk from settings [deg], of which the axis may be any, at most so many times each; the lowest J first.
 
     A valley may be long and narrower than the grid: a simplex ends far from its minimum, and one that is turned goes
@@ -99,68 +91,61 @@ def descended(
         open_ = [d for d in descents if not number or (d.gain > LITTLE and d.J - d.gain < lowest)]
         if not open_:
             break
-        walks = in_chunks(partial(_walks, ranges, required, number, open_), len(open_), smallest=1)
+        walks = in_chunks(partial(_walks, space, open_, number), len(open_), smallest=1)
         further = {descent.start: descent for descent in chain.from_iterable(walks)}
         descents = [further.get(descent.start, descent) for descent in descents]
         progress("refining the minima", (number + 1) / most)
     return sorted(descents, key=lambda descent: descent.J)
 
 
-def walked(ranges: AngleRanges, descent: Descent, walk: Walk, required: Requirements, number: int = 0) -> Descent:
+def walked(space: SearchSpace, descent: Descent, walk: Walk, number: int = 0) -> Descent:
     """The lowest setting that a simplex reaches: angles that the task fixes stay, and an axis that is any.
 
     The first one has its sides along the coordinates, those of a higher number are turned.
     """
-    free, limits = _free(ranges, descent.any_axis)
+    free, limits = _free(space.ranges, descent.any_axis)
     # a count of lines that is not whole takes ten times as long and moves no minimum, but it decides the lowest count
-    exact_count = required.limits.min_density is not None
-    easier = required if exact_count else replace(required, problem=required.problem.without_seam())
-    chart = _Chart(descent.angles_deg, free, limits, on_spheres=required.problem.sweep is None)
+    exact_count = space.limits.min_density is not None
+    easier = space if exact_count else replace(space, problem=space.problem.without_seam())
+    chart = _Chart(descent.angles_deg, free, limits, on_spheres=space.problem.sweep is None)
 
     def J(moved: Array) -> float:
-        return _J_of(easier, ranges, chart.setting(moved), walk.nodes)
+        return _J_of(easier, chart.setting(moved), walk.nodes)
 
     if not free.any():
         return replace(descent, J=J(chart.origin), gain=0.0)
     sides = np.eye(free.sum())
     if number:
         sides = np.linalg.qr(np.random.default_rng(number).normal(size=sides.shape))[0]
-    sides *= walk.reach * ranges.step_deg * SHRUNK[number % len(SHRUNK)]
+    sides *= walk.reach * space.ranges.step_deg * SHRUNK[number % len(SHRUNK)]
     corners, values = _first_simplex(J, chart, sides)
-    most = replace(walk.enough, values=walk.enough.values * len(sides) - len(values))
-    lowest, value = lowest_by_simplex(J, corners, values, chart.bounds, most)
+    lowest, value = lowest_by_simplex(J, corners, values, chart.bounds, walk)
     # a walk without gain does not exclude that the next one gains
     gain = max(float(values[0]) - value, descent.gain * LUCK if number else 0.0)
     return replace(descent, angles_deg=chart.setting(lowest), J=value, gain=gain)
 
 
-def _walks(
-    ranges: AngleRanges, required: Requirements, number: int, descents: list[Descent], some: slice
-) -> list[Descent]:
-    return [walked(ranges, descent, WIDE, required, number) for descent in descents[some]]
+def _walks(space: SearchSpace, descents: list[Descent], number: int, some: slice) -> list[Descent]:
+    return [walked(space, descent, WIDE, number) for descent in descents[some]]
 
 
-def same_valley(angles_deg: Setting, J: float, other_deg: Setting, other_J: float) -> bool:
-    """Whether two settings have nearly the same axis and nearly the same J: the scan plane is then indifferent."""
-    if not abs(J - other_J) <= VALLEY_J:
-        return False
-    u, v = (R_world_rot(*np.radians(each[:2]))[:, 2] for each in (angles_deg, other_deg))
-    return bool(abs(u @ v) >= np.cos(VALLEY_RAD))
-
-
-def buildable_setting(
-    ranges: AngleRanges, descent: Descent, nodes: int, required: Requirements, otherwise: Setting
-) -> Setting:
-    """A refined setting, with angles of the grid if J is as low there, rounded to 0.01 deg within the constraints."""
-    free, limits = _free(ranges, descent.any_axis)
+def buildable_setting(space: SearchSpace, descent: Descent, nodes: int, otherwise: Setting) -> Setting:
+    """A refined mount, with angles of the grid if J is as low there, rounded to 0.01 deg within the constraints."""
+    free, limits = _free(space.ranges, descent.any_axis)
     if not free.any():
         return descent.angles_deg
-
-    def J(setting: Setting) -> float:
-        return _J_of(required, ranges, setting, nodes)
-
-    angles = _on_the_grid(descent.angles_deg, free, limits, ranges.step_deg, J)
-    return _rounded(angles, free, limits, nodes, required, otherwise)
+    step_deg = space.ranges.step_deg
+    angles = _on_the_grid(descent.angles_deg, free, limits, step_deg, lambda setting: _J_of(space, setting, nodes))
+    below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
+    corners = below + FINEST_DEG * np.array(list(product((0, 1), repeat=int(free.sum()))))
+    corners = np.clip(corners, limits[free, 0], limits[free, 1]).round(2)
+    # the nearest one may be outside the constraints, and then another one is inside
+    for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
+        setting = angles.copy()
+        setting[free] = corner
+        if np.isfinite(space.J(setting, nodes)):
+            return setting + 0.0  # -0.0 is 0.0
+    return otherwise
 
 
 def _free(ranges: AngleRanges, any_axis: bool) -> tuple[Bool[ndarray, " 4"], Float[ndarray, "4 2"]]:
@@ -171,19 +156,19 @@ def _free(ranges: AngleRanges, any_axis: bool) -> tuple[Bool[ndarray, " 4"], Flo
     return free, limits
 
 
-def _J_of(required: Requirements, ranges: AngleRanges, angles_deg: Setting, nodes: int) -> float:
-    """J of a setting, or the highest within the tolerance of the mounting; inf where the setting is refused."""
-    designed = required.J(angles_deg, nodes)
-    if not ranges.tolerance_deg or not np.isfinite(designed):
+def _J_of(space: SearchSpace, angles_deg: Setting, nodes: int) -> float:
+    """J of a mount, or the highest within the tolerance of the mounting; inf if the mount is rejected."""
+    designed, off_deg = space.J(angles_deg, nodes), space.ranges.tolerance_deg
+    if not off_deg or not np.isfinite(designed):
         return designed
-    return max(designed, worst_off(required.problem, np.radians(angles_deg), np.radians(ranges.tolerance_deg), nodes))
+    return max(designed, worst_off(space.problem, np.radians(angles_deg), np.radians(off_deg), nodes))
 
 
-def allowed_setting(refined: Setting, candidate: Setting, required: Requirements) -> tuple[Setting, Score | None]:
-    """A refined setting and its score; where all nodes refuse it, the next one on the way back to its candidate."""
+def allowed_setting(space: SearchSpace, refined: Setting, candidate: Setting) -> tuple[Setting, Score | None]:
+    """A refined mount and its score; if all nodes reject it, the next one on the way back to its candidate."""
     for share in STEPS_BACK:
         setting = ((1 - share) * refined + share * candidate).round(2) + 0.0
-        result = required.score(setting)
+        result = space.score(setting)
         if result is not None:
             return setting, result
     return candidate, None
@@ -194,7 +179,7 @@ def lowest_by_simplex(
     corners: Float[ndarray, "corners n"],
     values: Float[ndarray, " corners"],
     bounds: Float[ndarray, "n 2"],
-    enough: Enough,
+    walk: Walk,
 ) -> tuple[Float[ndarray, " n"], float]:
     """The lowest corner of a simplex that reflects, expands and contracts (Nelder and Mead 1965), and its value.
 
@@ -203,10 +188,10 @@ def lowest_by_simplex(
         corners: the first simplex, one corner more than coordinates.
         values: of its corners.
         bounds: lowest and highest of each coordinate; points beyond are moved there.
-        enough: when it ends.
+        walk: when it ends; the values of the first simplex count.
     """
     corners, values = corners.copy(), values.copy()
-    left = enough.values
+    left = walk.values * corners.shape[1] - len(values)
 
     def tried(point: Array) -> tuple[Array, float]:
         nonlocal left
@@ -217,8 +202,8 @@ def lowest_by_simplex(
     while True:
         order = np.argsort(values, kind="stable")
         corners, values = corners[order], values[order]
-        small = np.abs(corners[1:] - corners[0]).max(initial=0.0) <= enough.size  # one corner: no angle is free
-        if left < STEP or (small and not values[-1] - values[0] > enough.spread):
+        small = np.abs(corners[1:] - corners[0]).max(initial=0.0) <= walk.size_deg  # one corner: no angle is free
+        if left < STEP or (small and not values[-1] - values[0] > walk.spread):
             return corners[0], float(values[0])
         middle = corners[:-1].mean(axis=0)
         away = middle - corners[-1]
@@ -239,13 +224,9 @@ def lowest_by_simplex(
 
 
 class _Chart:
-    """Coordinates [deg] about a setting, as many as angles are free; `bounds` are their limits, (free, 2).
+    """Coordinates [deg] about a mount, as many as angles are free; `bounds` are their limits, (free, 2).
 
-    Args:
-        angles_deg: the setting.
-        free: which of its angles may move.
-        limits_deg: lowest and highest of each angle, (4, 2).
-        on_spheres: whether a pair that is free moves on its sphere; else each coordinate is an angle.
+    A pair of free angles moves on its sphere if `on_spheres`; else each coordinate is an angle.
     """
 
     def __init__(
@@ -253,8 +234,8 @@ class _Chart:
     ) -> None:
         self._angles, self._free, self._limits = angles_deg, free, limits_deg
         self._on_sphere = [on_spheres and bool(free[pair].all()) for pair in PAIRS]
-        poles = [_pole_of_axis(angles_deg[PAIRS[0]]), _pole_of_plane(angles_deg[PAIRS[1]])]
-        self._frames = frames_about(np.stack(poles))
+        axis, plane = (np.radians(angles_deg[pair]) for pair in PAIRS)
+        self._frames = frames_about(np.stack([R_world_rot(*axis)[:, 2], R_rot_laser(*plane)[2]]))
         spherical = np.repeat(self._on_sphere, 2)
         self.origin = np.where(spherical, 0.0, angles_deg)[free]
         self.bounds = np.where(spherical[:, None], [[-np.inf, np.inf]], limits_deg)[free]
@@ -272,20 +253,8 @@ class _Chart:
         return np.clip(result, *self._limits.T)
 
 
-def _pole_of_axis(pair_deg: Array) -> Vector:
-    """Where the axis of (alpha_rot, beta_rot) points in the world."""
-    alpha, beta = np.radians(pair_deg)
-    return np.array([np.sin(beta), -np.sin(alpha) * np.cos(beta), np.cos(alpha) * np.cos(beta)])
-
-
 def _axis_of(u: Vector) -> Array:
     return np.degrees([np.arctan2(-u[1], u[2]), np.arcsin(np.clip(u[0], -1, 1))])
-
-
-def _pole_of_plane(pair_deg: Array) -> Vector:
-    """The axis in the laser frame of (alpha_laser, beta_laser)."""
-    alpha, beta = np.radians(pair_deg)
-    return np.array([-np.sin(beta), np.cos(beta) * np.sin(alpha), np.cos(beta) * np.cos(alpha)])
 
 
 def _plane_of(q: Vector) -> Array:
@@ -325,18 +294,3 @@ def _on_the_grid(
         if abs(rounder[i] - angles[i]) <= NEARLY_DEG and J(rounder) <= most:
             angles = rounder
     return angles
-
-
-def _rounded(
-    angles: Setting, free: Bool[ndarray, " 4"], limits: Array, nodes: int, required: Requirements, otherwise: Setting
-) -> Setting:
-    """The nearest of the rounded settings around it: rounding may leave the constraints, and then another one is."""
-    below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
-    corners = below + FINEST_DEG * np.array(list(product((0, 1), repeat=int(free.sum()))))
-    corners = np.clip(corners, limits[free, 0], limits[free, 1]).round(2)
-    for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
-        setting = angles.copy()
-        setting[free] = corner
-        if np.isfinite(required.J(setting, nodes)):
-            return setting + 0.0  # -0.0 is 0.0
-    return otherwise

@@ -15,11 +15,11 @@ from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.objective.score import score
 from scanwright.design.progress import Progress
-from scanwright.design.search.constraints import Requirements
+from scanwright.design.search.constraints import line_gaps_deg
 from scanwright.design.search.families import Family
-from scanwright.design.search.limits import line_gaps_deg
 from scanwright.design.search.mounts.simplest import simplest_first
 from scanwright.design.search.search import SearchResult, search
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.named_products import fastest_rpm
 from scanwright.design.task.task import LoadedTask
 
@@ -37,12 +37,12 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
     Raises:
         TaskError: the limits are not kept even at `longest_s`.
     """
-    motion, limits = loaded.task.motion, loaded.task.limits
+    motion, limits, ranges = loaded.task.motion, loaded.task.limits, loaded.task.angles
     assert isinstance(motion, Shortest)
     now = _at(loaded, motion.longest_s)
     problem = problem_of(now)
     try:
-        result = search(problem, now.task.angles, progress, limits)
+        result = search(problem, ranges, progress, limits)
     except TaskError as error:
         raise TaskError(f"{loaded.source}: even with motion.longest_s = {motion.longest_s:g}: {error}") from error
     for _ in range(ROUNDS):
@@ -54,13 +54,14 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
         now = _at(loaded, period)
         problem = problem_of(now)
         able = _rescored(problem, result.best, periods, period)
-        required = Requirements(problem, limits, now.task.angles.holes == "avoid" and result.least_blind is None)
-        if now.task.angles.prefer == "simple":
-            result = replace(result, best=simplest_first(required, now.task.angles, able), lowest=able[0])
+        if ranges.prefer == "simple":
+            avoid = ranges.holes == "avoid" and result.least_blind is None
+            space = SearchSpace(problem, ranges, limits, avoid)
+            result = replace(result, best=simplest_first(space, able), lowest=able[0])
         else:
             result = replace(result, best=able)
         try:
-            result = search(problem, now.task.angles, progress, limits)
+            result = search(problem, ranges, progress, limits)
         except TaskError:  # none of the families of this period is the one that allows it: that one stays
             break
     return now, problem, result

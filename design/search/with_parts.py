@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from scanwright.design.angles import angles_words
 from scanwright.design.arrays import Setting
 from scanwright.design.density.ball_count import ball_count
 from scanwright.design.density.beams import scan_at
@@ -83,10 +84,9 @@ class Chosen:
 
     def lines(self) -> list[str]:
         """Return the chosen mount, and the rejected ones with reasons."""
-        setting = ", ".join(f"{angle:g}" for angle in self.family.angles_deg)
         lines = [
-            f"built ({setting}): J = {self.bare.J:.4f} without parts; considered {self.bounded} mounts, "
-            f"built {self.built}, rejected {len(self.refused)}",
+            f"built {angles_words(self.family.angles_deg)}: J = {self.bare.J:.4f} without parts; "
+            f"considered {self.bounded} mounts, built {self.built}, rejected {len(self.refused)}",
             *(f"rejected {reason}" for reason in self.refused),
         ]
         if self.open:
@@ -134,12 +134,12 @@ def choose_with_parts(
         bounds = []
         for angles_deg in equivalents(problem, family.angles_deg, ranges):
             if angles_deg in failed:
-                refused.append(f"{_shown(angles_deg)}: its parts fail a check: {failed[angles_deg]}")
+                refused.append(f"{angles_words(angles_deg)}: its parts fail a check: {failed[angles_deg]}")
                 continue
             bound = workshop.bound(np.radians(angles_deg))
             bounded += 1
             if isinstance(bound, Refused):
-                refused.append(f"{_shown(angles_deg)}: {bound.reason}")
+                refused.append(f"{angles_words(angles_deg)}: {bound.reason}")
                 continue
             bare = score(problem.behind(bound), np.radians(angles_deg))
             turned = simple and angles_deg != family.angles_deg
@@ -148,15 +148,17 @@ def choose_with_parts(
         for blind, _, J, angles_deg in sorted(bounds, key=lambda bound: (*bound[:2], round(bound[2], 3)))[:1]:
             if lowest is not None and lowest <= (blind, first, J):
                 continue
-            progress(f"beams blocked by the parts of {_shown(angles_deg)}")
+            progress(f"beams blocked by the parts of {angles_words(angles_deg)}")
             built += 1
             shadow = workshop.shadow(np.radians(angles_deg))
             if isinstance(shadow, Refused):
-                refused.append(f"{_shown(angles_deg)}: {shadow.reason}")
+                refused.append(f"{angles_words(angles_deg)}: {shadow.reason}")
                 continue
             hidden = shadow.share()
             if limits.max_blocked is not None and hidden > limits.max_blocked:
-                refused.append(f"{_shown(angles_deg)}: the parts block {hidden:.1%} of the beams (limits.max_blocked)")
+                refused.append(
+                    f"{angles_words(angles_deg)}: the parts block {hidden:.1%} of the beams (limits.max_blocked)"
+                )
                 continue
             result = score_with(problem, np.radians(angles_deg), shadow)
             rank = _blind(result, avoid), first, result.J
@@ -253,7 +255,3 @@ def _sampled(
         g = [moment.g(problem.lines.repeats * count) for count in counts]
         out.append([each.max() if moment.gathered == "highest" else share @ each for each in g])
     return np.array(out).T, blinded, min(lowest)
-
-
-def _shown(angles_deg: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{angle:g}" for angle in angles_deg) + ")"

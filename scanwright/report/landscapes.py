@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from scanwright.design.angles import AngleSet, standard_settings
+from scanwright.design.angles import AngleSet, angles_words, standard_settings
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.evaluation.landscape_picture import LandscapePanel, draw_landscape
 from scanwright.design.evaluation.picture_files import svg_bytes
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT, holes, percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import score
-from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.optimum import price
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.task import Task
 from scanwright.report.build_files import data_uri
 
@@ -70,9 +70,9 @@ def other_mounts(problem: Problem, task: Task, setting: Setting, planes: Array) 
     """
     own = score(problem, setting)
     avoid = task.angles.holes == "avoid" and own.blind_weight <= NO_BLIND_WEIGHT
-    required = Requirements(problem, task.limits, avoid)
+    space = SearchSpace(problem, task.angles, task.limits, avoid)
     lowest = planes[np.argsort(planes[:, 2], kind="stable")][:ROWS]
-    mounts = [_mount(required, row[[3, 4, 0, 1]]) for row in lowest if np.isfinite(row[2])]
+    mounts = [_mount(space, row[[3, 4, 0, 1]]) for row in lowest if np.isfinite(row[2])]
     ordered = sorted(mounts, key=lambda mount: mount.J)
     return OtherMounts(
         within=tuple(mount for mount in ordered if not mount.breaks),
@@ -81,20 +81,19 @@ def other_mounts(problem: Problem, task: Task, setting: Setting, planes: Array) 
     )
 
 
-def _mount(required: Requirements, angles_deg: Setting) -> OtherMount:
-    own = score(required.problem, np.radians(angles_deg))
-    breaks = "" if required.keeps(own, angles_deg) else "breaks the limits"
-    blind = required.avoid_holes and own.blind_weight > NO_BLIND_WEIGHT
+def _mount(space: SearchSpace, angles_deg: Setting) -> OtherMount:
+    own = score(space.problem, np.radians(angles_deg))
+    breaks = "" if space.keeps(own, angles_deg) else "breaks the limits"
+    blind = space.avoid_holes and own.blind_weight > NO_BLIND_WEIGHT
     if blind:
         breaks = f"blind to {percent(own.blind_weight)} of the weight"
     return OtherMount(tuple(angles_deg.tolist()), own.J, breaks, blind)
 
 
 def _alone(problem: Problem, mount: OtherMount, J: float) -> str:
-    angles = ", ".join(f"{angle:g}" for angle in mount.angles_deg)
     blind = "; ".join(hole.words() for hole in holes(problem, np.radians(mount.angles_deg)))
     return (
-        f"Without blind spots and limits, ({angles}) with J = {mount.J:.4f} would be best, which "
+        f"Without blind spots and limits, {angles_words(mount.angles_deg)} with J = {mount.J:.4f} would be best, which "
         f"{f'is {blind}' if mount.blind else 'breaks the limits of the task'}. "
         f"Keeping the requirements of the task costs {price(problem, J, mount.J)}."
     )

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 LINT = Path(sys.executable).with_name("lint-imports")
 CONTRACTS = [c["id"] for c in tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]]
 INTRUDERS = {  # contract -> a file, and an import in it that breaks that one
-    "design": ("design/sphere/regions.py", "import scanwright.design.search.limits"),
+    "design": ("design/sphere/regions.py", "import scanwright.design.search.constraints"),
     "cad": ("cad/layout/deck.py", "import scanwright.cad.parts.base_mount"),
     "cad-layout": ("cad/layout/deck.py", "import scanwright.cad.solids"),
     "cad-layout-steps": ("cad/layout/direct/stack.py", "import scanwright.cad.layout.deck"),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from scanwright.design.angles import angles_words
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.stated_error import error_words
@@ -53,7 +54,7 @@ class Gain:
         if self.factor is None:
             J += f" +- {error_words(self.mount.score.J, self.mount.score.J_error)}"
         inside = "; ".join(filter(None, [J, self.flaws]))
-        return f"{self.value} {self.mount.name} {_four(self.mount.angles_deg)}: {inside}"
+        return f"{self.value} {self.mount.name} {angles_words(self.mount.angles_deg)}: {inside}"
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
@@ -100,7 +101,7 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     assert best.factor is not None
     how = f"better ({1 / best.factor:.2f} times the beams)" if better else f"as good within {AS_GOOD - 1:.0%}"
     rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""
-    return [f"{best.mount.name} {_four(best.mount.angles_deg)} is {how}{rest}"]
+    return [f"{best.mount.name} {angles_words(best.mount.angles_deg)} is {how}{rest}"]
 
 
 def _better(gain: Gain) -> bool:
@@ -112,7 +113,3 @@ def _against(gain: Gain) -> str:
     """What speaks against a mount."""
     flaws = gain.flaws if not gain.flaws or gain.flaws.startswith("breaks") else f"is {gain.flaws}"
     return ", ".join(filter(None, [flaws, "" if gain.mount.in_ranges else "the angles of the task exclude it"]))
-
-
-def _four(angles_deg: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{angle:g}" for angle in angles_deg) + ")"

@@ -21,8 +21,8 @@ from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.arrays import Setting
 from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.score import Score, bound_J, score, score_on
-from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.grid_classes import mirrors_of
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.search.with_parts import equivalents
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import Task
@@ -98,13 +98,13 @@ def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
     Raises:
         TaskError: no direction has a weight.
     """
-    limits = Requirements(problem, task.limits, avoid_holes=False)
     if problem.sweep is not None:
         tolerance = max(problem.tolerance, SWEEP_TOLERANCE)
         problem = replace(problem, tolerance=tolerance, nodes=min(problem.nodes, SWEEP_NODES))
-    required = Requirements(problem, task.limits, task.angles.holes == "avoid")
+    space = SearchSpace(problem, task.angles, task.limits, task.angles.holes == "avoid")
+    limits = replace(space, avoid_holes=False)
     result = [(name, angles_deg, score(problem, np.radians(angles_deg))) for name, angles_deg in STANDARD_DEG.items()]
-    result += [(name, *_tuned(required, lines)) for name, lines in TUNED.items()]
+    result += [(name, *_tuned(space, lines)) for name, lines in TUNED.items()]
     out = []
     for name, angles_deg, judged in result:
         keeps_limits = limits.keeps(judged, np.array(angles_deg))
@@ -113,9 +113,9 @@ def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
     return tuple(out)
 
 
-def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, Score]:
+def _tuned(space: SearchSpace, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, Score]:
     """The best setting of some lines, found by quick scores, and its exact score."""
-    problem = required.problem
+    problem = space.problem
     known: dict[Four, tuple[bool, float]] = {}
     places: list[tuple[OneFreeAngle, float]] = []
 
@@ -124,7 +124,7 @@ def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Fou
             setting = line.at(angle_deg)
             if setting not in known:
                 quick = score_on(problem, np.radians(setting), QUICK_NODES, stated=False)
-                known[setting] = (not required.keeps(quick, np.array(setting)), quick.J)
+                known[setting] = (not space.keeps(quick, np.array(setting)), quick.J)
                 places.append((line, angle_deg))
 
     first: list[tuple[OneFreeAngle, Setting]] = []
@@ -145,9 +145,9 @@ def _tuned(required: Requirements, lines: tuple[OneFreeAngle, ...]) -> tuple[Fou
         look(line, angle_deg + step_deg * np.arange(-AROUND, AROUND + 1))
     ordered = sorted(known, key=known.__getitem__)
     for setting in [each for each in ordered if not known[each][0]][:LOOKS]:
-        if (result := required.score(np.array(setting))) is not None:
+        if (result := space.score(np.array(setting))) is not None:
             return setting, result
-    return ordered[0], score(required.problem, np.radians(ordered[0]))
+    return ordered[0], score(space.problem, np.radians(ordered[0]))
 
 
 def _same(problem: Problem, angles_deg: Four) -> list[Four]:

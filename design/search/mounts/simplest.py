@@ -14,31 +14,31 @@ import numpy as np
 from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem
-from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import EQUAL, Family
 from scanwright.design.search.mounts.reference import QUICK_NODES, TUNED, Four, angles_used
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 
 ROUGH_J = 0.05  # a quick J may be too high by this: then the exact one decides
 
 
-def simplest_first(required: Requirements, ranges: AngleRanges, families: tuple[Family, ...]) -> tuple[Family, ...]:
+def simplest_first(space: SearchSpace, families: tuple[Family, ...]) -> tuple[Family, ...]:
     """Put the simplest mount that costs at most `prefer_loss` before the families of a search, lowest J first.
 
     Simplest: the fewest angles that are not 0, then the lowest J. It keeps the limits, and has no hole if the optimum
     has none.
     """
-    optimum = families[0]
-    most_J = highest_J(required.problem, optimum.score.J, ranges.prefer_loss)
+    ranges, optimum = space.ranges, families[0]
+    most_J = highest_J(space.problem, optimum.score.J, ranges.prefer_loss)
     free = optimum.score.blind_weight <= NO_BLIND_WEIGHT
-    required = replace(required, avoid_holes=required.avoid_holes or free)
+    space = replace(space, avoid_holes=space.avoid_holes or free)
     known = {family.angles_deg: family for family in families if most_J + EQUAL >= family.score.J}
-    quick = {setting: required.J(np.array(setting), QUICK_NODES) for setting in _simple_settings(ranges)}
+    quick = {setting: space.J(np.array(setting), QUICK_NODES) for setting in _simple_settings(ranges)}
     quick |= {angles_deg: family.score.J for angles_deg, family in known.items()}
     near = [setting for setting, J in quick.items() if most_J + ROUGH_J >= J]
     answer = optimum
     for setting in sorted(near, key=lambda setting: (angles_used(setting), quick[setting])):
-        result = required.score(np.array(setting))
+        result = space.score(np.array(setting))
         if result is not None and most_J + EQUAL >= result.J:
             answer = known.get(setting) or Family(setting, result, 1, "")
             break

@@ -14,7 +14,7 @@ from scanwright.design.evaluation.metres import PlaneFigures, on_planes, planes_
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
 from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.score import Score, score, score_on
-from scanwright.design.search.limits import blind_cones_deg, line_gaps_deg
+from scanwright.design.search.constraints import blind_cones_deg, line_gaps_deg
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.task.task import Limits, LoadedTask

@@ -22,6 +22,7 @@ from scanwright.design.search.coarse import Effort, coarse_landscape
 from scanwright.design.search.grid_classes import fold_axes, fold_planes, mirrors_of, unfolded
 from scanwright.design.search.optimum import directions_left_out
 from scanwright.design.search.search import search
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.sphere import polar_rule
 from scanwright.design.sphere.directions import Samples, spiral
 from scanwright.design.sphere.polar_rule import breaks_of
@@ -109,7 +110,9 @@ def test_equivalent_settings_folded_and_not(sensor):
     assert len(folded[0].first) * len(folded[1].first) < 0.3 * len(whole[0].first) * len(whole[1].first)
     lowest = []
     for axes, planes in (folded, whole):
-        land, _ = coarse_landscape(problem, planes, axes, no_progress, Limits(), avoid_holes=False, effort=EXACT)
+        space = SearchSpace(problem, ranges, Limits(), avoid_holes=False)
+        vars(space).update(planes=planes, axes=axes)
+        land, _ = coarse_landscape(space, no_progress, EXACT)
         by_plane = land.plain.by_plane[planes.flip.astype(int), planes.classes]
         lowest.append((by_plane, land.plain.by_axis[axes.flip.astype(int), axes.classes]))
     for of_folded, of_whole in zip(*lowest, strict=True):

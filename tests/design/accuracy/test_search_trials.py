@@ -42,5 +42,5 @@ def test_ways_to_compute_J_of_a_sweep(tmp_path, monkeypatch):
     angles = loaded.task.angles.model_copy(update=fixed)
     one = replace(loaded, task=loaded.task.model_copy(update={"angles": angles}))
     report_precision(one, tmp_path, no_progress)
-    directions, ball = (float(row["J_error"]) for row in rows_of(tmp_path / "work_precision.csv"))
+    directions, ball = (float(row["error"]) for row in rows_of(tmp_path / "work_precision.csv"))
     assert directions < 2e-3 < ball < 3e-2

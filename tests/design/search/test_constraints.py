@@ -1,5 +1,6 @@
 """Holes and limits as constraints of the whole grid, against a loop over every setting of it."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -10,12 +11,15 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.scene.surface import cell_directions
 from scanwright.design.search import families, refinement
-from scanwright.design.search.constraints import Requirements, fan_reach
+from scanwright.design.search.constraints import fan_reach
 from scanwright.design.search.search import search
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.sphere.directions import weighted_samples
 from scanwright.design.sphere.outline import reach_about
-from scanwright.design.task.angle_ranges import NAMES
+from scanwright.design.sphere.polar_rule import has_all_breaks
+from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 from scanwright.design.task.task import Limits, LoadedTask, Task
 
 AHEAD = {"shape": "band", "theta_deg": [95, 140], "phi_deg": [-50, 50]}
@@ -103,14 +107,34 @@ def test_a_minimum_that_all_nodes_refuse_is_left_for_the_nearest_place_on_the_wa
     leader, refined = np.zeros(4), np.array([4.0, -2.0, 1.0, 0.0])
     kept = Score(J=-1.0, J_error=1e-4, J_lower=-1.1, least=1, blind_weight=0.0)
 
-    class Edge(Requirements):
+    class Edge(SearchSpace):
         def score(self, angles_deg):
             return kept if angles_deg[0] <= 3.5 else None
 
-    edge = Edge(problem_of(loaded()), Limits(), True)
-    setting, found = refinement.allowed_setting(refined, leader, edge)
+    edge = Edge(problem_of(loaded()), AngleRanges(), Limits(), True)
+    setting, found = refinement.allowed_setting(edge, refined, leader)
     assert found == kept and setting.tolist() == [3.4, -1.7, 0.85, 0.0]
-    assert refinement.allowed_setting(refined + 9, leader + 9, edge)[1] is None
+    assert refinement.allowed_setting(edge, refined + 9, leader + 9)[1] is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_walk_ends_where_a_fan_no_longer_reaches_a_corner_of_a_painted_region(seed):
+    """Walks went on until directions that represent the region were missed: the way back cost 1e-3 of J."""
+    rng = np.random.default_rng(seed)
+    cells = cell_directions(4.0)
+    centres = rng.normal(size=(6, 3))
+    reach = np.cos(np.radians(rng.uniform(5, 25, 6))) * np.linalg.norm(centres, axis=1)
+    table = (cells @ centres.T >= reach).any(axis=2).astype(float)
+    task = replace(loaded(weight=[{"shape": "map", "file": "discs.npy"}]), maps=(table,))
+    space = SearchSpace(problem_of(task), AngleRanges(), Limits(), True)
+    assert not has_all_breaks(space.problem.field)
+    settings = rng.uniform([-180, -90, -90, -90], [180, 90, 90, 90], (30, 4))
+    seen = np.array([np.isfinite(space.J(setting, 81)) for setting in settings])
+    inside, outside = settings[seen][0], settings[~seen][0]
+    for _ in range(12):
+        middle = (inside + outside) / 2
+        inside, outside = (middle, outside) if space.score(middle) else (inside, middle)
+    assert np.isfinite(space.J(inside, 81)) and np.isinf(space.J(outside, 81))
 
 
 def test_where_nothing_is_free_of_holes_the_smallest_share_is_told(monkeypatch):

@@ -18,8 +18,8 @@ from scanwright.design.objective.tolerance import rise_words, sensitivity, worst
 from scanwright.design.progress import no_progress
 from scanwright.design.search import families
 from scanwright.design.search import search as search_module
+from scanwright.design.search.constraints import allowed_planes
 from scanwright.design.search.grid_classes import fold_planes, mirrors_of
-from scanwright.design.search.limits import allowed_planes
 from scanwright.design.search.search import search
 from scanwright.design.search.shortest_period import fastest
 from scanwright.design.sphere.directions import weighted_samples
@@ -186,12 +186,12 @@ def test_holes_between_the_nodes_of_every_setting_are_no_refusal(monkeypatch):
     """A task without limits has an answer where no setting is free of holes, even if none shows them at the nodes."""
     real = search_module.best_candidate
 
-    def with_holes(land, planes, axes, required, **more):
-        return None if required.avoid_holes else real(land, planes, axes, required, **more)
+    def with_holes(land, space, **more):
+        return None if space.avoid_holes else real(land, space, **more)
 
     task, told = loaded(angles=ANGLES | {"step_deg": 45}), []
     free = search(problem_of(task), task.task.angles)
     monkeypatch.setattr(search_module, "best_candidate", with_holes)
     found = search(problem_of(task), task.task.angles, lambda step, _=None: told.append(step))
     assert found.best[0].score.J <= free.best[0].score.J and found.least_blind is not None
-    assert "no setting of the grid sees all of the region: the lowest J of all" in told
+    assert "no mount of the grid sees all of the region: the lowest J of all" in told

@@ -10,12 +10,12 @@ from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.progress import no_progress
-from scanwright.design.search.constraints import Requirements
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.gain import gain_lines, gains
 from scanwright.design.search.mounts.reference import angles_used, reference_mounts
 from scanwright.design.search.mounts.simplest import simplest_first
 from scanwright.design.search.optimum import find_optimum
+from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import Limits, load_task
 
@@ -67,7 +67,7 @@ def test_each_mount_has_the_j_of_its_angles_and_the_first_factor_is_the_smallest
 def test_no_setting_of_a_mount_that_keeps_what_the_task_asks_is_better_than_the_tuned_one():
     loaded = task(limits={"max_blind_cone_deg": 60.0})
     problem, mounts = mounts_of(loaded)
-    required = Requirements(problem, loaded.task.limits, avoid_holes=True)
+    required = SearchSpace(problem, loaded.task.angles, loaded.task.limits, avoid_holes=True)
     *_, upright, bonn = mounts
     tilts = [(0, 0, tilt, 0) for tilt in range(-90, 91, 6)] + [(0, 0, 0, tilt) for tilt in range(-90, 91, 6)]
     twists = [(180, 45, 90, twist) for twist in range(-90, -44, 5)]
@@ -132,8 +132,8 @@ def test_the_simplest_mount_costs_no_more_than_accepted_and_breaks_nothing(seed)
     limits = Limits(max_blind_cone_deg=float(rng.uniform(40, 90)))
     lowest, *_ = families = families_of(rng, loaded, problem)
     free = lowest.score.blind_weight <= NO_BLIND_WEIGHT
-    required = Requirements(problem, limits, avoid_holes=False)
-    answer, *rest = simplest_first(required, ranges, families)
+    required = SearchSpace(problem, ranges, limits, avoid_holes=False)
+    answer, *rest = simplest_first(required, families)
     assert answer.score.J == score(problem, answer.angles_rad).J and ranges.hold(answer.angles_deg)
     assert np.exp(lowest.score.J - answer.score.J) >= 1 - loss - 1e-6
     same = {family.angles_deg for family in families} - {answer.angles_deg}

@@ -1,0 +1,107 @@
+"""The mounts of one search: the task as numbers, its grid in groups of equal J, what they must keep, their scores."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from scanwright.design.arrays import Setting
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.holes import NO_BLIND_WEIGHT
+from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import Score, score, score_on
+from scanwright.design.search.constraints import NoHole, allowed_planes, fan_reach, planes_keep
+from scanwright.design.search.grid_classes import Folded, fold_axes, fold_planes, mirrors_of, unfolded
+from scanwright.design.sphere.outline import reach_about
+from scanwright.design.sphere.polar_rule import has_all_breaks
+from scanwright.design.task.angle_ranges import AngleRanges
+from scanwright.design.task.task import Limits
+
+
+@dataclass(frozen=True)
+class SearchSpace:
+    """The mounts of a search, and what rejects some of them.
+
+    Attributes:
+        problem: the task as numbers.
+        ranges: of the angles.
+        limits: of the task.
+        avoid_holes: whether a mount with a blind spot is rejected.
+    """
+
+    problem: Problem
+    ranges: AngleRanges
+    limits: Limits
+    avoid_holes: bool
+    _scores: dict[tuple[float, ...], Score] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @cached_property
+    def mirrors(self) -> Float[ndarray, "mirrors 2 2"]:
+        """Mirrors of the scan plane that leave J as it is; of a sweep the identity alone."""
+        return mirrors_of(self.problem.bearings_rad)[: None if self.problem.sweep is None else 1]
+
+    @cached_property
+    def planes(self) -> Folded:
+        """Scan planes of the grid that keep the limits.
+
+        Raises:
+            TaskError: none does.
+        """
+        sweep = self.problem.sweep is not None
+        every = unfolded(self.ranges)[1] if sweep else fold_planes(self.ranges, self.mirrors)
+        return allowed_planes(self.problem, every, self.limits)
+
+    @cached_property
+    def axes(self) -> Folded:
+        """Axes of the grid."""
+        return fold_axes(self.ranges) if self.problem.sweep is None else unfolded(self.ranges)[0]
+
+    @property
+    def covered(self) -> int:
+        """Mounts of the grid."""
+        return len(self.planes.settings_deg) * len(self.axes.settings_deg)
+
+    @property
+    def different(self) -> int:
+        """Number of different J: every pair of classes both ways round, but once if both come in one way only."""
+        planes, axes = self.planes, self.axes
+        one_way = int((~(planes.has | planes.own).all(axis=0)).sum()) * int((~axes.has.all(axis=0)).sum())
+        return 2 * len(planes.first) * len(axes.first) - one_way
+
+    def score(self, angles_deg: Setting) -> Score | None:
+        """The exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None if the mount is rejected.
+
+        Kept, as several steps of a search need the same: an exact one of a sweep takes seconds.
+        """
+        named = tuple(np.asarray(angles_deg).tolist())
+        if named not in self._scores:
+            self._scores[named] = score(self.problem, np.radians(angles_deg))
+        result = self._scores[named]
+        return result if self.keeps(result, angles_deg) and self._reaches_all(angles_deg) else None
+
+    def J(self, angles_deg: Setting, nodes: int) -> float:
+        """J on a number of nodes; inf if the mount is rejected."""
+        result = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
+        return result.J if self.keeps(result, angles_deg) and self._reaches_all(angles_deg) else np.inf
+
+    def keeps(self, result: Score, angles_deg: Setting) -> bool:
+        """Whether a scored mount keeps the limits and, if they are to be avoided, has no hole."""
+        blind = 0.0 if self.avoid_holes else self.limits.max_blind_weight
+        if blind is not None and result.blind_weight > blind + NO_BLIND_WEIGHT:
+            return False
+        if result.least < (self.limits.min_density or 0):
+            return False
+        return bool(planes_keep(self.problem, np.radians(angles_deg[None, 2:]), self.limits)[0])
+
+    def _reaches_all(self, angles_deg: Setting) -> bool:
+        """Whether a fan reaches all of a region of many edges, also between the directions that represent it."""
+        problem, angles_rad = self.problem, np.radians(angles_deg)
+        if not self.avoid_holes or problem.sweep is not None or has_all_breaks(problem.field):
+            return True
+        axis = R_world_rot(angles_rad[0], angles_rad[1])[None, :, 2]
+        both = NoHole(fan_reach(problem, angles_rad[None, 2:]), reach_about(problem.field, axis))
+        return not both.broken(slice(None), slice(None))[0].any()
