@@ -24,7 +24,6 @@ EXAMPLE = bytes.fromhex(
 def patience(monkeypatch):
     """Emulators share a computer with the tests: ten times as long."""
     monkeypatch.setattr(driver, "_FIRST_PACKETS_S", 5.0)
-    monkeypatch.setattr(driver, "_TURN_S", 10.0)
 
 
 def lidar(model):

@@ -44,7 +44,6 @@ DESCRIPTORS = [
 def patience(monkeypatch):
     """Emulators share a computer with the tests: wait ten times as long."""
     monkeypatch.setattr(dialogue, "_ANSWER_S", 2.0)
-    monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
     monkeypatch.setattr(world, "SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`

@@ -5,19 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from virtual_line import VirtualLine
+from virtual_time import replace_time
 
 from scanwright.design.errors import DeviceError, DeviceFaultError
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.families import FAMILIES, family_of, open_lidar
-from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
-from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
-from scanwright.firmware_io.lidar.scip import dialogue as scip_dialogue
 from scanwright.firmware_io.lidar.scip import driver as scip
-from scanwright.firmware_io.lidar.sick import dialogue as cola
-from scanwright.firmware_io.lidar.sick import driver as sick
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
-from scanwright.firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
-from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 from scanwright.firmware_io.scan import doctor, lidar_scans
 from scanwright.firmware_io.scan.reporter import Reporter
 
@@ -56,19 +50,7 @@ class Scanner:
 def line(request, monkeypatch):
     line = VirtualLine(request.param, wall)
     line.machine.baud = 500_000  # of those that have a speed: no such line here
-    for module in (
-        sensor_line,
-        ldrobot,
-        lms2xx,
-        scip_dialogue,
-        scip,
-        cola,
-        sick,
-        slamtec_dialogue,
-        slamtec,
-        lidar_scans,
-    ):
-        monkeypatch.setattr(module, "time", line)
+    replace_time(line, monkeypatch, "scanwright.firmware_io.lidar", "scanwright.firmware_io.scan")
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     monkeypatch.setattr(scip, "lidar_ports", list)
     return line
