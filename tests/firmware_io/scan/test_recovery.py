@@ -178,3 +178,37 @@ def test_a_fault_in_the_midst_of_a_scan_is_told_within_the_turns_that_were_under
             scanner.next()
     assert scanner.line.now_ns - began_ns < 5e9 / scanner.lidar.scan_rate_hz
     assert scanner.axis == []  # what ends the scan ends the motion, too
+
+
+class LoosePlug:
+    """A lidar that is lost at each second read and comes back at once."""
+
+    model = "loose"
+
+    def __init__(self):
+        self.reads = self.reconnects = 0
+
+    def read(self):
+        self.reads += 1
+        if self.reads % 2:
+            raise DeviceError("gone")
+        return SimpleNamespace(scan=self.reads, uncertainty_ns=0, warning="")
+
+    def reconnect(self, _timeout_s):
+        self.reconnects += 1
+
+
+@pytest.mark.parametrize(("every_s", "most"), [(1.0, 9), (70.0, 30)])
+def test_one_that_is_lost_again_and_again_ends_the_scan(monkeypatch, every_s, most):
+    now_s = iter(every_s * number for number in range(1000))
+    monkeypatch.setattr(lidar_scans, "time", SimpleNamespace(monotonic=lambda: next(now_s)))
+    lidar = LoosePlug()
+    scans = lidar_scans.LidarScans(lidar, Reporter())
+    if most == 9:
+        with pytest.raises(DeviceError, match="gone; lost 10 times in"):
+            for _ in range(30):
+                scans.next()
+        assert lidar.reconnects == most
+    else:
+        for _ in range(most):
+            scans.next()
