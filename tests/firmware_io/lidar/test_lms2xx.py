@@ -10,7 +10,7 @@ from virtual_time import replace_time
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceFaultError, ProtocolError
-from scanwright.firmware_io.emulators.sick.lms_emulator import LmsEmulator, lms_emulator, write_telegram
+from scanwright.firmware_io.emulators.sick.lms_emulator import lms_emulator, write_telegram
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lms2xx import driver, protocol
@@ -295,7 +295,6 @@ class SlowPort(byte_stream.SerialStream):
 def test_the_speed_of_a_serial_line_is_found_and_raised_as_far_as_the_adapter_can(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     with lms_emulator(load_catalogue().products["LMS 200"], Wall()) as emulator:
-        assert isinstance(emulator, LmsEmulator)
         monkeypatch.setattr(SlowPort, "machine", emulator.machine)
         emulator.machine.baud = 19_200
         monkeypatch.setattr(driver, "_ANSWER_S", 0.3)
