@@ -1,16 +1,18 @@
 """Clouds as text (xyz, txt, asc, csv, pts): one point a line. We write names, types, shape, pose and start as comments.
 
 A first line of words names the columns; else the first three are x y z. Separators are spaces, tabs, commas or
-semicolons. A decimal comma is refused: `1,5,2,5` may be two numbers or four.
+semicolons. Decimal commas are read only on request, since `1,5,2,5` may be two numbers or four.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count, islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +38,8 @@ _PTS = {4: ("intensity",), 6: ("red", "green", "blue"), 7: ("intensity", "red", 
 _AXES = ("x", "y", "z")
 _HEAD = 1000  # lines that show the columns of a large file
 _AMBIGUOUS = 6  # numbers without a point, separated by commas: three with a decimal comma, or as many integers
-_DECIMAL_COMMA = "a decimal comma, or a comma between numbers? write decimals with a point"
+_DECIMAL_COMMA = "a decimal comma, or a comma between numbers? For the first, convert it with decimal_comma = true"
+_COMMA_INSIDE = re.compile(rb"(?<=\d),(?=\d)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +254,29 @@ def read_numbers(
     except ValueError as error:
         changed = str(error).startswith("the number of columns")
         why = str(error).split(" at row ")[0].split(";")[0] if changed else "not numbers"
+        if separator != "," and _COMMA_INSIDE.search(str(last[1]).encode()):
+            why += f": {_DECIMAL_COMMA}"
         raise RecordingError(f"{path}: line {last[0]}: {str(last[1]).strip()[:60]!a}: {why}") from error
+
+
+@contextmanager
+def decimal_points(path: Path) -> Iterator[Path]:
+    """Yield a copy of a text file that has points for its decimal commas; errors name the file itself.
+
+    Raises:
+        RecordingError: the file cannot be read, or is no text.
+    """
+    with TemporaryDirectory() as folder:
+        copy = Path(folder, path.name)
+        with foreign(f"{path}: cannot read", path.open, "rb") as source, copy.open("wb") as out:
+            for line in source:
+                if b"\0" in line:
+                    raise RecordingError(f"{path}: decimal_comma: not a text file")
+                out.write(_COMMA_INSIDE.sub(b".", line))
+        try:
+            yield copy
+        except RecordingError as error:
+            raise RecordingError(str(error).replace(str(copy), str(path))) from error
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:

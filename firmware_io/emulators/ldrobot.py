@@ -123,45 +123,16 @@ class LdrobotMachine:
         return max(round(_CHUNK_NS / (_POINTS * self.point_ns)), 1)
 
 
-class LdrobotEmulator(LidarLine):
-    """A lidar that talks all the time."""
-
-    machine: LdrobotMachine
-
-    def __init__(
-        self,
-        lidar: Lidar,
-        ranging: Ranging,
-        *,
-        rate_error: float = 0.0,
-        first_ms: int = 0,
-        jitter_s: float = 0.0,
-        seed: int = 0,
-    ) -> None:
-        """Nothing runs before `with`.
-
-        Args:
-            lidar: of the catalogue.
-            ranging: what it sees.
-            rate_error: of its clock.
-            first_ms: what its clock shows first.
-            jitter_s: packets arrive up to this much late.
-            seed: of jitter and faults.
-
-        Raises:
-            DeviceError: there is no emulator of this model.
-        """
-        if lidar.name not in BAUDS:
-            raise DeviceError(f"no LDROBOT emulator of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
-        machine = LdrobotMachine(lidar, ranging, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
-        # a line that nobody listens to keeps next to nothing
-        super().__init__(lidar.name, machine, jitter_s=jitter_s, head=6, backlog=_BACKLOG, network=False, seed=seed)
-
-
-def ldrobot_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LdrobotEmulator:
-    """The emulator of a sensor of the catalogue.
+def ldrobot_emulator(
+    lidar: Lidar, ranging: Ranging, seed: int = 0, *, rate_error: float = 0.0, first_ms: int = 0
+) -> LidarLine[LdrobotMachine]:
+    """The emulator of a sensor of the catalogue; `rate_error` and `first_ms` of its clock.
 
     Raises:
         DeviceError: there is no emulator of this model.
     """
-    return LdrobotEmulator(lidar, ranging, seed=seed)
+    if lidar.name not in BAUDS:
+        raise DeviceError(f"no LDROBOT emulator of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
+    machine = LdrobotMachine(lidar, ranging, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
+    # a line that nobody listens to keeps next to nothing
+    return LidarLine(lidar.name, machine, head=6, backlog=_BACKLOG, network=False, seed=seed)

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -63,6 +63,9 @@ class Machine(Protocol):
         ...
 
 
+M_co = TypeVar("M_co", bound=Machine, covariant=True)
+
+
 @dataclass(slots=True)
 class _Channel:
     """One client's way to the sensor: what came and is no whole request yet, and what waits to be sent."""
@@ -73,7 +76,7 @@ class _Channel:
     waiting: bytearray = field(default_factory=bytearray)
 
 
-class LidarLine:
+class LidarLine(Generic[M_co]):
     """A lidar on a pseudo-terminal (`port`, a name that lasts) and over TCP (`address`); whoever asked gets the scans.
 
     Attributes:
@@ -85,7 +88,7 @@ class LidarLine:
     def __init__(
         self,
         name: str,
-        machine: Machine,
+        machine: M_co,
         *,
         jitter_s: float = 0.0,
         head: int = 0,

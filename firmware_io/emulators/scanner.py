@@ -17,7 +17,7 @@ from scanwright.design.errors import SceneError
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import Scene, cast
 from scanwright.firmware_io.device_ports import Ports
-from scanwright.firmware_io.emulators.lidar_line import LidarLine
+from scanwright.firmware_io.emulators.lidar_line import LidarLine, Machine
 from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.emulators.world import looking, range_model, rays
@@ -29,7 +29,7 @@ class EmulatedScanner:
     """A scanner that runs; `ports` is where programs find it."""
 
     ports: Ports
-    lidar: LidarLine
+    lidar: LidarLine[Machine]
     servo: ServoEmulator
 
 

@@ -8,16 +8,20 @@ from __future__ import annotations
 
 import math
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import TracebackType
 from typing import Self, TypeVar
 
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
+from scanwright.firmware_io.lidar.lidar import TimedScan
 from scanwright.firmware_io.serial_port import latency_ms
 
+TURN_S = 1.0  # without a turn: ten turns of the slowest sensor
+_MOST_RESUMES = 20  # in one read: a busy computer catches up after a few
 _POLL_S = 0.05  # between two tries to connect
 _LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
 _SETTLE_S = 0.03  # adapters and sensors that had to wait send the rest of their own buffers within this
@@ -161,13 +165,99 @@ class SensorLine:
             raise DeviceError(f"{self.name}: connection lost ({error}); plug it in again") from error
 
 
-class LineDriver(ABC):
-    """A sensor on a line; the end of a `with` stops it, and closes the line whatever happens."""
+class LineDriver:
+    """A lidar on a line: the life that all families share. `LidarDriver` describes the public methods.
 
+    A family connects to its sensor in `_find`, begins to scan in `_begin`, returns turns from `_turn` and ends in
+    `_halt`. The end of a `with` stops the sensor, and closes the line whatever happens.
+    """
+
+    address: str
+    serial_number = ""
+    firmware = ""
     _line: SensorLine
+    _lidar: Lidar  # of the catalogue
+    _begun: tuple[bool, int] | None = None  # intensity, skip; None while it does not scan
+    _warning = ""
+    _clusters = False  # whether beams can share a value
+    _until_s = math.inf  # end of the present attempt to reconnect
 
-    @abstractmethod
+    @property
+    def model(self) -> str:
+        """Name of its type."""
+        return self._lidar.name
+
+    @property
+    def scan_rate_hz(self) -> float:
+        """Turns per second, by the catalogue."""
+        return self._lidar.scan_rate_hz
+
+    def condition(self) -> tuple[str, ...]:
+        """Nothing, unless the family reports age or state."""
+        return ()
+
+    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
+        """Scan until `stop`; raises as `LidarDriver.start`."""
+        if cluster != 1 and not self._clusters:
+            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every beam; use 1")
+        self._cluster = cluster
+        self._begin(intensity, skip)
+        self._begun = intensity, skip
+
+    def read(self, timeout_s: float | None = None) -> TimedScan:
+        """Return the next turn; raises as `LidarDriver.read`."""
+        if self._begun is None:
+            raise DeviceError(f"{self._line.name}: not started")
+        patience_s = self._patience_s() if timeout_s is None else timeout_s
+        for _ in range(_MOST_RESUMES):
+            if (turn := self._turn(time.monotonic() + patience_s)) is not None:
+                return replace(turn, warning=turn.warning or self._warning)
+        raise DeviceTimeoutError(f"{self._line.name}: this computer is always too late to read it; end other programs")
+
     def stop(self) -> None:
+        """Laser off, if it can be; raises as `LidarDriver.stop`."""
+        self._begun = None
+        self._halt()
+
+    def reconnect(self, timeout_s: float = 3.0) -> None:
+        """Find the sensor again, and scan on if it did; raises as `LidarDriver.reconnect`."""
+        self._until_s = time.monotonic() + timeout_s
+        try:
+            while (error := self._still_away()) is not None:
+                if time.monotonic() > self._until_s:
+                    gone = f"{self.address}: lidar {self.serial_number}".strip()
+                    raise DeviceError(
+                        f"{gone} did not come back in {timeout_s:.1f} s; check its plug ({error})"
+                    ) from error
+                time.sleep(_POLL_S)
+        finally:
+            self._until_s = math.inf
+
+    def _still_away(self) -> DeviceError | None:
+        """Try once to reconnect; why that failed."""
+        try:
+            self._find()
+            if self._begun is not None:
+                with self._line.closed_on_error():
+                    self._begin(*self._begun)
+        except DeviceError as error:
+            return error
+        return None
+
+    def _patience_s(self) -> float:
+        """How long the next turn may take."""
+        return TURN_S
+
+    def _find(self) -> None:
+        """Open the line again and recognise the sensor."""
+
+    def _begin(self, intensity: bool, skip: int) -> None:
+        """Begin to scan."""
+
+    def _turn(self, deadline_s: float) -> TimedScan | None:
+        """Return the next turn; None if what had waited for this computer was dropped."""
+
+    def _halt(self) -> None:
         """Stop the sensor."""
 
     def __enter__(self) -> Self:
@@ -184,21 +274,3 @@ class LineDriver(ABC):
             error.add_note(UnsafeNote(f"its laser may still be on: {unsafe}"))
         finally:
             self._line.close()
-
-
-def until_back(name: str, timeout_s: float, connect: Callable[[], None]) -> None:
-    """Connect again and again until it works.
-
-    Raises:
-        DeviceError: it did not in time.
-    """
-    deadline_s = time.monotonic() + timeout_s
-    while True:
-        try:
-            connect()
-        except DeviceError as error:
-            if time.monotonic() > deadline_s:
-                raise DeviceError(f"{name} did not come back in {timeout_s:.1f} s; check its plug ({error})") from error
-            time.sleep(_POLL_S)
-        else:
-            return

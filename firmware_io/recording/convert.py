@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
 from scanwright.firmware_io.clouds.streams.stream import stream
+from scanwright.firmware_io.clouds.text import decimal_points
 from scanwright.firmware_io.recording.bag_export import export_bag
 
 
@@ -36,7 +38,7 @@ class Converted:
         ]
 
 
-def convert(source: Path, target: Path, *, organised: bool = False) -> Converted:
+def convert(source: Path, target: Path, *, organised: bool = False, decimal_comma: bool = False) -> Converted:
     """Convert a cloud to another format, or a recording to a bag.
 
     Large clouds without rows and columns are converted in parts, in bounded memory.
@@ -45,6 +47,7 @@ def convert(source: Path, target: Path, *, organised: bool = False) -> Converted
         source: a cloud, or a recording (`.mcap`).
         target: a cloud; or a bag, `.bag` for ROS 1, otherwise a new folder for ROS 2.
         organised: keep the rows without a point of an organised cloud, in formats that do not define them too.
+        decimal_comma: the numbers of the source are text with decimal commas.
 
     Raises:
         InstallError: a format needs the extra `clouds`, which is not installed.
@@ -56,8 +59,10 @@ def convert(source: Path, target: Path, *, organised: bool = False) -> Converted
         return Converted((target,), None, exported.written, unknown)
     check_target(target)
     unread: list[str] = []
-    wrote = None if organised else stream(source, target)
-    if wrote is None:
-        clouds, unread = read_clouds(source)
-        wrote = write_clouds(target, clouds, organised=organised)
-    return Converted(wrote.paths, wrote.rows, None, (*unread, *wrote.notes))
+    with decimal_points(source) if decimal_comma else nullcontext(source) as readable:
+        wrote = None if organised else stream(readable, target)
+        if wrote is None:
+            clouds, unread = read_clouds(readable)
+            wrote = write_clouds(target, clouds, organised=organised)
+    notes = (note.replace(str(readable), str(source)) for note in (*unread, *wrote.notes))
+    return Converted(wrote.paths, wrote.rows, None, tuple(notes))

@@ -34,11 +34,11 @@ from scanwright.firmware_io.recording.bag_clocks import (
     one_clock,
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
-from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
-from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, joint_positions, without_far
-from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
+from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, without_far
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
-from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings
+from scanwright.firmware_io.recording.import_checks.headers import Headers
+from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
 from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
 from scanwright.firmware_io.recording.recording import (
@@ -131,20 +131,15 @@ def import_bag(
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
             have no time in common. Nothing is written then.
     """
-    check_place(out, RecordingError)
-    if out.suffix != ".mcap":
-        raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
-    first, *parts = [bag] if isinstance(bag, Path) else bag
-    bag = first
-    if out.resolve() in [part.resolve() for part in (bag, *parts)]:
-        raise RecordingError(f"{out}: this is the bag itself; name another file")
+    parts = [bag] if isinstance(bag, Path) else list(bag)
+    _check_target(out, parts)
     scan_source = parse_source(scan)
     angle_source = None if is_table(angle) else parse_frames(angle) or parse_source(angle)
     unit_rad = radians_per(angle_unit) if angle_unit else None
     table = read_table(angle) if angle_source is None else None
     if reserved := {SCAN_TOPIC, JOINT_TOPIC, BEAMS_TOPIC}.intersection(also):
         raise RecordingError(f"also {min(reserved)}: the recording already has a topic of this name")
-    with open_bag(bag, *parts) as opened:
+    with open_bag(*parts) as opened:
         opened.check({scan_source.topic, *([] if angle_source is None else [angle_source.topic]), *also})
         survey = survey_bag(opened, scan_source, angle_source, table, corrections)
         if survey.turned:
@@ -156,40 +151,35 @@ def import_bag(
         stated_s = headers.time_increment_s if increment_s is None else increment_s
         arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
         clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps, arc_ns), survey, arc_ns, corrections)
-        in_time = (clock.scan_ns >= clock.angle_ns.min()) & (clock.scan_ns <= clock.angle_ns.max())
-        if not in_time.any():
+        outside = (clock.scan_ns < clock.angle_ns.min()) | (clock.scan_ns > clock.angle_ns.max())
+        if outside.all():
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
-            raise RecordingError(f"{bag}: no scan falls into the time of the angles: {spans}")
-        order = np.argsort(clock.angle_ns, kind="stable")
-        wrong = outliers(clock.angle_ns[order], survey.angle[order] * unit_rad)[0] & corrections.drop_outliers
-        time_ns, first_of = np.unique(clock.angle_ns[order][~wrong], return_index=True)
-        log = JointLog(time_ns, joint_positions(survey.angle[order][~wrong][first_of], unit_rad, corrections))
-        doubled = order.size - int(wrong.sum()) - log.time_ns.size
-        left_out = survey.left_out + Counter(
-            {"angle_at_the_time_of_another": doubled, "angle_outlier": int(wrong.sum())}
-        )
+            raise RecordingError(f"{parts[0]}: no scan falls into the time of the angles: {spans}")
+        log, left_out = _joint_log(clock, survey, unit_rad, corrections)
         still = hold or rests_in_scans(note_in(opened))
         findings = [_remark("clock", note) for note in (clock.note, survey.angle_note) if note]
         unit_notes = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
         findings += [_remark("angle_unit", note) for note in unit_notes]
-        if not still:
-            in_order = clock.angle_ns[order], survey.angle[order] * unit_rad
-            findings += angle_findings(*in_order, dropped=corrections.drop_outliers, timed=not clock.note)
-        speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
-        findings += header_findings(headers.corrected(increment_s, corrections), speed_rad_s)
-        if not clock.note and corrections.stamp != "receipt":
-            same = angle_source is not None and angle_source.topic == scan_source.topic
-            shifted = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
-            findings += clock_findings(
-                shifted, survey.angle_stamps, headers.judged().arc_ns, speed_rad_s, same_clock=same
-            )
+        findings += sample_findings(
+            headers.corrected(increment_s, corrections),
+            Stamps(clock.scan_ns, survey.scan_stamps.receive_ns),
+            survey.angle_stamps,
+            clock.angle_ns,
+            survey.angle * unit_rad,
+            0.0 if still else usual_speed_rad_s(log),
+            at_rest=still,
+            dropped=corrections.drop_outliers,
+            stamped=not clock.note and corrections.stamp != "receipt",
+            timed=not clock.note,
+            same_clock=angle_source is not None and angle_source.topic == scan_source.topic,
+        )
         findings += _scan_findings(survey)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"
             findings.append(_remark("clock", also_note))
-        if not in_time.all():
-            outside = f"{np.sum(~in_time)} scans begin before the first or after the last angle: no point of them"
-            findings.append(_remark("scans_outside", outside))
+        if outside.any():
+            none = f"{np.sum(outside)} scans begin before the first or after the last angle: no point of them"
+            findings.append(_remark("scans_outside", none))
         if hold:
             log, cut = log_at_rest(log, clock.scan_ns, arc_ns)
             if cut:
@@ -199,7 +189,7 @@ def import_bag(
             findings += [_remark("angle_gaps", gap) for gap in gap_warnings(log)]
         note = {
             "schema": "scanwright/recording/1",
-            "source": bag.name,
+            "source": parts[0].name,
             "scan": str(scan_source),
             "angle": str(angle_source or angle),
             "angle_unit": angle_unit,
@@ -218,6 +208,29 @@ def import_bag(
         left_out=dict(left_out),
         findings=tuple(findings),
     )
+
+
+def _check_target(out: Path, bags: Sequence[Path]) -> None:
+    check_place(out, RecordingError)
+    if out.suffix != ".mcap":
+        raise RecordingError(f"{out}: a recording is an MCAP file; name it {out.with_suffix('.mcap').name}")
+    if out.resolve() in [bag.resolve() for bag in bags]:
+        raise RecordingError(f"{out}: this is the bag itself; name another file")
+
+
+def _joint_log(
+    clock: OneClock, survey: BagSurvey, unit_rad: float, corrections: Corrections
+) -> tuple[JointLog, Counter[str]]:
+    """Return the joint positions in the order of their times, and what was left out of the bag."""
+    order = np.argsort(clock.angle_ns, kind="stable")
+    time_ns, angle = clock.angle_ns[order], survey.angle[order]
+    wrong = outliers(time_ns, angle * unit_rad)[0] & corrections.drop_outliers
+    unique_ns, first = np.unique(time_ns[~wrong], return_index=True)
+    turned_rad = np.unwrap((angle[~wrong][first] - corrections.angle_zero) * unit_rad)
+    dropped = int(wrong.sum())
+    doubled = order.size - dropped - unique_ns.size
+    left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled, "angle_outlier": dropped})
+    return JointLog(unique_ns, corrections.angle_scale * turned_rad), left_out
 
 
 def _time_increment_s(headers: Headers, corrections: Corrections) -> float | None:

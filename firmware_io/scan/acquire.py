@@ -33,7 +33,7 @@ from scanwright.firmware_io.scan.axis_thread import AxisThread, turning_servo
 from scanwright.firmware_io.scan.lidar_scans import LidarScans, settle_clock
 from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
-from scanwright.firmware_io.scan.recorder import recorder_of
+from scanwright.firmware_io.scan.recorder import Recorder, recorder_of
 from scanwright.firmware_io.scan.reporter import Reporter
 from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.firmware_io.servo.progress import ServoState
@@ -162,93 +162,125 @@ def _wait_until_steady(
 def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Reporter) -> ScanSummary:
     """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
     reporter.step("scanning until Ctrl-C" if plan.endless else f"recording {plan.duration_s:g} s")
-    watch = reporter.watch
-    wanted = math.inf if plan.endless else plan.turns
-    lidar, dropped, bad = scans.lidar, scans.lidar.dropped, scans.lidar.bad_packets
     axis.left_out.clear()
-    recorded_s = reported_s = time.monotonic()
-    earlier, done, away = 0, 0.0, scans.away  # full scans: before the lidar was lost last, until now; its losses
-    begin_s, from_rad = recorded_s, axis.window[-1].position_rad
-    turned = deque([axis.turning()], maxlen=_MOST_SPEEDS)
-    waiting: deque[Scan] = deque()
-    recorded, angles, first_ns, last_ns = 0, 0, 0, 0
-    checks = StreamChecks(at_rest=isinstance(plan.motion, StopAndGo))
     note = {"source": "scanwright scan", "hold": "true" if isinstance(plan.motion, StopAndGo) else "false"}
     with recorder_of(None if plan.endless else plan.recording, note, plan.attached) as recorder:
+        run = _Run(plan, scans, axis, reporter, recorder)
+        while run.done < run.wanted or run.waiting:
+            run.take_scan()
+    return run.summary()
 
-        def keep(state: ServoState) -> None:
-            nonlocal angles
-            recorder.joint(state.time_ns, state.position_rad)
-            watch.joint(state.time_ns, state.position_rad)
-            checks.joint(state.time_ns, state.position_rad)
-            angles += 1
 
-        def write_complete() -> None:
-            """Write the scans after whose last beam an angle is known."""
-            nonlocal recorded, first_ns, last_ns
-            for state in axis.hear():
-                keep(state)
-            while waiting and waiting[0].time_ns[-1] <= axis.window[-1].time_ns:
-                ready = waiting.popleft()
-                if isinstance(plan.motion, StopAndGo) and axis.moved(ready):
-                    axis.left_out[BETWEEN_STOPS] += 1
-                    continue
-                recorder.scan(ready)
-                watch.scan(ready)
-                first_ns = first_ns or ready.stamp_ns
-                recorded += 1
-                last_ns = int(ready.time_ns[-1])
+class _Run:
+    """What was recorded so far, and how many full scans it is.
 
+    Attributes:
+        done: full scans.
+        wanted: full scans, infinite without an end.
+        waiting: scans whose last beam is later than the last angle.
+    """
+
+    def __init__(
+        self, plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Reporter, recorder: Recorder | Watch
+    ) -> None:
+        self._plan, self._scans, self._axis, self._reporter, self._recorder = plan, scans, axis, reporter, recorder
+        self.done, self.wanted = 0.0, math.inf if plan.endless else float(plan.turns)
+        self.waiting: deque[Scan] = deque()
+        self._began_s = self._reported_s = time.monotonic()
+        self._dropped, self._bad = scans.lidar.dropped, scans.lidar.bad_packets
+        self._speeds = deque([axis.turning()], maxlen=_MOST_SPEEDS)
+        self._recorded = self._angles = self._first_ns = self._last_ns = 0
+        self._checks = StreamChecks(at_rest=isinstance(plan.motion, StopAndGo))
         for state in axis.window:
-            keep(state)
-        while done < wanted or waiting:
-            try:
-                scan = scans.next()
-            except DeviceError:
-                write_complete()
-                raise
-            if scans.away > away:
-                resting = 1 + _wait_until_steady(scans, axis, plan.motion, reporter, keep)
-                axis.left_out["scans until the servo turned again"] += resting
-                earlier, away = math.floor(done), scans.away
-                begin_s, from_rad = time.monotonic(), axis.window[-1].position_rad
+            self._keep(state)
+        self._begin_turns()
+
+    def take_scan(self) -> None:
+        """Wait for a scan, and write what is complete; the full scan in which the lidar was lost begins anew."""
+        try:
+            scan = self._scans.next()
+        except DeviceError:
+            self._write_complete()
+            raise
+        if self._scans.away > self._away:
+            resting = 1 + _wait_until_steady(self._scans, self._axis, self._plan.motion, self._reporter, self._keep)
+            self._axis.left_out["scans until the servo turned again"] += resting
+            self._begin_turns()
+            return
+        for finding in self._checks.scan(scan, time.monotonic_ns()):
+            self._reporter.warn(sentence(finding))
+        if self.done < self.wanted:
+            self.waiting.append(scan)
+        self._write_complete()
+        motion = self._plan.motion
+        if isinstance(motion, Spin):
+            turns = abs(self._axis.window[-1].position_rad - self._from_rad) / (2 * math.pi)
+            self.done = self._earlier + max(turns - scan.scan_time_s / motion.period_s, 0.0)
+        else:
+            self.done = self._earlier + (time.monotonic() - self._begin_s) / motion.duration_s
+        if time.monotonic() - self._reported_s > 1:
+            self._report()
+
+    def summary(self) -> ScanSummary:
+        """Check the last scans, and sum up.
+
+        Raises:
+            DeviceError: there is no scan.
+        """
+        for finding in self._checks.check():
+            self._reporter.warn(sentence(finding))
+        if not self._recorded:
+            raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
+        lidar = self._scans.lidar
+        why = "scans that the sensor lost, or that waited because this computer was busy"
+        lost = {why: lidar.dropped - self._dropped, "bad packets": lidar.bad_packets - self._bad}
+        speeds = np.array(self._speeds) if isinstance(self._plan.motion, Spin) else np.zeros((1, 2))
+        return ScanSummary(
+            recording=self._plan.recording,
+            scans=self._recorded,
+            joint_samples=self._angles,
+            duration_s=(self._last_ns - self._first_ns) / 1e9,
+            speed_deg_s=float(speeds[:, 0].mean()),
+            ripple_deg=float(speeds[:, 1].max()),
+            clock_ns=self._scans.clock_ns,
+            reconnects=self._scans.away,
+            left_out={reason: number for reason, number in {**lost, **self._axis.left_out}.items() if number},
+        )
+
+    def _begin_turns(self) -> None:
+        """Full scans count from here."""
+        self._earlier, self._away = math.floor(self.done), self._scans.away
+        self._begin_s, self._from_rad = time.monotonic(), self._axis.window[-1].position_rad
+
+    def _keep(self, state: ServoState) -> None:
+        for one in (self._recorder, self._reporter.watch, self._checks):
+            one.joint(state.time_ns, state.position_rad)
+        self._angles += 1
+
+    def _write_complete(self) -> None:
+        """Write the scans after whose last beam an angle is known."""
+        for state in self._axis.hear():
+            self._keep(state)
+        while self.waiting and self.waiting[0].time_ns[-1] <= self._axis.window[-1].time_ns:
+            ready = self.waiting.popleft()
+            if isinstance(self._plan.motion, StopAndGo) and self._axis.moved(ready):
+                self._axis.left_out[BETWEEN_STOPS] += 1
                 continue
-            for finding in checks.scan(scan, time.monotonic_ns()):
-                reporter.warn(sentence(finding))
-            if done < wanted:
-                waiting.append(scan)
-            write_complete()
-            if isinstance(plan.motion, Spin):
-                turns = abs(axis.window[-1].position_rad - from_rad) / (2 * math.pi)
-                done = earlier + max(turns - scan.scan_time_s / plan.motion.period_s, 0.0)
-            else:
-                done = earlier + (time.monotonic() - begin_s) / plan.motion.duration_s
-            if time.monotonic() - reported_s > 1:
-                reported_s = time.monotonic()
-                turned.append(axis.turning())
-                rate_hz = recorded / (reported_s - recorded_s)
-                even = f", {turned[-1][0]:.1f} deg/s, rms deviation {turned[-1][1]:.2f} deg"
-                step = f"full scan {math.floor(done) + 1:,}" if plan.endless else "recording"
-                reporter.step(
-                    f"{step}: {rate_hz:.1f} scans/s, {lidar.dropped - dropped} dropped, "
-                    f"{lidar.bad_packets - bad} bad packets" + (even if isinstance(plan.motion, Spin) else ""),
-                    done % 1 if plan.endless else min(done / plan.turns, 1),
-                )
-    for finding in checks.check():
-        reporter.warn(sentence(finding))
-    if not recorded:
-        raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
-    dropped_why = "scans that the sensor lost, or that waited because this computer was busy"
-    lost = {dropped_why: lidar.dropped - dropped, "bad packets": lidar.bad_packets - bad}
-    even_turning = np.array(turned) if isinstance(plan.motion, Spin) else np.zeros((1, 2))
-    return ScanSummary(
-        recording=plan.recording,
-        scans=recorded,
-        joint_samples=angles,
-        duration_s=(last_ns - first_ns) / 1e9,
-        speed_deg_s=float(even_turning[:, 0].mean()),
-        ripple_deg=float(even_turning[:, 1].max()),
-        clock_ns=scans.clock_ns,
-        reconnects=scans.away,
-        left_out={reason: number for reason, number in {**lost, **axis.left_out}.items() if number},
-    )
+            self._recorder.scan(ready)
+            self._reporter.watch.scan(ready)
+            self._first_ns = self._first_ns or ready.stamp_ns
+            self._recorded += 1
+            self._last_ns = int(ready.time_ns[-1])
+
+    def _report(self) -> None:
+        plan, lidar = self._plan, self._scans.lidar
+        self._reported_s = time.monotonic()
+        self._speeds.append(self._axis.turning())
+        rate_hz = self._recorded / (self._reported_s - self._began_s)
+        even = f", {self._speeds[-1][0]:.1f} deg/s, rms deviation {self._speeds[-1][1]:.2f} deg"
+        step = f"full scan {math.floor(self.done) + 1:,}" if plan.endless else "recording"
+        self._reporter.step(
+            f"{step}: {rate_hz:.1f} scans/s, {lidar.dropped - self._dropped} dropped, "
+            f"{lidar.bad_packets - self._bad} bad packets" + (even if isinstance(plan.motion, Spin) else ""),
+            self.done % 1 if plan.endless else min(self.done / plan.turns, 1),
+        )

@@ -1,12 +1,14 @@
 """Scans of a lidar as they come, also after it was away for a while, and its clock on the host's.
 
-A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. When the sensor is back (ten
-seconds are granted) it turns on. One that says of itself that it has a fault is not waited for.
+A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. If the sensor is back within
+ten seconds, the servo turns on, up to nine times in ten minutes. A sensor that reports a fault of its own is not waited
+for.
 """
 
 from __future__ import annotations
 
 import time
+from collections import deque
 
 from scanwright.design.errors import DeviceError, DeviceFaultError
 from scanwright.firmware_io.lidar.lidar import LidarDriver, TimedScan
@@ -18,6 +20,7 @@ CLOCK_GOOD_NS = 500_000  # 0.03 deg at 60 deg/s, a third of an encoder's step
 _CLOCK_LEAST_S = 3.0  # three one-second buckets give a rate
 _CLOCK_PATIENCE_S = 10.0  # longer improves it no more on a busy computer
 _AWAY_S = 10.0  # to plug it in again, and for its start
+_MOST_LOST, _LOST_WITHIN_S = 10, 600.0  # a loose plug or a weak supply: no scan comes of it
 _SERVO_UNKNOWN = "the servo has not answered that it stands: look, and cut its power if it turns"
 
 
@@ -37,13 +40,14 @@ class LidarScans:
         self.away = 0
         self._warned = ""
         self._reporter = reporter
+        self._lost_s: deque[float] = deque(maxlen=_MOST_LOST)
 
     def next(self) -> Scan:
         """The next one, however long the sensor was away before it.
 
         Raises:
             DeviceFaultError: the sensor reports a fault of its own.
-            DeviceError: it stayed away, or the servo failed meanwhile.
+            DeviceError: it stayed away, was lost ten times in ten minutes, or the servo failed meanwhile.
         """
         try:
             timed = self.lidar.read()
@@ -54,6 +58,11 @@ class LidarScans:
             if self.axis is not None:
                 stopped = self.axis.stop()
                 servo_state = "the servo has answered that it holds, " if stopped else f"{_SERVO_UNKNOWN}, "
+            self._lost_s.append(time.monotonic())
+            since_s = self._lost_s[-1] - self._lost_s[0]
+            if len(self._lost_s) == _MOST_LOST and since_s < _LOST_WITHIN_S:
+                lost = f"lost {_MOST_LOST} times in {since_s:.0f} s: replace its cable, or its supply is too weak"
+                raise DeviceError(f"{error}; {servo_state}{lost}") from error
             self._reporter.warn(f"{error}; {servo_state}waiting {_AWAY_S:g} s for the lidar to come back")
             self.away += 1
             timed = self._read_again()

@@ -24,6 +24,7 @@ from scanwright.design.errors import DeviceError, RecordingError
 from scanwright.firmware_io.recording.mcap_chunks import CHUNK_S
 from scanwright.firmware_io.recording.recording import MessageWriter
 from scanwright.firmware_io.samples import Scan
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 
 
 class Recorder:
@@ -104,22 +105,12 @@ class Recorder:
         return DeviceError(f"{self._path}: cannot write: {error.strerror or error}; {kept}")
 
 
-class _Nowhere:
-    """The recorder of a scan that somebody else keeps."""
-
-    def scan(self, scan: Scan) -> None:
-        """Nothing."""
-
-    def joint(self, time_ns: int, position_rad: float) -> None:
-        """Nothing."""
-
-
 def recorder_of(
     path: Path | None, note: Mapping[str, str], attached: Mapping[str, str]
-) -> AbstractContextManager[Recorder | _Nowhere]:
+) -> AbstractContextManager[Recorder | Watch]:
     """The recorder of a file, whose folder is made, or one that keeps nothing."""
     if path is None:
-        return nullcontext(_Nowhere())
+        return nullcontext(UNWATCHED)
     path.parent.mkdir(exist_ok=True)
     return Recorder(path, note, attached)
 

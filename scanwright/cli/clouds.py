@@ -205,6 +205,7 @@ def convert(
     source: Annotated[Path, Argument(metavar="IN", help="Cloud, or recording (.mcap).")],
     target: Annotated[Path, Argument(metavar="OUT", help="Cloud, .bag, or a new folder for a bag.")],
     organised: Organised = False,
+    decimal_comma: Annotated[bool, Option("--decimal-comma", help="Numbers of IN are written as 1,5.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Convert a point cloud or recording to another format.
@@ -214,5 +215,5 @@ def convert(
     """
     from scanwright.firmware_io.recording.convert import convert
 
-    result = convert(source, target, organised=organised)
+    result = convert(source, target, organised=organised, decimal_comma=decimal_comma)
     show_result(result.lines, result, as_json)

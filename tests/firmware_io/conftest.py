@@ -3,9 +3,9 @@
 import pytest
 from virtual_bus import VirtualBus
 
-from scanwright.firmware_io.lidar.scip import dialogue, driver
+from scanwright.firmware_io.lidar import sensor_line
+from scanwright.firmware_io.lidar.scip import dialogue
 from scanwright.firmware_io.lidar.sick import dialogue as cola_dialogue
-from scanwright.firmware_io.lidar.sick import driver as sick_driver
 from scanwright.firmware_io.servo import examine, prepare
 from scanwright.firmware_io.servo.bus import bus, serial_line, unit
 
@@ -14,9 +14,8 @@ from scanwright.firmware_io.servo.bus import bus, serial_line, unit
 def patience(monkeypatch):
     """Emulators share a computer with the tests, and answer late if it is busy: wait ten times as long."""
     monkeypatch.setattr(dialogue, "_ANSWER_S", 5.0)
-    monkeypatch.setattr(driver, "_SCAN_S", 10.0)
+    monkeypatch.setattr(sensor_line, "TURN_S", 10.0)
     monkeypatch.setattr(cola_dialogue, "_ANSWER_S", 1.5)  # waited for whole where a sensor knows one dialect only
-    monkeypatch.setattr(sick_driver, "_SCAN_S", 10.0)
     monkeypatch.setattr(serial_line.SerialLine, "wait_s", 0.5)
     monkeypatch.setattr(bus, "_LATE", 1)
 

@@ -37,7 +37,6 @@ from scanwright.firmware_io.lidar.scip import driver as scip
 from scanwright.firmware_io.lidar.sick import dialogue as cola
 from scanwright.firmware_io.lidar.sick import driver as sick
 from scanwright.firmware_io.lidar.slamtec import dialogue
-from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 from scanwright.firmware_io.samples import Scan
 
 MODELS = ["LD06", "LD19", "STL27L", "LMS 200"]
@@ -49,7 +48,7 @@ BUFFER_BYTES = (4095, 69_631)
 LATENCY_MS = dict(zip(BUFFER_BYTES, (1, 16), strict=True))
 ROUNDED_MS = {model: 0.8 if " A" in model else 0.1 for model in MODELS}  # of a range: 8 mm of ultra capsules, or 1 mm
 
-_TIMED = (sensor_line, dialogue, slamtec, ldrobot, lms2xx, scip_dialogue, scip, cola, sick)
+_TIMED = (sensor_line, dialogue, ldrobot, lms2xx, scip_dialogue, scip, cola, sick)
 _M_S = 10.0  # by which the range grows
 _CYCLE_S = 0.63  # no whole number of turns
 _NEAREST_M = 1.0

@@ -6,60 +6,30 @@ that an AX-12A reads 0 or 1023 in its dead sector, the end that is nearer.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
-from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.servo import Servo
-from scanwright.firmware_io.emulators.dynamics import HornMotion
 from scanwright.firmware_io.emulators.servo import dynamixel_groups as groups
 from scanwright.firmware_io.emulators.servo.dynamixel_control import count_of, show, wanted
 from scanwright.firmware_io.emulators.servo.dynamixel_memory import INDIRECT, ITEMS
 from scanwright.firmware_io.emulators.servo.dynamixel_packets import fast_status, status, take
-from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request
-from scanwright.firmware_io.emulators.servo.memory import ACCESS, RANGE, Memory
-from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
+from scanwright.firmware_io.emulators.servo.machine import BROADCAST, OVERLOAD, Request, ServoMachine
+from scanwright.firmware_io.emulators.servo.memory import ACCESS, RANGE
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
-_BOOT_S = 0.5  # [assumed]
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.5
-_VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32  # bits of both protocols
 _BAUDS_2 = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)  # e-manual, by count
 _BAUDS_1_FAST = {250: 2_250_000, 251: 2_500_000, 252: 3_000_000}  # e-manual of MX: by count
 _ERRORS_1 = {RANGE: 8, ACCESS: 8}  # the others of protocol 2.0 are instruction errors in 1.0
 
 
-class DynamixelMachine:
-    """One servo with power; methods as `ServoMachine` has them.
-
-    Attributes:
-        table: what the driver knows of the model.
-        memory: the control table.
-        axis: the true motion of the horn.
-        forgets_ns: as `ServoMachine` has it; assumed.
-    """
-
-    forgets_ns = 100_000_000
+class DynamixelMachine(ServoMachine):
+    """A Dynamixel of protocol 1.0 or 2.0."""
 
     def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
-        self.table = table
-        self.memory = Memory({item.address: item for item in ITEMS[self.table.number]}, self.table.ram)
-        self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)
+        super().__init__(table, ITEMS[table.number], load, time_ns, angle_rad)
         self._pointers = INDIRECT.get(self.table.number, {})  # to the targets of indirect data
-        self._turns = 0  # of the axis, when the servo last began to count
-        self._latched = 0
-        self._hot_degC = 30
-        self._rated_v = load_catalogue().get(table.model, Servo).rated_v
-        self._supply = 1.0
-        self._strained_since_ns: int | None = None
-        self._mute_until_ns = time_ns
         self._spoken_ns = time_ns
-        self._registered: tuple[int, bytes] | None = None
-
-    @property
-    def id(self) -> int:
-        """The servo's number on the bus."""
-        return self.memory[7 if self._two else 3]
 
     @property
     def baud(self) -> float:
@@ -68,13 +38,9 @@ class DynamixelMachine:
         return _BAUDS_2[code] if self._two else _BAUDS_1_FAST.get(code, 2_000_000 / (code + 1))
 
     @property
-    def return_delay_ns(self) -> int:
-        """Between a request's end and the answer's begin."""
-        return self.memory[9 if self._two else 5] * 2000
-
-    def listens(self, now_ns: int) -> bool:
-        """Whether it is up after a restart."""
-        return now_ns >= self._mute_until_ns
+    def limits(self) -> tuple[int, int, int]:
+        """As `ServoMachine.limits`."""
+        return (34, 32, 31) if self._two else (12, 13, 11)
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
         """Carry out a request; error byte and data of the answer, None where there is none."""
@@ -98,27 +64,15 @@ class DynamixelMachine:
             return [fast_status(groups.fast_size(request), answers)]
         return [status(self.table.protocol, *one) for one in answers]
 
-    def overheat(self) -> None:
-        """The motor is 5 degrees above its limit."""
-        self._hot_degC = self.memory[31 if self._two else 11] + 5
-
     def overload(self, now_ns: int) -> None:
         """The overload protection trips."""
-        self._trip(_OVERLOAD, now_ns)
-
-    def set_voltage(self, volts: float, now_ns: int) -> None:
-        """The supply gives another voltage."""
-        self._supply = volts / self._rated_v
-        self.axis.change(now_ns, supply=self._supply)
+        self._trip(OVERLOAD, now_ns)
 
     def restart(self, now_ns: int) -> None:
-        """Back to the values at power-up; deaf and mute until that is done."""
-        self.memory.reset(self.table.ram)
+        """As `ServoMachine.restart`."""
+        super().restart(now_ns)
         if not self._two:
             self.memory[34] = self.memory[14]
-        self._latched, self._registered = 0, None
-        self._hot_degC = 30
-        self._mute_until_ns = now_ns + round(_BOOT_S * 1e9)
         self._count_one_turn(now_ns)
         self._act(now_ns)
 
@@ -127,8 +81,8 @@ class DynamixelMachine:
         memory = self.memory
         if bits := self._state_bits():
             self._trip(bits, now_ns)
-        if self._strained(now_ns):
-            self._trip(_OVERLOAD, now_ns)
+        if self._strained(now_ns, _OVERLOAD_SHARE, _OVERLOAD_S):
+            self._trip(OVERLOAD, now_ns)
         watched = self._two and 0 < memory[98] <= 127 and memory[64]
         if watched and now_ns - self._spoken_ns > memory[98] * 20_000_000:
             memory[98] = 255
@@ -228,7 +182,7 @@ class DynamixelMachine:
         if not self._two and address == 30:
             memory[torque] = 1  # a goal turns the torque on
         if not self._two and address == 34:
-            self._latched &= ~_OVERLOAD
+            self._latched &= ~OVERLOAD
         if not was_on and memory[torque]:
             self._begin_torque(now_ns)
         self._act(now_ns)
@@ -246,23 +200,15 @@ class DynamixelMachine:
             self._measure(now_ns)
             self.memory[116] = self.memory[132]
 
-    def _count_one_turn(self, now_ns: int) -> None:
-        self._turns = math.floor((self.axis.motion(now_ns).angle_rad + math.pi) / (2 * math.pi))
-
     def _measure(self, now_ns: int) -> None:
         """Bring the present values up to date."""
         show(self.table, self.memory, self._turns, self.axis.motion(now_ns), now_ns)
         self.memory[self.table.voltage.address] = round(self._supply * self._rated_v * 10)
         self.memory[self.table.temperature.address] = self._hot_degC
 
-    def _act(self, now_ns: int) -> None:
-        """Make the motor do what the control table says."""
-        drive = wanted(self.table, self.memory, self._turns)
-        now = self.axis.drive_at(now_ns)
-        if drive != Actuation(now.mode, now.goal, now.rate_rad_s, torque_limit=now.torque_limit):
-            self.axis.change(
-                now_ns, mode=drive.mode, goal=drive.goal, rate_rad_s=drive.rate_rad_s, torque_limit=drive.torque_limit
-            )
+    def wanted(self) -> Actuation:
+        """As `ServoMachine.wanted`."""
+        return wanted(self.table, self.memory, self._turns)
 
     def _conditions(self) -> int:
         """The fault bits that go with each answer."""
@@ -270,23 +216,10 @@ class DynamixelMachine:
             return 0x80 if self.memory[70] else 0
         return self._latched | self._state_bits()
 
-    def _state_bits(self) -> int:
-        low, high, hot = (34, 32, 31) if self._two else (12, 13, 11)
-        fits = self.memory[low] <= round(self._supply * self._rated_v * 10) <= self.memory[high]
-        return (0 if fits else _VOLTAGE) | (_HEAT if self._hot_degC > self.memory[hot] else 0)
-
-    def _strained(self, now_ns: int) -> bool:
-        if abs(self.axis.motion(now_ns).torque) < _OVERLOAD_SHARE * self._supply:
-            self._strained_since_ns = None
-            return False
-        if self._strained_since_ns is None:
-            self._strained_since_ns = now_ns
-        return now_ns - self._strained_since_ns > _OVERLOAD_S * 1e9
-
     def _trip(self, bits: int, now_ns: int) -> None:
         """A fault: reported, and the torque taken if the servo is set to shut down for it."""
         memory, table = self.memory, self.table
-        self._latched |= bits & _OVERLOAD if not self._two else bits & memory[63]
+        self._latched |= bits & OVERLOAD if not self._two else bits & memory[63]
         if self._two:
             memory[70] = memory[70] | bits
         if bits & memory[63 if self._two else 18] and memory[table.torque.address]:

@@ -10,17 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.servo import Servo
-from scanwright.firmware_io.emulators.dynamics import HornMotion
 from scanwright.firmware_io.emulators.servo import feetech_packets
-from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request
-from scanwright.firmware_io.emulators.servo.memory import Memory, TableItem, ro, rw
-from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, plant_of
+from scanwright.firmware_io.emulators.servo.machine import BROADCAST, OVERLOAD, Request, ServoMachine
+from scanwright.firmware_io.emulators.servo.memory import TableItem, ro, rw
+from scanwright.firmware_io.emulators.servo_plant import Actuation, Load
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
-_BOOT_S = 0.5  # [assumed]
-_VOLTAGE, _HEAT, _OVERLOAD = 1, 4, 32
 _BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)  # memory table of the STS, by count
 _PING, _READ, _WRITE, _REG_WRITE, _ACTION, _SYNC_READ, _SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
 _ID, _BAUD, _DELAY, _LEVEL, _OFFSET, _MODE, _TORQUE, _LOCK, _PRESENT = 5, 6, 7, 8, 31, 33, 40, 55, 56
@@ -48,36 +43,12 @@ _ITEMS: tuple[TableItem, ...] = (
 )
 
 
-class FeetechMachine:
-    """One servo with power; methods as `ServoMachine` has them.
-
-    Attributes:
-        table: what the driver knows of the model.
-        memory: the memory table, signs as on the wire.
-        axis: the true motion of the horn.
-        forgets_ns: as `ServoMachine` has it; assumed.
-    """
-
-    forgets_ns = 100_000_000
+class FeetechMachine(ServoMachine):
+    """An STS3215."""
 
     def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
-        self.table = table
-        self.memory = Memory({item.address: item for item in _ITEMS}, table.ram)
-        self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)
-        self._rated_v = load_catalogue().get(table.model, Servo).rated_v
+        super().__init__(table, _ITEMS, load, time_ns, angle_rad)
         self._unsaved: dict[int, int] = {}  # written while locked: address -> the byte that comes back with the power
-        self._supply = 1.0
-        self._hot_degC = 30
-        self._latched = 0
-        self._strained_since_ns: int | None = None
-        self._turns = 0  # of the axis, when position mode last began
-        self._mute_until_ns = time_ns
-        self._registered: tuple[int, bytes] | None = None
-
-    @property
-    def id(self) -> int:
-        """The servo's number on the bus."""
-        return self.memory[_ID]
 
     @property
     def baud(self) -> float:
@@ -85,17 +56,13 @@ class FeetechMachine:
         return _BAUDS[self.memory[_BAUD]]
 
     @property
-    def return_delay_ns(self) -> int:
-        """Between a request's end and the answer's begin."""
-        return self.memory[_DELAY] * 2000
+    def limits(self) -> tuple[int, int, int]:
+        """As `ServoMachine.limits`."""
+        return 15, 14, 13
 
     def take(self, buffer: bytearray) -> Request | None:
         """Take the next request off a buffer."""
         return feetech_packets.take(buffer)
-
-    def listens(self, now_ns: int) -> bool:
-        """Whether it is up after a restart."""
-        return now_ns >= self._mute_until_ns
 
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
         """The servos of a sync read answer one after the other."""
@@ -122,29 +89,18 @@ class FeetechMachine:
         self._change(request, now_ns)
         return None if to_all or not answers_all else (self._status(), b"")
 
-    def overheat(self) -> None:
-        """The motor is 5 degrees above its limit."""
-        self._hot_degC = self.memory[13] + 5
-
     def overload(self, now_ns: int) -> None:
         """The overload protection trips."""
-        self._latched |= _OVERLOAD
+        self._latched |= OVERLOAD
         self._act(now_ns)
 
-    def set_voltage(self, volts: float, now_ns: int) -> None:
-        """The supply gives another voltage."""
-        self._supply = volts / self._rated_v
-        self.axis.change(now_ns, supply=self._supply)
-
     def restart(self, now_ns: int) -> None:
-        """Back to what was kept, and the values at power-up; deaf and mute until that is done."""
-        self.memory.reset(self.table.ram)
+        """Back to what was kept, and the values at power-up."""
+        super().restart(now_ns)
         for address, byte in self._unsaved.items():
             self.memory.data[address] = byte
         self._unsaved.clear()
         self.memory[48] = self.memory[16]
-        self._latched, self._registered, self._hot_degC = 0, None, 30
-        self._mute_until_ns = now_ns + round(_BOOT_S * 1e9)
         self._act(now_ns)
 
     def protect(self, now_ns: int) -> None:
@@ -153,17 +109,8 @@ class FeetechMachine:
         if bits & self.memory[19] and self.memory[_TORQUE]:
             self.memory[_TORQUE] = 0
             self._act(now_ns)
-        share, since = self.memory[36] / 100 * self._supply, self._strained_since_ns
-        if abs(self.axis.motion(now_ns).torque) < share:
-            self._strained_since_ns = None
-        elif since is None:
-            self._strained_since_ns = now_ns
-        elif now_ns - since > self.memory[35] * 10_000_000 and not self._latched & _OVERLOAD:
+        if self._strained(now_ns, self.memory[36] / 100, self.memory[35] / 100) and not self._latched & OVERLOAD:
             self.overload(now_ns)
-
-    def _state_bits(self) -> int:
-        fits = self.memory[15] <= round(self._supply * self._rated_v * 10) <= self.memory[14]
-        return (0 if fits else _VOLTAGE) | (_HEAT if self._hot_degC > self.memory[13] else 0)
 
     def _status(self) -> int:
         return self._latched | self._state_bits()
@@ -212,25 +159,18 @@ class FeetechMachine:
             memory[_OFFSET] = _sized(round(self.axis.motion(now_ns).angle_rad / self.table.position.unit), 11)
             memory[_TORQUE] = was_on
         if not memory[_TORQUE]:
-            self._latched &= ~_OVERLOAD
+            self._latched &= ~OVERLOAD
         if (memory[_TORQUE] and not was_on) or mode != memory[_MODE]:
-            self._turns = math.floor((self.axis.motion(now_ns).angle_rad + math.pi) / (2 * math.pi))
+            self._count_one_turn(now_ns)
         self._act(now_ns)
 
-    def _act(self, now_ns: int) -> None:
-        """Make the motor do what the memory says."""
-        drive, now = self._wanted(), self.axis.drive_at(now_ns)
-        if drive != Actuation(now.mode, now.goal, now.rate_rad_s, torque_limit=now.torque_limit):
-            self.axis.change(
-                now_ns, mode=drive.mode, goal=drive.goal, rate_rad_s=drive.rate_rad_s, torque_limit=drive.torque_limit
-            )
-
-    def _wanted(self) -> Actuation:
+    def wanted(self) -> Actuation:
+        """As `ServoMachine.wanted`."""
         memory, table = self.memory, self.table
         if not memory[_TORQUE]:
             return Actuation()
         limit = memory[48] / 1000
-        if self._latched & _OVERLOAD:
+        if self._latched & OVERLOAD:
             limit = min(limit, memory[34] / 100)
         if memory[_MODE] == 1:
             rate_rad_s = _signed(memory[46], 15) * table.wheel_speed.unit

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -263,19 +264,12 @@ class SickMachine:
         return out.telegram()
 
 
-class SickEmulator(LidarLine):
-    """A SICK lidar on its line."""
-
-    machine: SickMachine
-
-    def __init__(self, machine: SickMachine, *, jitter_s: float = 0.0, seed: int = 0) -> None:
-        """Nothing runs before `with`; scans arrive up to `jitter_s` late."""
-        super().__init__(machine.lidar.name, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
-
-
-def sick_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> SickEmulator:
-    """The emulator of a sensor of the catalogue."""
-    return SickEmulator(SickMachine(lidar, ranging, time.monotonic_ns()), seed=seed)
+def sick_emulator(
+    lidar: Lidar, ranging: Ranging, seed: int = 0, *, jitter_s: float = 0.0, **state: Any
+) -> LidarLine[SickMachine]:
+    """The emulator of a sensor of the catalogue, with some state of its own; scans arrive up to `jitter_s` late."""
+    machine = SickMachine(lidar, ranging, time.monotonic_ns(), **state)
+    return LidarLine(lidar.name, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
 
 
 def _refused(request: Telegram, code: int) -> Telegram:

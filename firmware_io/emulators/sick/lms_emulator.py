@@ -150,16 +150,7 @@ class LmsMachine:
         return b""
 
 
-class LmsEmulator(LidarLine):
-    """A lidar that answers as an LMS 2xx."""
-
-    machine: LmsMachine
-
-    def __init__(self, machine: LmsMachine, *, jitter_s: float = 0.0, seed: int = 0) -> None:
-        """Nothing runs before `with`; telegrams arrive up to `jitter_s` late."""
-        super().__init__(machine.lidar.name, machine, jitter_s=jitter_s, head=_HEAD, network=False, seed=seed)
-
-
-def lms_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LmsEmulator:
+def lms_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarLine[LmsMachine]:
     """The emulator of a sensor of the catalogue."""
-    return LmsEmulator(LmsMachine(lidar, ranging, time.monotonic_ns()), seed=seed)
+    machine = LmsMachine(lidar, ranging, time.monotonic_ns())
+    return LidarLine(lidar.name, machine, head=_HEAD, network=False, seed=seed)

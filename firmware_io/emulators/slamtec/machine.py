@@ -27,6 +27,7 @@ _MOTOR_PWM, _MOTOR_RPM, _BOARD_FLAG = 0xF0, 0xA8, 0xFF
 
 _CHUNK_NS = 8_000_000  # measured at once: some ms cost a computer little and delay nothing
 _BOOT_NS = 1_000_000_000  # [assumed]
+_POINTS_ERROR = 2e-3  # it measures this part faster than it states [assumed]
 _NEVER_NS = 1 << 62  # 146 years
 _POINTS: Final = {STANDARD: 8, EXPRESS: 32, ULTRA: 96, DENSE: 40}  # of a packet; nodes are sent 8 together
 _SIZES: Final = {STANDARD: 5, EXPRESS: 84, ULTRA: 132, DENSE: 84}
@@ -239,36 +240,13 @@ def triangulation_offset_deg(range_mm: Times) -> Floats:
     return np.where(range_mm >= 50, _FAR_OFFSET_DEG - np.degrees((64 * ratio + ratio**3 / 98_304) / 65_536), 7.5)
 
 
-class SlamtecEmulator(LidarLine):
-    """A lidar that answers as an RPLIDAR."""
-
-    machine: SlamtecMachine
-
-    def __init__(
-        self, lidar: Lidar, ranging: Ranging, *, points_error: float = 2e-3, jitter_s: float = 0.0, seed: int = 0
-    ) -> None:
-        """Nothing runs before `with`.
-
-        Args:
-            lidar: of the catalogue.
-            ranging: what it sees.
-            points_error: it measures this part faster than it states.
-            jitter_s: packets arrive up to this much late.
-            seed: of jitter and faults.
-
-        Raises:
-            DeviceError: there is no emulator of this model.
-        """
-        if lidar.name not in IDENTITIES:
-            raise DeviceError(f"no RPLIDAR emulator of the lidar '{lidar.name}'{suggest(lidar.name, IDENTITIES)}")
-        machine = SlamtecMachine(lidar, ranging, time.monotonic_ns(), points_error)
-        super().__init__(lidar.name, machine, jitter_s=jitter_s, head=0, backlog=1 << 12, network=False, seed=seed)
-
-
-def slamtec_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> SlamtecEmulator:
+def slamtec_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarLine[SlamtecMachine]:
     """The emulator of a sensor of the catalogue.
 
     Raises:
         DeviceError: there is no emulator of this model.
     """
-    return SlamtecEmulator(lidar, ranging, seed=seed)
+    if lidar.name not in IDENTITIES:
+        raise DeviceError(f"no RPLIDAR emulator of the lidar '{lidar.name}'{suggest(lidar.name, IDENTITIES)}")
+    machine = SlamtecMachine(lidar, ranging, time.monotonic_ns(), _POINTS_ERROR)
+    return LidarLine(lidar.name, machine, backlog=1 << 12, network=False, seed=seed)

@@ -19,14 +19,13 @@ from scanwright.design.errors import DeviceError, DeviceTimeoutError
 from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
 from scanwright.firmware_io.lidar.ldrobot import protocol
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine, until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine
 from scanwright.firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 
 FAMILY = "ldrobot"
 
 _BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
 _FIRST_PACKETS_S = 0.5  # it talks hundreds of times a second
-_TURN_S = 1.0  # without a turn: five of the slowest
 _SILENCE_NS = 500_000_000  # after which the sensor may have restarted
 _PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which packets waited or were lost
 _FIRST_PAUSE_S = 0.1  # the same, before there is a line to tell what is late
@@ -76,40 +75,16 @@ class _PacketClock:
 
 
 class LdrobotLidar(LineDriver):
-    """An LDROBOT lidar; `LidarDriver` says what its methods promise.
-
-    Attributes:
-        address: where it was found.
-        serial_number: empty, as it tells none.
-        firmware: empty, as it tells none.
-    """
+    """An LDROBOT lidar, which tells no serial number and no version."""
 
     def __init__(self, address: str, model: str | None = None) -> None:
-        """Listen to it; `model` is a name of the catalogue, None for the one whose speed of measuring fits.
-
-        Raises:
-            DeviceError: no such port, it is in use, another model talks there, or nothing does.
-        """
+        """Listen to it; without a model of the catalogue it is the first whose speed of measuring fits."""
         self.address = address
-        self.serial_number = self.firmware = ""
         self._bad_before = 0
         self._splitter = protocol.LdrobotSplitter()
-        self._scanning = self._intensity = False
-        self._skip = 0
         self._turns = TurnQueue()
         self._line = SensorLine(address, 2 * protocol.SIZE)
         self._lidar = self._recognised(model)
-        self._begin_anew()
-
-    @property
-    def model(self) -> str:
-        """Name of its type: the one it was opened as, or the first whose speed of measuring fits."""
-        return self._lidar.name
-
-    @property
-    def scan_rate_hz(self) -> float:
-        """Turns per second, by the catalogue: it holds them to some parts in a hundred."""
-        return self._lidar.scan_rate_hz
 
     @property
     def dropped(self) -> int:
@@ -121,28 +96,13 @@ class LdrobotLidar(LineDriver):
         """Runs of bytes that were no packet."""
         return self._bad_before + self._splitter.bad
 
-    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Hand out turns from now on; it measures all the time.
+    def _begin(self, intensity: bool, skip: int) -> None:
+        """Return turns from now on; it measures all the time."""
+        self._intensity = intensity
+        self._turns.begin_anew(skip)
+        self._resume()
 
-        Raises:
-            DeviceError: clusters, which it has not.
-        """
-        if cluster != 1:
-            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every point; use 1")
-        self._scanning, self._intensity, self._skip = True, intensity, skip
-        self._begin_anew()
-
-    def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next turn; it is waited for for a second if nothing else is said.
-
-        Raises:
-            DeviceTimeoutError: none came in time.
-            DeviceError: it was unplugged, or was not started.
-        """
-        if not self._scanning:
-            raise DeviceError(f"{self._line.name}: not started")
-        patience_s = _TURN_S if timeout_s is None else timeout_s
-        deadline_s = time.monotonic() + patience_s
+    def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._arrivals)) is None:
             pause_s = _PAUSE_S if self._clock.is_known else _FIRST_PAUSE_S
             packets, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, pause_s)
@@ -152,33 +112,16 @@ class LdrobotLidar(LineDriver):
             if not packets:
                 self._splitter.cut_in()
                 self._resume()
-                deadline_s = time.monotonic() + patience_s
+                return None
             for packet in packets:
                 self._take(packet, arrival_ns)
         uncertainty_ns = self._line.widened(self._arrivals.uncertainty_ns)
         return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
 
-    def condition(self) -> tuple[str, ...]:
-        """Nothing: it only ever sends points."""
-        return ()
-
-    def stop(self) -> None:
-        """Hand out no more; its laser stays on as long as it has power."""
-        self._scanning = False
-
-    def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Listen again where it was, after an unplug or a reset.
-
-        Raises:
-            DeviceError: nothing talks there in time.
-        """
-
-        def connect() -> None:
-            self._line.reopen()
-            self._lidar = self._recognised(self.model)
-
-        until_back(self._line.name, timeout_s, connect)
-        self._begin_anew()
+    def _find(self) -> None:
+        """Listen again where it was."""
+        self._line.reopen()
+        self._lidar = self._recognised(self.model)
 
     def _recognised(self, model: str | None) -> Lidar:
         """Hear who talks, at whatever speed; the line is closed where nobody does."""
@@ -215,10 +158,6 @@ class LdrobotLidar(LineDriver):
                 return None
             rates += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
         return float(np.median(rates)) or None
-
-    def _begin_anew(self) -> None:
-        self._turns.begin_anew(self._skip)
-        self._resume()
 
     def _resume(self) -> None:
         """Nothing of what came before is of use: a new line, a new clock, a new turn."""
@@ -268,9 +207,5 @@ def _grain_ns(lidar: Lidar) -> float:
 
 
 def open_ldrobot(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LdrobotLidar:
-    """Listen to the lidar at a serial port or HOST:PORT.
-
-    Raises:
-        DeviceError: no such port, it is in use, or no LDROBOT sensor talks there.
-    """
+    """Listen to the lidar at an address; raises as `open_lidar`."""
     return LdrobotLidar(address, model)

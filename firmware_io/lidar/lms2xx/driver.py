@@ -18,7 +18,7 @@ from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeou
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.lms2xx import protocol
 from scanwright.firmware_io.lidar.lms2xx.telegram_count import TelegramCount
-from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine, until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine
 from scanwright.firmware_io.samples import Scan
 
 FAMILY = "lms2xx"
@@ -26,7 +26,6 @@ FAMILY = "lms2xx"
 _ANSWER_S = 0.5  # 15 times what the bytes of an answer take at 9600 baud
 _STREAM_S = 0.1  # several turns of its mirror
 _MODE_S = 3.0  # it stops its stream, or answers at its new speed, after some turns
-_SCAN_S = 1.0  # 37 scans
 _TRIES = 2  # the first may meet its stream
 _FAST_BAUD, _USUAL_BAUD = 500_000, 38_400
 _POWER_UP_BAUD = 9600  # after each power-up
@@ -36,36 +35,19 @@ _PATIENCE = 8  # telegrams: a fifth of a second
 
 
 class LmsLidar(LineDriver):
-    """An LMS 2xx; `LidarDriver` says what its methods promise.
-
-    Attributes:
-        address: where it was found.
-        serial_number: empty, as it tells none.
-        firmware: version, as the sensor writes it.
-    """
+    """An LMS 2xx, which tells no serial number."""
 
     def __init__(self, address: str, model: str | None = None) -> None:
-        """Open it and stop its stream; `model` is a name of the catalogue, None for the one that it gives itself.
-
-        Raises:
-            DeviceError: no such port, it is in use, another model answers, or none.
-        """
+        """Open it and stop its stream; `model` is a name of the catalogue, None for the one that it gives itself."""
         self.address = address
-        self.serial_number = self.firmware = ""
         self._bad_before = self._bad_scans = 0
         self._splitter = protocol.LmsSplitter()
-        self._skip = 0
-        self._scanning = False
         self._lost_before = self._skipped = 0
         self._waiting: deque[TimedScan] = deque()
         self._count: TelegramCount | None = None
         self._line = SensorLine(address, 2 * protocol.LONGEST)
         self._recognise(model, _BAUDS)
-
-    @property
-    def model(self) -> str:
-        """Name of its type."""
-        return self._lidar.name
+        self._baud_before = self._baud  # at which it was last in order
 
     @property
     def scan_rate_hz(self) -> float:
@@ -82,17 +64,10 @@ class LmsLidar(LineDriver):
         """Telegrams that were thrown away."""
         return self._bad_before + self._bad_scans + self._splitter.bad
 
-    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Scan until `stop`, as finely as the catalogue says, at the speed that the port can.
-
-        Raises:
-            DeviceError: intensity or clusters, which it has not; it refuses, or is gone.
-        """
-        if intensity or cluster != 1:
-            what = "intensity" if intensity else f"cluster = {cluster}"
-            raise DeviceError(
-                f"{self._line.name}: {what}: a {self.model} sends one range for each beam, nothing else; omit it"
-            )
+    def _begin(self, intensity: bool, skip: int) -> None:
+        """As finely as the catalogue says, at the speed that the port can."""
+        if intensity:
+            raise DeviceError(f"{self._line.name}: intensity: a {self.model} sends none; omit it")
         step_centideg = round(36_000 / self._lidar.steps_per_turn)
         reply = self._ask(protocol.variant(180, step_centideg), protocol.VARIANT, _MODE_S)
         if protocol.accepted_variant(reply) != (180, step_centideg):
@@ -107,66 +82,32 @@ class LmsLidar(LineDriver):
         telegram_ns = round((2 * beams + 10) * 10 / self._baud * 1e9)
         patience = _PATIENCE if self._baud == _FAST_BAUD else 1  # on a slow line every one is behind lost ones
         self._count = TelegramCount(self._interlaced * _TURN_S * 1e9, telegram_ns, patience)
-        self._scanning = True
+        self._baud_before = self._baud
 
-    def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next turn of its mirror; it is waited for for a second if nothing else is said.
-
-        Raises:
-            DeviceTimeoutError: none came in time.
-            DeviceFaultError: it reports a fault.
-            DeviceError: it was unplugged, or was not started.
-        """
-        if not self._scanning:
-            raise DeviceError(f"{self._line.name}: not started")
+    def _turn(self, deadline_s: float) -> TimedScan | None:
         assert self._count is not None
-        patience_s = _SCAN_S if timeout_s is None else timeout_s
-        deadline_s = time.monotonic() + patience_s
         while not self._waiting:
             telegrams, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._count.pause_s)
             if not telegrams:
                 self._splitter.cut_in()
                 self._count.resume()
-                deadline_s = time.monotonic() + patience_s
+                return None
             for reply in telegrams:
                 if reply.command == protocol.SCAN:
                     self._take(reply, arrival_ns)
         return self._waiting.popleft()
 
-    def condition(self) -> tuple[str, ...]:
-        """Nothing: a dirty window and faults stand in every telegram."""
-        return ()
-
-    def stop(self) -> None:
-        """Stop its stream; its laser stays on as long as it has power.
-
-        Raises:
-            DeviceError: the sensor is gone.
-        """
-        self._scanning = False
+    def _halt(self) -> None:
+        """Stop its stream; its laser stays on as long as it has power."""
         self._mode(protocol.ON_REQUEST)
 
-    def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Open it again where it was, after an unplug or a reset, and scan on if it did.
-
-        Raises:
-            DeviceError: it did not turn up in time.
-        """
-        scanning, before = self._scanning, self._baud
-
-        def connect() -> None:
-            self._line.reopen()
-            # the plug was out, and it streams on, or the power was; to look for it at all four costs a second more
-            streams = self._receives_at(before)
-            self._recognise(self.model, (before, _POWER_UP_BAUD) if streams else (_POWER_UP_BAUD, before))
-            if scanning:
-                with self._line.closed_on_error():
-                    self.start(skip=self._skip)
-
-        try:
-            until_back(self._line.name, timeout_s, connect)
-        finally:
-            self._scanning = scanning
+    def _find(self) -> None:
+        """Open it again where it was."""
+        self._line.reopen()
+        before = self._baud_before
+        # the plug was out, and it streams on, or the power was; to look for it at all four costs a second more
+        streams = self._receives_at(before)
+        self._recognise(self.model, (before, _POWER_UP_BAUD) if streams else (_POWER_UP_BAUD, before))
 
     def _receives_at(self, baud: int) -> bool:
         """Whether anything comes at this speed, within some turns."""
@@ -256,9 +197,9 @@ class LmsLidar(LineDriver):
                 if self._skipped > self._skip:
                     self._skipped = 0
                     before_ns = (self._interlaced - 1 - turn + 0.5) * 1e9 * _TURN_S
-                    self._waiting.append(self._turn(ready, turn, self._count, over_ns - before_ns, came_ns))
+                    self._waiting.append(self._scan_of(ready, turn, self._count, over_ns - before_ns, came_ns))
 
-    def _turn(
+    def _scan_of(
         self, measured: protocol.LmsScan, turn: int, count: TelegramCount, begin_ns: float, arrival_ns: int
     ) -> TimedScan:
         """The beams of one turn, which begins at -90 deg at `begin_ns`."""
@@ -283,9 +224,5 @@ class LmsLidar(LineDriver):
 
 
 def open_lms2xx(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LmsLidar:
-    """Open the lidar at a serial port or HOST:PORT.
-
-    Raises:
-        DeviceError: no such port, it is in use, or no LMS 2xx answers.
-    """
+    """Open the lidar at an address; raises as `open_lidar`."""
     return LmsLidar(address, model)

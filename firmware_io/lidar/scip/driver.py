@@ -18,9 +18,8 @@ from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
 from scanwright.firmware_io.lidar.scip.dialogue import ScipDialogue
 from scanwright.firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
-from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
+from scanwright.firmware_io.lidar.sensor_line import TURN_S, LineDriver
 
-_SCAN_S = 1.0  # without a scan: ten turns of the slowest sensor
 _EXCHANGES = 60  # a second or so of them
 # of its captures, and of firmware of the EW and UST; what else a sensor says of its state is trouble
 _WELL = ("sensor works well", "stable 000 no error", "sensor is working normally")
@@ -28,29 +27,25 @@ _WRONG_TIMES = ("1.16.02(19/Jan./2010)",)  # this firmware of the UTM-30LX answe
 
 
 class ScipLidar(LineDriver):
-    """A SCIP lidar, opened, its laser off. `with` leaves it with the laser off and the port closed.
+    """A SCIP lidar.
 
     Attributes:
-        address: where it was found last.
-        firmware: version, as the sensor writes it.
-        serial_number: by which it is found again.
         parameters: steps, ranges, speed.
         sync: its clock against the host's when it was opened or found again; None from one that cannot tell.
         dropped: scans that are missing between those that were read, by their stamps.
     """
 
+    _clusters = True
+
     def __init__(
         self, address: str, search: Callable[[], Iterable[str]] = lidar_ports, *, stamp_at: StampAt = "step_0"
     ) -> None:
-        """Open it.
+        """Open it; raises as `open_lidar`.
 
         Args:
             address: where it is.
             search: the ports where it may turn up after a re-plug, besides its own address.
             stamp_at: which moment of a turn its stamps mean.
-
-        Raises:
-            DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
         """
         self.address = address
         self.dropped = 0
@@ -59,18 +54,14 @@ class ScipLidar(LineDriver):
         self._bad_scans = 0
         self._counter = StampCounter()
         self._request = b""
-        self._warning = ""
-        self._skip = 0
         self._stamp_ms = -1
         self._dialogue = ScipDialogue(address)
         self._line = self._dialogue.line
         with self._line.closed_on_error():
             self.parameters = parameters.parameters(self.information("PP"))
             version = self.information("VV")
-            self.serial_number = version.get("SERI", "")
-            self.firmware = version.get("FIRM", "")
-            self.sync = self._synchronise()
-            self._clock = self._new_clock()
+            self.serial_number, self.firmware = version.get("SERI", ""), version.get("FIRM", "")
+            self._begin_clock()
 
     @property
     def model(self) -> str:
@@ -92,47 +83,32 @@ class ScipLidar(LineDriver):
         return protocol.information(self._dialogue.ask(command.encode()))
 
     def condition(self) -> tuple[str, ...]:
-        """What it says of its state where that is well (STAT of II); trouble comes with its scans.
-
-        Raises:
-            DeviceError: it does not answer, or is gone.
-        """
+        """What it says of its state where that is well (STAT of II); trouble comes with its scans."""
         status = self.information("II").get("STAT", "")
         return (f"status: {status}",) if _is_well(status) else ()
 
-    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Scan until `stop`; the laser lights by itself.
+    def read_raw(self, timeout_s: float | None = None) -> RawScan:
+        """The next scan as the sensor sent it; raises as `read` does, whose clock it passes by."""
+        deadline_s = time.monotonic() + (TURN_S if timeout_s is None else timeout_s)
+        return self._raw_by(deadline_s)
 
-        Args:
-            intensity: measure it too (ME; the URG-04LX cannot).
-            cluster: steps that share one value, the least range among them.
-            skip: scans to leave out between two.
-
-        Raises:
-            DeviceError: the sensor refuses, or is gone.
-        """
-        window = replace(self.parameters.window, cluster=cluster, intensity=intensity)
+    def _begin(self, intensity: bool, skip: int) -> None:
+        window = replace(self.parameters.window, cluster=self._cluster, intensity=intensity)
         bytes_s = window.bytes_per_scan / self.parameters.scan_period_s / (skip + 1)
         self._dialogue.speed_up(bytes_s, without_speed=self._search)
         self._request = measurement.continuous(window, skip=skip)
-        self._skip = skip
-        self._scan_on()
+        self._period_ms = self.parameters.scan_period_s * 1e3 * (skip + 1)
+        self._stamp_ms = -1
+        status = self.information("II").get("STAT", "")
+        self._warning = f"status: {status}; switch it off and on" if status and not _is_well(status) else ""
+        self._dialogue.insist(self._request, "00")
 
-    def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next scan on the host's clock; it is waited for for a second if nothing else is said.
-
-        Raises:
-            DeviceTimeoutError: none came in time: switched off, or reset; `reconnect` helps where it is back.
-            DeviceError: it was unplugged, or reports a fault.
-        """
-        raw = self.read_raw(timeout_s)
+    def _turn(self, deadline_s: float) -> TimedScan:
+        raw = self._raw_by(deadline_s)
         moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
-        scan = to_laser_scan(raw, self.parameters, moment.time_ns)
-        return TimedScan(scan, raw.arrival_ns, moment.uncertainty_ns, self._warning)
+        return TimedScan(to_laser_scan(raw, self.parameters, moment.time_ns), raw.arrival_ns, moment.uncertainty_ns)
 
-    def read_raw(self, timeout_s: float | None = None) -> RawScan:
-        """The next scan as the sensor sent it; raises as `read` does, whose clock it passes by."""
-        deadline_s = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
+    def _raw_by(self, deadline_s: float) -> RawScan:
         while True:
             reply, arrival_ns = self._dialogue.next(deadline_s)
             if reply.echo[:-2] != self._request[:-2] or reply.status == "00":
@@ -145,55 +121,30 @@ class ScipLidar(LineDriver):
                 except ProtocolError:
                     self._bad_scans += 1
 
-    def stop(self) -> None:
-        """Laser off; a scan that was on its way is dropped.
-
-        Raises:
-            DeviceError: the sensor is gone.
-        """
+    def _halt(self) -> None:
+        """Put the laser out; a scan that was on its way is dropped."""
         self._request = b""
         try:
             self._dialogue.insist(b"QT", "00")
         except DeviceTimeoutError:  # the answer may have been glued to noise
             self._dialogue.insist(b"QT", "00")
 
-    def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Find the sensor again by its serial number, after an unplug or a reset, and scan on if it did.
-
-        Raises:
-            DeviceError: it did not turn up in time.
-        """
-
-        def connect() -> None:
-            errors = []
-            for address in dict.fromkeys([self.address, *self._search()]):
-                try:
-                    self._find_at(address)
-                    return
-                except DeviceError as error:
-                    errors.append(error)
-            raise errors[0]
-
-        until_back(f"{self.address}: lidar {self.serial_number}", timeout_s, connect)
-
-    def _find_at(self, address: str) -> None:
-        """Talk to this very sensor there, its clock learnt anew, and scan on if it did."""
-        self._dialogue.reopen(address)
-        with self._line.closed_on_error():
-            if self.information("VV").get("SERI") != self.serial_number:
-                raise DeviceError(f"{address}: another lidar answers")
-            self._counter.restart()  # a sensor that takes its power from the port has begun anew
-            self.sync = self._synchronise()
-            self._clock = self._new_clock()
-            if self._request:
-                self._scan_on()
-        self.address = address
-
-    def _scan_on(self) -> None:
-        self._stamp_ms = -1
-        status = self.information("II").get("STAT", "")
-        self._warning = f"status: {status}; switch it off and on" if status and not _is_well(status) else ""
-        self._dialogue.insist(self._request, "00")
+    def _find(self) -> None:
+        """Look for this very sensor at every port, by its serial number."""
+        errors = []
+        for address in dict.fromkeys([self.address, *self._search()]):
+            try:
+                self._dialogue.reopen(address)
+                with self._line.closed_on_error():
+                    if self.information("VV").get("SERI") != self.serial_number:
+                        raise DeviceError(f"{address}: another lidar answers")
+                    self._counter.restart()  # a sensor that takes its power from the port has begun anew
+                    self._begin_clock()
+                self.address = address
+                return
+            except DeviceError as error:
+                errors.append(error)
+        raise errors[0]
 
     def _synchronise(self) -> TimeSync | None:
         """Compare the clocks by questions and answers. It puts the laser out, so it comes before all scans."""
@@ -210,8 +161,8 @@ class ScipLidar(LineDriver):
             self._dialogue.insist(b"TM2", "00", "03")
         return synchronised(exchanges)
 
-    def _new_clock(self) -> DeviceClock:
-        """A fresh clock, which gives the times of the first beams.
+    def _begin_clock(self) -> None:
+        """Compare the clocks, and begin a fresh one that gives the times of the first beams.
 
         Nothing can arrive earlier than the end of the last step; a real serial line takes longer by its bytes' time,
         which nobody declares here: all times are late by it.
@@ -220,20 +171,19 @@ class ScipLidar(LineDriver):
         def since_stamp_ns(step: int) -> int:
             return round(self.parameters.since_stamp_s(step, self._stamp_at) * 1e9)
 
-        clock = DeviceClock(
+        self.sync = self._synchronise()
+        self._clock = DeviceClock(
             self.parameters.scan_period_s,
             smallest_delay_ns=since_stamp_ns(self.parameters.last_step + 1),
             first_beam_ns=since_stamp_ns(self.parameters.first_step),
         )
         if self.sync is not None:
-            clock.synchronise(self.sync)
-        return clock
+            self._clock.synchronise(self.sync)
 
     def _raw(self, measured: measurement.Measurement, arrival_ns: int) -> RawScan:
         stamp_ms = self._counter.unwrap(measured.stamp_ms, arrival_ns)
         if 0 <= self._stamp_ms < stamp_ms:
-            period_ms = self.parameters.scan_period_s * 1e3 * (self._skip + 1)
-            self.dropped += max(round((stamp_ms - self._stamp_ms) / period_ms) - 1, 0)
+            self.dropped += max(round((stamp_ms - self._stamp_ms) / self._period_ms) - 1, 0)
         self._stamp_ms = stamp_ms
         return RawScan(
             stamp_ms=stamp_ms,
@@ -251,9 +201,5 @@ def _is_well(status: str) -> bool:
 
 
 def open_scip(address: str, _model: str | None = None, stamp_at: StampAt = "step_0") -> ScipLidar:
-    """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing; it says itself which model it is.
-
-    Raises:
-        DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
-    """
+    """Open the lidar at an address, which says itself which model it is; raises as `open_lidar`."""
     return ScipLidar(address, stamp_at=stamp_at)

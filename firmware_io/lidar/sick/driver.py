@@ -14,14 +14,13 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.lidar.device_clock import DeviceClock, StampCounter
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
+from scanwright.firmware_io.lidar.sensor_line import LineDriver
 from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
 from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
 from scanwright.firmware_io.lidar.sick.values import Kind
 from scanwright.firmware_io.samples import Scan
 
-_SCAN_S = 1.0  # 15 scans of the slowest
 _READY_S = 30.0  # a motor that was off takes ten seconds
 _CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
 _ECHOES = {0: "first echo", 1: "all echoes", 2: "last echo"}  # of FREchoFilter; telegram listing 8014631
@@ -29,32 +28,18 @@ _STLMS_READY = 7  # state of STlms; telegram listing 8014631
 
 
 class SickLidar(LineDriver):
-    """A SICK lidar, opened; `with` leaves it stopped and its port closed.
+    """A SICK lidar.
 
     Attributes:
-        address: where it is.
-        model: name of its type, as in the catalogue.
-        serial_number: by which it is known again.
-        firmware: version, as the sensor writes it.
         dropped: telegrams that are missing between those that were read, by their counter.
     """
 
     def __init__(self, address: str, model: str | None = None) -> None:
-        """Open it.
-
-        Args:
-            address: where it is.
-            model: name in the catalogue; None takes the name that it gives itself, where the catalogue has that.
-
-        Raises:
-            DeviceError: no such port, what answers speaks no CoLa, or it is not known which model it is.
-        """
+        """Open it; without a model of the catalogue it is the one that it calls itself, if the catalogue has that."""
         self.address = address
         self.dropped = 0
         self._measuring = False
         self._bad_scans = 0
-        self._filter_warning = ""
-        self._started: tuple[bool, int] | None = None
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
         self._dialogue = ColaDialogue(address)
         self._line = self._dialogue.line
@@ -66,16 +51,10 @@ class SickLidar(LineDriver):
                     f"{self._name} calls itself '{identity[0]}', which leaves open what it is: name its model; "
                     f"known: {', '.join(sorted(known))}"
                 )
-            self.model = model or identity[0]
             self.firmware = identity[1]
             self.serial_number = self._serial_number()
-        self._product = load_catalogue().get(self.model, Lidar)
+        self._lidar = load_catalogue().get(model or identity[0], Lidar)
         self._forget()
-
-    @property
-    def scan_rate_hz(self) -> float:
-        """Turns per second, as the catalogue says and `start` has set."""
-        return self._product.scan_rate_hz
 
     @property
     def bad_packets(self) -> int:
@@ -83,11 +62,7 @@ class SickLidar(LineDriver):
         return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
-        """Return the hours that it has run, how often it was switched on, and its filters, as far as it tells them.
-
-        Raises:
-            DeviceError: it does not answer, or is gone.
-        """
+        """Return the hours that it has run, how often it was switched on, and its filters, as far as it tells them."""
         hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
         age = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
         switched = [] if starts is None else [f"it was switched on {starts:,} times"]
@@ -96,64 +71,36 @@ class SickLidar(LineDriver):
         means = {None: [], 0: ["mean filter: off"]}
         return (*age, *switched, *echoes, *means.get(averaged, [f"mean filter: {averaged} scans"]))
 
-    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Scan until `stop`, at the rate and resolution of the catalogue.
-
-        Args:
-            intensity: measure it too.
-            cluster: 1; these sensors share no values.
-            skip: turns to leave out between two.
-
-        Raises:
-            DeviceError: the sensor refuses, does not get ready, or is gone.
-        """
-        if cluster != 1:
-            raise DeviceError(f"{self._name}: cluster = {cluster}: a {self.model} sends every beam; use 1")
-        self._begin(intensity, skip, _READY_S)
-
-    def _begin(self, intensity: bool, skip: int, patience_s: float) -> None:
+    def _begin(self, intensity: bool, skip: int) -> None:
+        """At the rate and resolution of the catalogue."""
         self._login()
-        set_rate(self._dialogue, self._product)
+        set_rate(self._dialogue, self._lidar)
         averaged = self._averaged_scans()
         smeared = f"its mean filter averages {averaged} scans, which smears a turning scan: switch it off in SOPAS"
-        self._filter_warning = smeared if averaged else ""
+        self._warning = smeared if averaged else ""
         # channels, intensity, its resolution, unit, encoders, position, name, comment, time of day
         wanted = self._dialogue.writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
         self._dialogue.ask(wanted.number("u16", skip + 1))
         self._measuring = True
         self._dialogue.insist(self._dialogue.writer("sMN LMCstartmeas"), 0)
-        self._wait_until_ready(patience_s)
+        self._wait_until_ready(min(_READY_S, max(self._until_s - time.monotonic(), 0.0)))
         self._dialogue.insist(self._dialogue.writer("sMN Run"), 1)
         self._forget()
         self._dialogue.ask(self._dialogue.writer("sEN LMDscandata").number("u8", 1))
-        self._started = (intensity, skip)
+        self._every = skip + 1
 
-    def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next turn; it is waited for for a second if nothing else is said.
-
-        Raises:
-            DeviceTimeoutError: none came in time.
-            DeviceFaultError: the sensor reports a fault, or that its window is too dirty.
-            DeviceError: it is gone.
-        """
-        deadline_s = time.monotonic() + (_SCAN_S if timeout_s is None else timeout_s)
+    def _turn(self, deadline_s: float) -> TimedScan:
         while True:
             reply, arrival_ns = self._dialogue.next(deadline_s)
             if (reply.word, reply.name) != (b"sSN", b"LMDscandata"):
                 continue
             try:
-                scan = scan_data(reply)
-                return self._timed(scan, arrival_ns)
+                return self._timed(scan_data(reply), arrival_ns)
             except ProtocolError:
                 self._bad_scans += 1
 
-    def stop(self) -> None:
-        """Stop the telegrams, and what `start` lit; a laser that cannot be put out stays on.
-
-        Raises:
-            DeviceError: the sensor is gone.
-        """
-        self._started = None
+    def _halt(self) -> None:
+        """Stop the telegrams, and what `start` lit; a laser that cannot be put out stays on."""
         self._dialogue.ask(self._dialogue.writer("sEN LMDscandata").number("u8", 0))
         if not self._measuring:
             return
@@ -165,24 +112,11 @@ class SickLidar(LineDriver):
             if not (refused.unknown or refused.untimely):
                 raise
 
-    def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Find the sensor again at its address, and scan on if it did.
-
-        Raises:
-            DeviceError: it did not turn up in time.
-        """
-        deadline_s = time.monotonic() + timeout_s
-
-        def connect() -> None:
-            self._dialogue.reopen()
-            with self._line.closed_on_error():
-                if self._serial_number() != self.serial_number:
-                    raise DeviceError(f"{self._name}: it has another serial number")
-                self._forget()
-                if self._started is not None:
-                    self._begin(*self._started, max(deadline_s - time.monotonic(), 0.0))
-
-        until_back(f"{self._name} {self.serial_number}", timeout_s, connect)
+    def _find(self) -> None:
+        self._dialogue.reopen()
+        with self._line.closed_on_error():
+            if self._serial_number() != self.serial_number:
+                raise DeviceError(f"{self._name}: it has another serial number")
 
     def _identity(self) -> tuple[str, str]:
         """Name and version, as the sensor writes them."""
@@ -259,9 +193,8 @@ class SickLidar(LineDriver):
         self._count = scan.telegram_count
         restarts = self._stamps.restarts
         sent_us = self._stamps.unwrap(scan.sent_us, arrival_ns)
-        skip = self._started[1] if self._started else 0
         if self._clock is None or restarts != self._stamps.restarts:
-            self._clock = DeviceClock((skip + 1) / scan.scan_rate_hz, smallest_delay_ns=0, fine=True)
+            self._clock = DeviceClock(self._every / scan.scan_rate_hz, smallest_delay_ns=0, fine=True)
         moment = self._clock.update(sent_us / 1e3, arrival_ns)
         start_deg, step_deg = first.bearing_deg
         shown = scan.channel("RSSI1")
@@ -272,18 +205,17 @@ class SickLidar(LineDriver):
             angle_increment_rad=self._step_rad(step_deg),
             time_increment_s=scan.beam_us / 1e6,
             scan_time_s=1 / scan.scan_rate_hz,
-            range_min_m=self._product.range_min_mm / 1e3,
-            range_max_m=self._product.range_max_mm / 1e3,
+            range_min_m=self._lidar.range_min_mm / 1e3,
+            range_max_m=self._lidar.range_max_mm / 1e3,
             range_m=first.range_m(),
             intensity=intensity.astype(np.float32),
         )
         dirty = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
-        warning = dirty or self._filter_warning
-        return TimedScan(turn, arrival_ns, moment.uncertainty_ns, warning)
+        return TimedScan(turn, arrival_ns, moment.uncertainty_ns, dirty)
 
     def _step_rad(self, step_deg: float) -> float:
         """A step of a third of a degree is sent as 0.3333: 0.027 deg are missing at the end of 811 beams."""
-        exact_deg = 360 / self._product.steps_per_turn
+        exact_deg = 360 / self._lidar.steps_per_turn
         return float(np.radians(exact_deg if abs(step_deg - exact_deg) < 1e-4 else step_deg))
 
     @property
@@ -292,9 +224,5 @@ class SickLidar(LineDriver):
 
 
 def open_sick(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SickLidar:
-    """Open "192.168.0.1:2112", whatever the sensor is doing.
-
-    Raises:
-        DeviceError: no such host, or what answers is no SICK sensor.
-    """
+    """Open the lidar at an address; raises as `open_lidar`."""
     return SickLidar(address, model)

@@ -6,22 +6,19 @@ It has no clock of its own in these modes: its points follow each other evenly, 
 from __future__ import annotations
 
 import struct
-import time
 from contextlib import suppress
-from dataclasses import replace
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
-from scanwright.firmware_io.lidar.sensor_line import LineDriver, until_back
+from scanwright.firmware_io.lidar.sensor_line import TURN_S, LineDriver
 from scanwright.firmware_io.lidar.slamtec import protocol
 from scanwright.firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
 from scanwright.firmware_io.lidar.slamtec.series import SERIES
 from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
 
-_TURN_S = 1.0  # ten turns
 _START_S = 3.0  # the first turn: the motor takes its time
 _TRIES = 3  # the first may meet its stream
 _SILENCE_NS = 500_000_000  # five turns: it may have restarted
@@ -32,41 +29,19 @@ _RPM = 600  # the SDK's default
 
 
 class SlamtecLidar(LineDriver):
-    """An RPLIDAR; `LidarDriver` says what its methods promise.
-
-    Attributes:
-        address: where it was found.
-        serial_number: by which it is known again.
-        firmware: version.
-    """
+    """An RPLIDAR."""
 
     def __init__(self, address: str, model: str | None = None) -> None:
-        """Open it and stop what it does; `model` is a name of the catalogue, None for whatever answers.
-
-        Raises:
-            DeviceError: no such port, it is in use, another model answers, or none.
-        """
+        """Open it and stop what it does; `model` is a name of the catalogue, None for whatever answers."""
         self.address = address
-        self.serial_number = self.firmware = ""
         self._bad_before = 0
         self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
         self._turns = TurnQueue()
-        self._scanning = self._turning = self._intensity = False
-        self._skip, self._warning = 0, ""
+        self._turning = False
         self._pause_s = _PAUSE_S
         self._dialogue = SlamtecDialogue(address)
         self._line = self._dialogue.line
         self._recognise(model)
-
-    @property
-    def model(self) -> str:
-        """Name of its type."""
-        return self._lidar.name
-
-    @property
-    def scan_rate_hz(self) -> float:
-        """Turns per second, by the catalogue; it holds them to some parts in a hundred."""
-        return self._lidar.scan_rate_hz
 
     @property
     def dropped(self) -> int:
@@ -78,24 +53,12 @@ class SlamtecLidar(LineDriver):
         """Packets that were thrown away."""
         return self._bad_before + self._splitter.bad
 
-    def condition(self) -> tuple[str, ...]:
-        """Nothing: it counts no hours; of its health, a fault is told by `start` and a warning with every turn."""
-        return ()
-
-    def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Start the motor and scan until `stop`.
-
-        Raises:
-            DeviceFaultError: it reports a fault.
-            DeviceError: clusters, which it has not; it refuses, or is gone.
-        """
-        if cluster != 1:
-            raise DeviceError(f"{self._line.name}: cluster = {cluster}: a {self.model} sends every point; use 1")
+    def _begin(self, intensity: bool, skip: int) -> None:
         status, code = self._dialogue.ask(protocol.HEALTH, 6, protocol.health)
         if status == 2:
             raise DeviceFaultError(f"{self._line.name}: it reports fault {code:#06x}; switch it off and on")
         self._warning = f"health warning {code:#06x}; it still scans" if status else ""
-        self._intensity, self._skip = intensity, skip
+        self._intensity = intensity
         self._mode = typical_mode(self._dialogue)
         self._turn_motor(on=True)
         mode = struct.pack("<BHH", self._mode.number, 0, 0)
@@ -106,64 +69,37 @@ class SlamtecLidar(LineDriver):
             raise DeviceError(f"{self._line.name}: it sends packets of type {answer.kind:#x}, not {self._mode.kind:#x}")
         byte_ns = self._mode.point_ns * protocol.POINTS[answer.kind] / protocol.SIZES[answer.kind]
         self._pause_s = max(_PAUSE_S, _BUFFER_BYTES * byte_ns / 1e9)
-        self._scanning, self._turning = True, False
+        self._turning = False
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
-        self._turns.begin_anew(self._skip)
+        self._turns.begin_anew(skip)
         self._line.drop_waiting()
         self._resume()
 
-    def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next turn; it is waited for for a second if nothing else is said, three for the first.
+    def _patience_s(self) -> float:
+        return TURN_S if self._turning else _START_S
 
-        Raises:
-            DeviceTimeoutError: none came in time.
-            DeviceError: it was unplugged, or was not started.
-        """
-        if not self._scanning:
-            raise DeviceError(f"{self._line.name}: not started")
-        patience_s = _TURN_S if self._turning else _START_S
-        patience_s = patience_s if timeout_s is None else timeout_s
-        deadline_s = time.monotonic() + patience_s
+    def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._count.arrivals)) is None:
             received, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
-            if received:
-                self._take(received, arrival_ns)
-            else:
+            if not received:
                 self._resume()
-                deadline_s = time.monotonic() + patience_s
+                return None
+            self._take(received, arrival_ns)
         self._turning = True
         arrivals = self._count.arrivals
         uncertainty_ns = self._line.widened(arrivals.uncertainty_ns)
-        timed = timed_scan(turn[0], arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
-        return replace(timed, warning=self._warning)
+        return timed_scan(turn[0], arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
 
-    def stop(self) -> None:
-        """Laser and motor off.
-
-        Raises:
-            DeviceError: the sensor is gone.
-        """
-        self._scanning = False
+    def _halt(self) -> None:
+        """Laser and motor off."""
         self._dialogue.request(protocol.STOP)
         self._turn_motor(on=False)
 
-    def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Open it again where it was, after an unplug or a reset, and scan on if it did.
-
-        Raises:
-            DeviceError: it did not turn up in time.
-        """
-        scanning = self._scanning
-
-        def connect() -> None:
-            self._line.reopen()
-            self._recognise(self.model)
-            if scanning:
-                with self._line.closed_on_error():
-                    self.start(intensity=self._intensity, skip=self._skip)
-
-        until_back(self._line.name, timeout_s, connect)
+    def _find(self) -> None:
+        """Open it again where it was."""
+        self._line.reopen()
+        self._recognise(self.model)
 
     def _recognise(self, model: str | None) -> None:
         """Stop what it does, and hear who it is; the line is closed where no one answers."""
@@ -224,9 +160,5 @@ class SlamtecLidar(LineDriver):
 
 
 def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:
-    """Open the lidar at a serial port or HOST:PORT.
-
-    Raises:
-        DeviceError: no such port, it is in use, or no RPLIDAR answers.
-    """
+    """Open the lidar at an address; raises as `open_lidar`."""
     return SlamtecLidar(address, model)

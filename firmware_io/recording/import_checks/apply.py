@@ -1,4 +1,4 @@
-"""Apply corrections to angles and scans."""
+"""Apply corrections to scans."""
 
 from __future__ import annotations
 
@@ -6,20 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanwright.design.arrays import Floats
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
 from scanwright.firmware_io.samples import Scan
-
-
-def joint_positions(angle: Floats, unit_rad: float, corrections: Corrections) -> Floats:
-    """Return joint positions [rad] of angles in the order of their times, turns counted, shape (n,).
-
-    Args:
-        angle: in its unit, shape (n,).
-        unit_rad: radians of that unit.
-        corrections: scale and zero.
-    """
-    return corrections.angle_scale * np.unwrap((angle - corrections.angle_zero) * unit_rad)
 
 
 def corrected_scan(

@@ -20,7 +20,7 @@ from scanwright.firmware_io.samples import Scan
 AT_M = 5.0  # range at which a finding states its cost
 _LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
 _WRONG_MM = 5.0  # at that range, of the last beam
-_TIME_ERROR = 0.03  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
+_TIME_ERROR = 0.015  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
 _TURN_ERROR = 0.03  # how near to an integer the turns between two scans are that a driver dropped
 _SAME_RANGE = 0.01  # share of the beams with the longest range: no scene puts so many at one distance
 _FEWEST = 20  # beams
@@ -200,7 +200,7 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
     if not even_s:
         return
     ratio = headers.time_increment_ratio
-    if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _LEAST_MM:
+    if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _WRONG_MM:
         yield Finding(
             "time_increment_off",
             "warning",

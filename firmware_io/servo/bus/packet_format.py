@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
+_PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
 NO_ANSWER = "no answer: check its power and cable; another program may have set another speed"
 
 
@@ -42,31 +43,30 @@ class Meaning:
     refusal: str | None = None
 
 
-class PacketFormat(Protocol):
-    """How the servos of a family pack what is said on their bus."""
+class PacketFormat(ABC):
+    """How the servos of a family pack what is said on their bus; packets hold an instruction and its parameters.
+
+    Attributes:
+        protocol: as the maker calls it: "2.0".
+        overhead: bytes of a reading, request and answer, around its values.
+        everyone: number that all answer to; without one, the number that they have from the factory.
+        address_bytes: of an address, and of a size.
+    """
 
     protocol: str
-    """As the maker calls it: "2.0"."""
     overhead: int
-    """Bytes of a reading, request and answer, around its values."""
-    everyone: int
-    """The number that all answer to; where there is none, the one that they have from the factory."""
+    everyone = 254
+    address_bytes = 1
 
-    def ping(self, servo_id: int) -> bytes:
-        """The request to say no more than that it is there."""
+    @abstractmethod
+    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
+        """The bytes of a request."""
 
-    def reading(self, servo_id: int, address: int, size: int) -> bytes:
-        """The request for the values at an address."""
-
-    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
-        """The request to take these values to an address."""
-
-    def reboot(self, servo_id: int) -> bytes:
-        """The request to restart."""
-
+    @abstractmethod
     def acknowledged(self, servo_id: int) -> bytes:
-        """What the answer to a write that was obeyed begins with."""
+        """What the answer to a write that was obeyed begins with, whatever the servo reports of itself."""
 
+    @abstractmethod
     def receive(self, line: SerialLine) -> Status:
         """The next status of any servo.
 
@@ -75,5 +75,24 @@ class PacketFormat(Protocol):
             ProtocolError: what came is damaged.
         """
 
+    @abstractmethod
     def meaning(self, error: int) -> Meaning:
         """What the error byte of a status means."""
+
+    def ping(self, servo_id: int) -> bytes:
+        """The request to say no more than that it is there."""
+        return self.packet(servo_id, _PING, b"")
+
+    def reading(self, servo_id: int, address: int, size: int) -> bytes:
+        """The request for the values at an address."""
+        return self.packet(
+            servo_id, _READ, b"".join(one.to_bytes(self.address_bytes, "little") for one in (address, size))
+        )
+
+    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
+        """The request to take these values to an address."""
+        return self.packet(servo_id, _WRITE, address.to_bytes(self.address_bytes, "little") + values)
+
+    def reboot(self, servo_id: int) -> bytes:
+        """The request to restart, which not every family knows."""
+        return self.packet(servo_id, _REBOOT, b"")

@@ -16,11 +16,9 @@ from __future__ import annotations
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, Protocol1PacketHandler, Protocol2PacketHandler
 
 from scanwright.design.errors import DeviceTimeoutError, ProtocolError
-from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
+from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, PacketFormat, Status
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
-_PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
-_EVERYONE = 254  # broadcast id; e-manual, protocol 1.0 and 2.0
 _CONDITIONS_1 = 0b0010_0101  # overload, overheating, voltage: states of the servo, not answers to the request
 _CHECKSUM_1 = 0b0001_0000  # bit of the error byte: the request arrived damaged
 _REFUSALS_1 = {2: "an angle beyond its limits", 8: "a value out of range", 64: "an instruction it does not know"}
@@ -37,12 +35,11 @@ _REFUSALS_2 = {
 }
 
 
-class Protocol1:
+class Protocol1(PacketFormat):
     """AX and MX from the factory: FF FF, sum of the bytes."""
 
     protocol = "1.0"
     overhead = 14
-    everyone = _EVERYONE
 
     def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
         """The bytes of a request."""
@@ -50,24 +47,8 @@ class Protocol1:
         Protocol1PacketHandler().txPacket(tape, [0, 0, servo_id, *length, instruction, *parameters, 0])
         return tape.packet
 
-    def ping(self, servo_id: int) -> bytes:
-        """As `PacketFormat.ping`, and so are those below."""
-        return self.packet(servo_id, _PING, b"")
-
-    def reading(self, servo_id: int, address: int, size: int) -> bytes:
-        """The request for the values at an address."""
-        return self.packet(servo_id, _READ, address.to_bytes(1, "little") + size.to_bytes(1, "little"))
-
-    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
-        """The request to take these values to an address."""
-        return self.packet(servo_id, _WRITE, address.to_bytes(1, "little") + values)
-
-    def reboot(self, servo_id: int) -> bytes:
-        """The request to restart, which only protocol 2.0 knows."""
-        return self.packet(servo_id, _REBOOT, b"")
-
     def acknowledged(self, servo_id: int) -> bytes:
-        """What the answer to a write begins with; whatever the servo reports of itself."""
+        """As `PacketFormat.acknowledged`."""
         return b"\xff\xff%c\x02" % servo_id
 
     def receive(self, line: SerialLine) -> Status:
@@ -83,12 +64,12 @@ class Protocol1:
         return Meaning(error & _CONDITIONS_1, bool(error & _CHECKSUM_1), refusal)
 
 
-class Protocol2:
+class Protocol2(PacketFormat):
     """X, and MX that were updated: FF FF FD 00, CRC, stuffing."""
 
     protocol = "2.0"
     overhead = 25
-    everyone = _EVERYONE
+    address_bytes = 2
 
     def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
         """The bytes of a request."""
@@ -97,24 +78,8 @@ class Protocol2:
         Protocol2PacketHandler().txPacket(tape, [0, 0, 0, 0, servo_id, *length, instruction, *parameters, 0, 0])
         return tape.packet
 
-    def ping(self, servo_id: int) -> bytes:
-        """As `PacketFormat.ping`, and so are those below."""
-        return self.packet(servo_id, _PING, b"")
-
-    def reading(self, servo_id: int, address: int, size: int) -> bytes:
-        """The request for the values at an address."""
-        return self.packet(servo_id, _READ, address.to_bytes(2, "little") + size.to_bytes(2, "little"))
-
-    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
-        """The request to take these values to an address."""
-        return self.packet(servo_id, _WRITE, address.to_bytes(2, "little") + values)
-
-    def reboot(self, servo_id: int) -> bytes:
-        """The request to restart, which only protocol 2.0 knows."""
-        return self.packet(servo_id, _REBOOT, b"")
-
     def acknowledged(self, servo_id: int) -> bytes:
-        """What the answer to a write begins with; whatever the servo reports of itself."""
+        """As `PacketFormat.acknowledged`."""
         return b"\xff\xff\xfd\x00%c\x04\x00\x55" % servo_id
 
     def receive(self, line: SerialLine) -> Status:

@@ -11,10 +11,9 @@ the registers and the signs are not. A servo that gets a damaged request says no
 from __future__ import annotations
 
 from scanwright.design.errors import DeviceTimeoutError, ProtocolError
-from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, Status
+from scanwright.firmware_io.servo.bus.packet_format import NO_ANSWER, Meaning, PacketFormat, Status
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
-_PING, _READ, _WRITE, _REBOOT = 1, 2, 3, 8
 _HEADER = b"\xff\xff"
 _SHORTEST = 6  # header, id, length, status, sum
 _LAST_ID = b"\xfd"
@@ -24,12 +23,6 @@ _LONGEST = 250  # of the length byte; more is damage
 def checksum(body: bytes) -> int:
     """Of everything between header and sum."""
     return ~sum(body) & 0xFF
-
-
-def request(servo_id: int, instruction: int, parameters: bytes) -> bytes:
-    """The bytes of a request."""
-    body = bytes([servo_id, len(parameters) + 2, instruction]) + parameters
-    return _HEADER + body + bytes([checksum(body)])
 
 
 def from_header(data: bytes) -> bytes:
@@ -58,31 +51,19 @@ def status(data: bytes) -> Status:
     return Status(data[2], data[4], data[5:-1], len(data))
 
 
-class Sts:
+class Sts(PacketFormat):
     """The `PacketFormat` of them."""
 
     protocol = "STS"
     overhead = 14
-    everyone = 254
 
-    def ping(self, servo_id: int) -> bytes:
-        """As `PacketFormat.ping`, and so are those below."""
-        return request(servo_id, _PING, b"")
-
-    def reading(self, servo_id: int, address: int, size: int) -> bytes:
-        """The request for the values at an address."""
-        return request(servo_id, _READ, bytes([address, size]))
-
-    def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
-        """The request to take these values to an address."""
-        return request(servo_id, _WRITE, bytes([address]) + values)
-
-    def reboot(self, servo_id: int) -> bytes:
-        """The request to restart."""
-        return request(servo_id, _REBOOT, b"")
+    def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
+        """The bytes of a request."""
+        body = bytes([servo_id, len(parameters) + 2, instruction]) + parameters
+        return _HEADER + body + bytes([checksum(body)])
 
     def acknowledged(self, servo_id: int) -> bytes:
-        """What the answer to a write begins with; whatever the servo reports of itself."""
+        """As `PacketFormat.acknowledged`."""
         return _HEADER + bytes([servo_id, 2])
 
     def receive(self, line: SerialLine) -> Status:

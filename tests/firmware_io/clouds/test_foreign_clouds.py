@@ -11,6 +11,7 @@ import trimesh
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.clouds import formats
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
+from scanwright.firmware_io.recording.convert import convert
 
 POINTS = np.random.default_rng(5).normal(size=(6, 3)).astype(np.float32)
 RGB = np.random.default_rng(6).integers(0, 256, (6, 3)).astype(np.uint8)
@@ -152,6 +153,36 @@ def test_text_that_may_mean_two_things_is_refused(tmp_path, text):
         read_clouds(tmp_path / "c.txt")
 
 
+PCD = "VERSION .7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n"
+COMMAS = {
+    "a.txt": "1,5 2 -3,25\n4 5 6,5\n",
+    "a.csv": "x;y;z\n1,5;2;-3,25\n4;5;6,5\n",
+    "b.csv": "x, y, z\n1,5, 2, -3,25\n4, 5, 6,5\n",
+    "utm.pcd": PCD + "1,5 2 -3,25\n4 5 6,5\n",
+}
+
+
+@pytest.mark.parametrize("name", COMMAS)
+def test_decimal_commas_are_read_if_a_person_says_so(tmp_path, name):
+    source, out = tmp_path / name, tmp_path / "out.npz"
+    source.write_text(COMMAS[name])
+    if name != "b.csv":
+        with pytest.raises(RecordingError, match=f"{source}: .*decimal_comma = true"):
+            convert(source, out)
+    convert(source, out, decimal_comma=True)
+    np.testing.assert_array_equal(only(out)[0].points_m, [[1.5, 2, -3.25], [4, 5, 6.5]])
+
+
+def test_what_a_decimal_comma_does_not_explain_is_refused(tmp_path):
+    source = tmp_path / "a.txt"
+    source.write_text("1,5,2,5,3,5\n")
+    with pytest.raises(RecordingError, match=f"{source}: "):
+        convert(source, tmp_path / "out.npz", decimal_comma=True)
+    source.write_bytes(b"ply\0")
+    with pytest.raises(RecordingError, match="not a text file"):
+        convert(source, tmp_path / "out.npz", decimal_comma=True)
+
+
 def test_arrays_are_read(tmp_path):
     np.save(tmp_path / "c.npy", POINTS.reshape(2, 3, 3))
     assert only(tmp_path / "c.npy")[0].shape == (2, 3)
@@ -169,6 +200,7 @@ ACME = '''"""Clouds of ACME: three integers a line, in mm."""
 import numpy as np
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import CloudFormat
+from scanwright.firmware_io.recording.convert import convert
 
 FORMAT = CloudFormat("acme", "acme_clouds")
 

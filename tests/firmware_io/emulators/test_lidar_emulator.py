@@ -14,7 +14,7 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar as Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.emulators.hokuyo_models import IDENTITIES, Quartz
-from scanwright.firmware_io.emulators.lidar import LidarEmulator
+from scanwright.firmware_io.emulators.lidar import hokuyo_emulator
 from scanwright.firmware_io.emulators.lidar_machine import LidarMachine, clustered
 from scanwright.firmware_io.lidar.scip import measurement, protocol
 
@@ -85,7 +85,7 @@ def test_the_models_are_those_of_the_catalogue():
             assert product.scan_rate_hz == pytest.approx(1 / of.scan_period_s)
     assert shared == {one.name for one in catalogue if isinstance(one, Lidar) and one.family == "scip"}
     with pytest.raises(DeviceError, match="did you mean 'UTM-30LX'"):
-        LidarEmulator("UTM30LX", plain)
+        hokuyo_emulator("UTM30LX", plain)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_a_cluster_is_its_least_range_that_is_none_of_the_codes(value, cluster):
 
 
 def test_an_independent_client_cannot_tell_it_from_hardware():
-    with LidarEmulator("UST-10LX", plain) as emulator:
+    with hokuyo_emulator("UST-10LX", plain) as emulator:
         host, port = emulator.address.split(":")
         client = HokuyoLX(addr=(host, int(port)), tsync=False, timeout=20, convert_time=False)
         try:
@@ -234,7 +234,7 @@ def test_scans_arrive_late_and_in_order_but_never_early():
         begun.append(int(time_ns[0]))
         return plain(time_ns)
 
-    with LidarEmulator("UTM-30LX", look, jitter_s=0.02) as emulator:
+    with hokuyo_emulator("UTM-30LX", look, jitter_s=0.02) as emulator:
         host, port = emulator.address.split(":")
         with socket.create_connection((host, int(port)), timeout=20) as client:
             client.sendall(b"MD0000000401000\n")
@@ -243,17 +243,17 @@ def test_scans_arrive_late_and_in_order_but_never_early():
                 arrivals += [
                     time.monotonic_ns() for told in splitter.feed(client.recv(4096)) if measurement.is_scan(told)
                 ]
-    late_ms = (np.array(arrivals[:25]) - np.array(begun[:25]) - emulator.smallest_delay_ns) / MS
+    late_ms = (np.array(arrivals[:25]) - np.array(begun[:25]) - emulator.machine.arc_ns) / MS
     assert late_ms.min() >= 0
     assert 3 < np.median(late_ms)  # evenly spread to 20 ms, and more where the machine is busy
-    assert emulator.smallest_delay_ns == pytest.approx(1081 / 1440 * 25.05 * MS, abs=1)
+    assert emulator.machine.arc_ns == pytest.approx(1081 / 1440 * 25.05 * MS, abs=1)
 
 
 def test_a_look_that_fails_is_told_at_the_end():
     def look(_):
         raise ZeroDivisionError("no scene")
 
-    emulator = LidarEmulator("UTM-30LX", look, scanning=True)
+    emulator = hokuyo_emulator("UTM-30LX", look, scanning=True)
     with pytest.raises(ZeroDivisionError), emulator:
         emulator._thread.join(timeout=60)
         assert not emulator._thread.is_alive()

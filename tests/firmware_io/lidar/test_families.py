@@ -3,18 +3,13 @@
 from dataclasses import replace
 
 import pytest
+from virtual_time import replace_time
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.lidar import families, sensor_line
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
-from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
-from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
-from scanwright.firmware_io.lidar.scip import dialogue as scip_dialogue
-from scanwright.firmware_io.lidar.sick import dialogue as sick_dialogue
-from scanwright.firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
-from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 
 
 @pytest.fixture(autouse=True)
@@ -61,8 +56,7 @@ class SilentPort:
 def test_a_silent_port_is_asked_at_every_speed_in_nine_seconds(monkeypatch):
     """`doctor` without a model waits for each family in turn: what answers nothing at a speed is not asked again."""
     port = SilentPort()
-    for module in (sensor_line, ldrobot, lms2xx, scip_dialogue, sick_dialogue, slamtec_dialogue, slamtec):
-        monkeypatch.setattr(module, "time", port)
+    replace_time(port, monkeypatch, "scanwright.firmware_io.lidar")
     monkeypatch.setattr(sensor_line, "open_stream", lambda _: port)
     monkeypatch.setattr(sensor_line.SensorLine, "serial", property(lambda _: port))
     with pytest.raises(DeviceError, match=r"no SCIP sensor answers.*no RPLIDAR answers.*no SICK LMS 2xx answers"):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.emulators import ldrobot as emulators
-from scanwright.firmware_io.emulators.ldrobot import LdrobotEmulator
+from scanwright.firmware_io.emulators.ldrobot import ldrobot_emulator
 from scanwright.firmware_io.lidar.families import family_of, open_lidar
 from scanwright.firmware_io.lidar.ldrobot import driver, protocol
 
@@ -24,7 +24,6 @@ EXAMPLE = bytes.fromhex(
 def patience(monkeypatch):
     """Emulators share a computer with the tests: ten times as long."""
     monkeypatch.setattr(driver, "_FIRST_PACKETS_S", 5.0)
-    monkeypatch.setattr(driver, "_TURN_S", 10.0)
 
 
 def lidar(model):
@@ -127,7 +126,7 @@ def test_damaged_streams_give_packets_or_nothing(data):
 @pytest.mark.parametrize("model", ["LD06", "LD19", "STL27L"])
 def test_turns_come_as_they_were_seen_and_when(model):
     ranging = Ranging()
-    emulator = LdrobotEmulator(lidar(model), ranging, rate_error=5e-5, first_ms=29_700)
+    emulator = ldrobot_emulator(lidar(model), ranging, rate_error=5e-5, first_ms=29_700)
     with emulator, open_lidar(emulator.port, model) as ours:
         assert (ours.model, ours.scan_rate_hz) == (model, 10.0)
         ours.start(intensity=True)
@@ -149,17 +148,17 @@ def test_turns_come_as_they_were_seen_and_when(model):
 
 
 def test_nobody_can_tell_the_first_two_apart_but_the_third():
-    with LdrobotEmulator(lidar("STL27L"), Ranging()) as emulator:
+    with ldrobot_emulator(lidar("STL27L"), Ranging()) as emulator:
         with open_lidar(emulator.port) as ours:
             assert ours.model == "STL27L"
         with pytest.raises(DeviceError, match="points/s: this is a STL27L, not a LD19"):
             open_lidar(emulator.port, "LD19")
-    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port) as ours:
+    with ldrobot_emulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port) as ours:
         assert ours.model in ("LD06", "LD19")
 
 
 def test_bad_packets_are_counted_and_never_handed_out():
-    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port, "LD19") as ours:
+    with ldrobot_emulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port, "LD19") as ours:
         ours.start()
         ours.read()
         emulator.garble(5)
@@ -173,7 +172,7 @@ def test_bad_packets_are_counted_and_never_handed_out():
 
 
 def test_an_unplugged_sensor_is_told_and_found_again():
-    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port, "LD19") as ours:
+    with ldrobot_emulator(lidar("LD19"), Ranging()) as emulator, open_lidar(emulator.port, "LD19") as ours:
         ours.start()
         ours.read()
         emulator.unplug()
@@ -189,7 +188,7 @@ def test_an_unplugged_sensor_is_told_and_found_again():
 
 def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
     with (
-        LdrobotEmulator(lidar("LD19"), Ranging(), first_ms=17_000) as emulator,
+        ldrobot_emulator(lidar("LD19"), Ranging(), first_ms=17_000) as emulator,
         open_lidar(emulator.port, "LD19") as ours,
     ):
         ours.start()
@@ -219,7 +218,7 @@ def test_a_port_where_something_else_or_nothing_talks(monkeypatch):
 
 def test_what_it_cannot_is_said():
     assert not family_of("LD19").stamp_choice
-    with LdrobotEmulator(lidar("LD19"), Ranging()) as emulator:
+    with ldrobot_emulator(lidar("LD19"), Ranging()) as emulator:
         with pytest.raises(DeviceError, match="stamp_at"):
             open_lidar(emulator.port, "LD19", "rear")
         with open_lidar(emulator.port, "LD19") as ours:

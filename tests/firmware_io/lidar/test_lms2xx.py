@@ -6,10 +6,11 @@ import virtual_line
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from virtual_line import VirtualLine
+from virtual_time import replace_time
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, DeviceFaultError, ProtocolError
-from scanwright.firmware_io.emulators.sick.lms_emulator import LmsEmulator, lms_emulator, write_telegram
+from scanwright.firmware_io.emulators.sick.lms_emulator import lms_emulator, write_telegram
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.lms2xx import driver, protocol
@@ -108,8 +109,7 @@ def opened(monkeypatch):
         line = VirtualLine(model, wall)
         for name, value in state.items():
             setattr(line.machine, name, value)
-        for module in (sensor_line, driver):
-            monkeypatch.setattr(module, "time", line)
+        replace_time(line, monkeypatch, "scanwright.firmware_io.lidar")
         monkeypatch.setattr(sensor_line, "open_stream", line.open)
         lidar = open_lidar("virtual", model)
         with_lidar.append(lidar)
@@ -198,8 +198,8 @@ def test_a_fault_and_a_dirty_window_are_told(opened):
 def test_what_it_cannot_is_said(opened):
     lidar, line, _ = opened()
     line.machine.baud = 500_000
-    for wish in ({"intensity": True}, {"cluster": 2}):
-        with pytest.raises(DeviceError, match="one range for each beam"):
+    for wish, what in (({"intensity": True}, "intensity"), ({"cluster": 2}, "cluster = 2")):
+        with pytest.raises(DeviceError, match=what):
             lidar.start(**wish)
     with pytest.raises(DeviceError, match="not started"):
         lidar.read()
@@ -245,9 +245,9 @@ class VirtualPort(byte_stream.SerialStream):
 @pytest.mark.parametrize("fault", ["brown-out", "unplugged", "unplugged while it changes its speed"])
 def test_after_an_interruption_it_is_found_at_the_speed_that_it_has_by_then(monkeypatch, fault):
     line = VirtualLine("LMS 200", Wall())
-    for module in (sensor_line, driver):
-        monkeypatch.setattr(module, "time", line)
+    replace_time(line, monkeypatch, "scanwright.firmware_io.lidar")
     monkeypatch.setattr(sensor_line, "open_stream", lambda address: VirtualPort(line.open(address)))
+    monkeypatch.setattr(sensor_line, "TURN_S", 1.0)
     with open_lidar("virtual", "LMS 200") as lidar:
         lidar.start()
         assert lidar.read().scan.range_m.size == 181 and line.machine.baud == 500_000
@@ -295,7 +295,6 @@ class SlowPort(byte_stream.SerialStream):
 def test_the_speed_of_a_serial_line_is_found_and_raised_as_far_as_the_adapter_can(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     with lms_emulator(load_catalogue().products["LMS 200"], Wall()) as emulator:
-        assert isinstance(emulator, LmsEmulator)
         monkeypatch.setattr(SlowPort, "machine", emulator.machine)
         emulator.machine.baud = 19_200
         monkeypatch.setattr(driver, "_ANSWER_S", 0.3)

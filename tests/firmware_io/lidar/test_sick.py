@@ -8,7 +8,7 @@ import pytest
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
-from scanwright.firmware_io.emulators.sick.cola_emulator import SickEmulator, SickMachine
+from scanwright.firmware_io.emulators.sick.cola_emulator import SickMachine, sick_emulator
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.sick import driver
 from scanwright.firmware_io.lidar.sick.dialogue import RefusedError
@@ -25,7 +25,7 @@ def look(_time_ns, bearing_rad):
 
 def emulator(model="LMS111", ranging=look, jitter_s=0.0, **state):
     lidar = load_catalogue().get(model, Lidar)
-    return SickEmulator(SickMachine(lidar, ranging, time.monotonic_ns(), **state), jitter_s=jitter_s)
+    return sick_emulator(lidar, ranging, jitter_s=jitter_s, **state)
 
 
 def check(scan, model):
@@ -243,7 +243,7 @@ OTHER_REQUESTS = [
 
 def test_an_emulator_answers_what_other_programs_ask():
     """The range of a TiM571: from -45 to 225 deg, in steps of a third of a degree cut to 0.3333."""
-    machine = SickEmulator(SickMachine(load_catalogue().get("TiM571", Lidar), look, 0)).machine
+    machine = SickMachine(load_catalogue().get("TiM571", Lidar), look, 0)
     for request, answer in OTHER_REQUESTS:
         got, rest = machine.hear(b"\x02" + request.encode() + b"\x03", 1_000_000_000)
         assert (got, rest) == (b"\x02" + answer.encode() + b"\x03", b""), request

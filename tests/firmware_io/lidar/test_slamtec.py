@@ -14,7 +14,7 @@ from patience import until
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.errors import DeviceError, ProtocolError
 from scanwright.firmware_io.emulators import world
-from scanwright.firmware_io.emulators.slamtec.machine import SlamtecEmulator
+from scanwright.firmware_io.emulators.slamtec.machine import slamtec_emulator
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
@@ -44,7 +44,6 @@ DESCRIPTORS = [
 def patience(monkeypatch):
     """Emulators share a computer with the tests: wait ten times as long."""
     monkeypatch.setattr(dialogue, "_ANSWER_S", 2.0)
-    monkeypatch.setattr(driver, "_TURN_S", 20.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
     monkeypatch.setattr(world, "SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
@@ -82,7 +81,7 @@ def test_descriptors_are_those_that_are_published(published, told):
 
 
 def test_a_emulator_answers_published_requests_with_published_descriptors():
-    emulator = SlamtecEmulator(lidar("RPLIDAR A1"), ranging)
+    emulator = slamtec_emulator(lidar("RPLIDAR A1"), ranging)
     for request, published, size in (("A5 50", DESCRIPTORS[0], 20), ("A5 52", DESCRIPTORS[1], 3)):
         told, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
         assert told[:7] == bytes.fromhex(published[0]) and (len(told), rest) == (7 + size, b"")
@@ -119,7 +118,7 @@ SDK_DIALOGUES = {
 
 @pytest.mark.parametrize("model", sorted(SDK_DIALOGUES))
 def test_an_emulator_answers_what_the_makers_program_asks(model):
-    emulator = SlamtecEmulator(lidar(model), ranging)
+    emulator = slamtec_emulator(lidar(model), ranging)
     for request, answer in SDK_DIALOGUES[model]:
         got, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
         assert got[: len(bytes.fromhex(answer))] == bytes.fromhex(answer), request
@@ -128,7 +127,7 @@ def test_an_emulator_answers_what_the_makers_program_asks(model):
 
 def test_a_serial_line_sends_no_faster_than_it_can():
     for model, identity in IDENTITIES.items():
-        emulator = SlamtecEmulator(lidar(model), ranging)
+        emulator = slamtec_emulator(lidar(model), ranging)
         for number, mode in enumerate(identity.modes):
             command = protocol.SCAN if mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
             request = protocol.request(command, bytes([number, 0, 0, 0, 0]))
@@ -140,7 +139,7 @@ def test_a_serial_line_sends_no_faster_than_it_can():
 
 def test_old_firmware_streams_express_capsules():
     """Before 1.24 it does not answer GET_LIDAR_CONF; it states the time between two points instead."""
-    with SlamtecEmulator(lidar("RPLIDAR A1"), ranging) as emulator:
+    with slamtec_emulator(lidar("RPLIDAR A1"), ranging) as emulator:
         emulator.machine.identity = replace(IDENTITIES["RPLIDAR A1"], firmware=(1, 20), modes=())
         with open_lidar(emulator.port, "RPLIDAR A1") as ours:
             ours.start()
@@ -171,7 +170,7 @@ def test_a_cabin_is_read_by_its_bits():
 
 
 def stream_of(model, mode, turns=0.3):
-    emulator = SlamtecEmulator(lidar(model), ranging)
+    emulator = slamtec_emulator(lidar(model), ranging)
     start = protocol.request(protocol.EXPRESS_SCAN, bytes([mode, 0, 0, 0, 0]))
     emulator.machine.hear(start, emulator.machine.began_ns)
     data = b""
@@ -234,7 +233,7 @@ def test_anything_is_an_answer_or_a_typed_error(read, data):
 
 @pytest.mark.parametrize("model", sorted(IDENTITIES))
 def test_turns_come_as_they_were_seen(model):
-    with SlamtecEmulator(lidar(model), ranging) as emulator:
+    with slamtec_emulator(lidar(model), ranging) as emulator:
         with open_lidar(emulator.port, model) as ours:
             assert ours.model == model and ours.firmware == "1.29" and len(ours.serial_number) == 32
             ours.start(intensity=True)
@@ -256,7 +255,7 @@ def test_turns_come_as_they_were_seen(model):
 
 
 def test_another_model_is_refused_and_none_named_is_found():
-    with SlamtecEmulator(lidar("RPLIDAR A1"), ranging) as emulator:
+    with slamtec_emulator(lidar("RPLIDAR A1"), ranging) as emulator:
         with pytest.raises(DeviceError, match="this is a RPLIDAR A1, not a RPLIDAR C1"):
             open_lidar(emulator.port, "RPLIDAR C1")
         with driver.open_slamtec(emulator.port) as ours:
@@ -265,7 +264,7 @@ def test_another_model_is_refused_and_none_named_is_found():
 
 @pytest.mark.parametrize("model", ["RPLIDAR A2", "RPLIDAR S2"])
 def test_bad_capsules_are_counted_and_never_handed_out(model):
-    with SlamtecEmulator(lidar(model), ranging) as emulator, open_lidar(emulator.port, model) as ours:
+    with slamtec_emulator(lidar(model), ranging) as emulator, open_lidar(emulator.port, model) as ours:
         ours.start()
         ours.read()
         emulator.garble(4)
@@ -278,7 +277,7 @@ def test_bad_capsules_are_counted_and_never_handed_out(model):
 
 
 def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
-    with SlamtecEmulator(lidar("RPLIDAR C1"), ranging) as emulator:
+    with slamtec_emulator(lidar("RPLIDAR C1"), ranging) as emulator:
         emulator.machine.hear(protocol.request(protocol.SCAN), time.monotonic_ns())
         with open_lidar(emulator.port, "RPLIDAR C1") as ours:
             ours.start()
@@ -299,7 +298,7 @@ def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
 
 
 def test_a_warning_of_its_health_is_told_with_the_turns():
-    with SlamtecEmulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
+    with slamtec_emulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
         emulator.machine.health = 1
         ours.start()
         assert ours.read().warning == "health warning 0x8002; it still scans"
@@ -310,7 +309,7 @@ def test_a_warning_of_its_health_is_told_with_the_turns():
 
 
 def test_a_fault_is_told():
-    with SlamtecEmulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
+    with slamtec_emulator(lidar("RPLIDAR S1"), ranging) as emulator, open_lidar(emulator.port, "RPLIDAR S1") as ours:
         emulator.machine.health = 2
         with pytest.raises(DeviceError, match="it reports fault 0x8002"):
             ours.start()

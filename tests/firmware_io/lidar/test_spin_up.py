@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from quick_tests import samples
 from virtual_line import VirtualLine
+from virtual_time import replace_time
 
 from scanwright.firmware_io.emulators.slamtec.models import IDENTITIES
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.families import open_lidar
-from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
 from scanwright.firmware_io.lidar.slamtec import dialogue, driver, protocol
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
 
@@ -23,8 +23,7 @@ def clock_m(time_ns, bearing_rad):
 
 def line_of(model, number, monkeypatch):
     line = VirtualLine(model, clock_m)
-    for module in (sensor_line, dialogue, driver):
-        monkeypatch.setattr(module, "time", line)
+    replace_time(line, monkeypatch, "scanwright.firmware_io.lidar")
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     mode = IDENTITIES[model].modes[number]
     number = 0 if mode.kind == protocol.CAPSULES else number
@@ -56,8 +55,7 @@ def test_turns_come_while_the_motor_spins_up(model, number, monkeypatch):
 @pytest.mark.parametrize("model", samples(["LD06", "LD19", "STL27L"], ["LD19"]))
 def test_an_ldrobot_that_starts_from_rest_sends_no_bad_packets(model, monkeypatch):
     line = VirtualLine(model, clock_m)
-    for module in (sensor_line, ldrobot):
-        monkeypatch.setattr(module, "time", line)
+    replace_time(line, monkeypatch, "scanwright.firmware_io.lidar")
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     with open_lidar("virtual", model) as lidar:
         line.machine.power_cycle(line.now_ns)

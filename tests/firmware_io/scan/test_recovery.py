@@ -5,19 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from virtual_line import VirtualLine
+from virtual_time import replace_time
 
 from scanwright.design.errors import DeviceError, DeviceFaultError
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.families import FAMILIES, family_of, open_lidar
-from scanwright.firmware_io.lidar.ldrobot import driver as ldrobot
-from scanwright.firmware_io.lidar.lms2xx import driver as lms2xx
-from scanwright.firmware_io.lidar.scip import dialogue as scip_dialogue
 from scanwright.firmware_io.lidar.scip import driver as scip
-from scanwright.firmware_io.lidar.sick import dialogue as cola
-from scanwright.firmware_io.lidar.sick import driver as sick
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
-from scanwright.firmware_io.lidar.slamtec import dialogue as slamtec_dialogue
-from scanwright.firmware_io.lidar.slamtec import driver as slamtec
 from scanwright.firmware_io.scan import doctor, lidar_scans
 from scanwright.firmware_io.scan.reporter import Reporter
 
@@ -56,19 +50,7 @@ class Scanner:
 def line(request, monkeypatch):
     line = VirtualLine(request.param, wall)
     line.machine.baud = 500_000  # of those that have a speed: no such line here
-    for module in (
-        sensor_line,
-        ldrobot,
-        lms2xx,
-        scip_dialogue,
-        scip,
-        cola,
-        sick,
-        slamtec_dialogue,
-        slamtec,
-        lidar_scans,
-    ):
-        monkeypatch.setattr(module, "time", line)
+    replace_time(line, monkeypatch, "scanwright.firmware_io.lidar", "scanwright.firmware_io.scan")
     monkeypatch.setattr(sensor_line, "open_stream", line.open)
     monkeypatch.setattr(scip, "lidar_ports", list)
     return line
@@ -196,3 +178,37 @@ def test_a_fault_in_the_midst_of_a_scan_is_told_within_the_turns_that_were_under
             scanner.next()
     assert scanner.line.now_ns - began_ns < 5e9 / scanner.lidar.scan_rate_hz
     assert scanner.axis == []  # what ends the scan ends the motion, too
+
+
+class LoosePlug:
+    """A lidar that is lost at each second read and comes back at once."""
+
+    model = "loose"
+
+    def __init__(self):
+        self.reads = self.reconnects = 0
+
+    def read(self):
+        self.reads += 1
+        if self.reads % 2:
+            raise DeviceError("gone")
+        return SimpleNamespace(scan=self.reads, uncertainty_ns=0, warning="")
+
+    def reconnect(self, _timeout_s):
+        self.reconnects += 1
+
+
+@pytest.mark.parametrize(("every_s", "most"), [(1.0, 9), (70.0, 30)])
+def test_one_that_is_lost_again_and_again_ends_the_scan(monkeypatch, every_s, most):
+    now_s = iter(every_s * number for number in range(1000))
+    monkeypatch.setattr(lidar_scans, "time", SimpleNamespace(monotonic=lambda: next(now_s)))
+    lidar = LoosePlug()
+    scans = lidar_scans.LidarScans(lidar, Reporter())
+    if most == 9:
+        with pytest.raises(DeviceError, match="gone; lost 10 times in"):
+            for _ in range(30):
+                scans.next()
+        assert lidar.reconnects == most
+    else:
+        for _ in range(most):
+            scans.next()

@@ -17,7 +17,7 @@ from scanwright.firmware_io.servo.bus import bus as servo_bus
 from scanwright.firmware_io.servo.bus import serial_line
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.registers import Register
-from scanwright.firmware_io.servo.feetech.packets import STS, from_header, request
+from scanwright.firmware_io.servo.feetech.packets import STS, from_header
 from scanwright.firmware_io.servo.feetech.tables import TABLES
 
 (STS3215,) = TABLES
@@ -36,7 +36,7 @@ FRAMES = [
 def test_frames_are_those_that_others_write(instruction, parameters, asked, said):
     """The driver sends them, and the emulator, which was written apart from it, answers them."""
     wire = bytes.fromhex(asked)
-    assert request(1, instruction, parameters) == wire
+    assert STS.packet(1, instruction, parameters) == wire
     servo = machine_of("STS3215", None, Load(), 0, 0.0)
     assert answers([servo], servo.take(bytearray(wire)), 0) == [bytes.fromhex(said)]
 
@@ -91,7 +91,7 @@ def test_what_is_written_while_the_memory_is_locked_is_gone_with_the_power():
     servo = machine_of("STS3215", None, Load(), 0, 0.0)
 
     def write(address, value):
-        answers([servo], servo.take(bytearray(request(1, 3, bytes([address, value])))), 0)
+        answers([servo], servo.take(bytearray(STS.packet(1, 3, bytes([address, value])))), 0)
 
     write(33, 1)
     assert servo.memory[33] == 1

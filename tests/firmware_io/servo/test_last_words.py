@@ -105,9 +105,8 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
 
     servo = Holding(hears)
     with turning_servo(servo, Spin(period_s=2.0)) as axis, pytest.raises(DeviceError, match="did not come back"):
-        scans = object.__new__(lidar_scans.LidarScans)
-        scans.lidar, scans.axis, scans.away = Away(), axis, 0
-        scans._reporter = Reporter(watch=SimpleNamespace(message=said.append))
+        scans = lidar_scans.LidarScans(Away(), Reporter(watch=SimpleNamespace(message=said.append)))
+        scans.axis = axis
         scans.next()
     assert servo.held >= 1
     assert ("the servo has answered that it holds" in said[0]) == hears

@@ -7,6 +7,13 @@ from queue import Empty
 from types import ModuleType
 
 
+def replace_time(clock, monkeypatch, *packages):
+    """Put a clock in the place of the module `time` in all modules of packages that have been imported."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith(packages) and isinstance(getattr(module, "time", None), (ModuleType, VirtualTime)):
+            monkeypatch.setattr(module, "time", clock)
+
+
 class VirtualTime:
     """Stands in for the module `time`, and makes the threads, events and queues that wait on it.
 
@@ -63,9 +70,7 @@ class VirtualTime:
 
     def put_in_place_of_time(self, monkeypatch, *packages):
         """In all modules of packages that have been imported."""
-        for name, module in list(sys.modules.items()):
-            if name.startswith(packages) and isinstance(getattr(module, "time", None), (ModuleType, VirtualTime)):
-                monkeypatch.setattr(module, "time", self)
+        replace_time(self, monkeypatch, *packages)
 
     def Event(self):
         return _Event(self)

@@ -16,6 +16,7 @@ multiprocessing.get_all_start_methods = lambda: ["spawn"]
 from pathlib import Path
 import numpy as np
 import scanwright as sw
+from scanwright.firmware_io.clouds.ply import read_ply, write_points
 from scanwright.firmware_io.recording.recording import RecordingWriter
 from scanwright.firmware_io.samples import Scan
 from scanwright.cli.app import run as main
@@ -49,6 +50,9 @@ run("evaluate", "ahead.toml", "--angles=0,0,0,-60")
 run("import", "seen.mcap", "--scan", "/scan", "--angle", "/joint_states", "--angle-unit=rad", "-o", "imported.mcap")
 run("assemble", "imported.mcap", "--angles", "angles.json", "-o", "cloud.ply")
 run("calibrate", "imported.mcap", "--angles", "angles.json", "-o", "calibrated.json")
+rows = read_ply(Path("cloud.ply"))
+write_points(Path("moved.ply"), np.stack([rows[axis][::2] for axis in "xyz"], axis=1) + (0.05, 0.0, 0.0))
+run("register", "cloud.ply", "moved.ply", "-o", "merged.ply")
 run("map", "cloud.ply", "-o", "map.yaml")
 run("catalogue")
 run("schema")
@@ -86,4 +90,4 @@ def test_what_drives_no_device_works_and_devices_are_refused_in_one_line(tmp_pat
     assert "two builds" not in done.stdout and "built ['a.txt', 'ahead']" in done.stdout
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert errors == [f"error: {REFUSED}"] * 2
-    assert len(codes) == 15
+    assert len(codes) == 16
