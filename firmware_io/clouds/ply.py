@@ -2,6 +2,8 @@
 
 Format: G. Turk, "The PLY polygon file format" (1994). Written by ourselves, because the usual library is GPL. It holds
 everything but integers of 64 bits.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -107,11 +109,7 @@ class PlyWriter:
 
 
 def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterable[str] = ()) -> None:
-    """Write bare points (n, 3) as a cloud of x y z.
-
-    Raises:
-        RecordingError: the file cannot be written, or is no .ply.
-    """
+    """Write bare points (n, 3) as a cloud of x y z."""
     check_place(path, RecordingError)
     if path.suffix != ".ply":
         raise RecordingError(f"{path}: clouds are written as PLY; name it {path.with_suffix('.ply').name}")
@@ -173,11 +171,7 @@ class PlyHeader:
 
 
 def read_header(path: Path) -> PlyHeader:
-    """Read the header of any PLY file with a cloud.
-
-    Raises:
-        RecordingError: the file is missing, is no PLY, or has no element `vertex` of x y z; a line is named.
-    """
+    """Read the header of any PLY file with a cloud."""
     with foreign(f"{path}: cannot read", path.open, "rb") as stream:
         text = foreign(f"{path}: cannot read", stream.read, _LONGEST_HEADER)
     end = re.search(rb"^end_header[ \t]*(\r\n|\n|\r)", text, re.MULTILINE) or re.search(rb"\rend_header(\r)", text)
@@ -256,11 +250,7 @@ def _rows_before(header: PlyHeader) -> int:
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
-    """Read the rows of a cloud, shape (n,); binary ones are mapped: columns are loaded when touched.
-
-    Raises:
-        RecordingError: as for `read_header`; or the file is cut off, or a line of text is not numbers.
-    """
+    """Read the rows of a cloud, shape (n,); binary ones are mapped: columns are loaded when touched."""
     header = read_header(path)
     if header.form == "ascii":
         return next(_chunks(path, header, header.vertex.rows))

@@ -1,4 +1,7 @@
-"""The rates of a gyro, from a topic of the recording or from a CSV file, and how its IMU stands on the platform."""
+"""The rates of a gyro, from a topic of the recording or from a CSV file, and how its IMU stands on the platform.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +36,6 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
     Args:
         spec: a `.csv` file with a header (time, wx wy wz [rad/s]), or a topic of `sensor_msgs/Imu` in the recording.
         recording: where topics are.
-
-    Raises:
-        RecordingError: there is no such file or topic, or it holds no rates.
     """
     path = Path(spec)
     if path.is_file():
@@ -69,9 +69,6 @@ def imu_mount(
         gyro: names the IMU's frame.
         platform: the frame that the poses are of.
         recording: whose /tf_static joins the two, where they are not the same.
-
-    Raises:
-        RecordingError: nothing tells how it stands.
     """
     if rpy_deg is not None:
         if not all(map(math.isfinite, rpy_deg)):

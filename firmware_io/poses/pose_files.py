@@ -1,4 +1,7 @@
-"""Platform poses from a file (TUM, CSV) or from a topic of the recording."""
+"""Platform poses from a file (TUM, CSV) or from a topic of the recording.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -31,9 +34,6 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
         spec: a file, `.csv` with a header or else TUM (`t x y z qx qy qz qw` in each line, s and m); or
             TOPIC[:PARENT:CHILD] of the recording, the frames where the topic has several (/tf).
         recording: where topics are.
-
-    Raises:
-        RecordingError: there is no such file or topic, or it does not hold poses.
     """
     path = Path(spec)
     if path.is_file():

@@ -1,4 +1,7 @@
-"""Tables of other people's: a time in each line and numbers beside it, by the names of their columns."""
+"""Tables of other people's: a time in each line and numbers beside it, by the names of their columns.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +30,6 @@ def csv_rows(path: Path, columns: Mapping[str, set[str]]) -> Iterator[Row]:
     Args:
         path: of the file. Its time is in seconds, or in nanoseconds where the column's name or unit says so.
         columns: what each wanted column may be called, in the order of the numbers.
-
-    Raises:
-        RecordingError: the file cannot be read, lacks a column, or a line is no numbers.
     """
     lines = csv.reader(lines_of(path))
     header = [word.strip().lstrip("#").strip().lower() for word in next(lines, [])]
@@ -53,9 +53,6 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
         time: as it stands there.
         digits: how many decimal places of the time are nanoseconds.
         values: as they stand there.
-
-    Raises:
-        RecordingError: something is no number, or no time of nanoseconds below 2^63.
     """
     try:
         # a float64 rounds the seconds of today to 256 ns
@@ -72,11 +69,7 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
 
 
 def lines_of(path: Path) -> list[str]:
-    """The lines of a text.
-
-    Raises:
-        RecordingError: the file cannot be read.
-    """
+    """The lines of a text."""
     return foreign(f"{path}: cannot read", read_text, path).splitlines()
 
 

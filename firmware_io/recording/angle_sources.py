@@ -1,6 +1,8 @@
 """Where the axis angle of somebody's recording stands: a number in messages, a pair of frames in `/tf`, or a table.
 
 And what speaks against the unit that it is said to have.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -63,11 +65,7 @@ def parse_frames(text: str) -> FrameSource | None:
 
 
 def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[tuple[float, ...], int]]:
-    """Values of a message and their stamps [ns] (0: none): one number, or the quaternions x y z w of a pair of frames.
-
-    Raises:
-        RecordingError: the message holds no such thing.
-    """
+    """Values of a message and their stamps [ns] (0: none): a number, or the quaternion x y z w of a pair of frames."""
     if isinstance(source, Source):
         numbers, stamp_ns = numbers_at(body, source, bag)
         return [(numbers, stamp_ns)] if numbers else []
@@ -89,9 +87,6 @@ def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source)
     Args:
         quaternions: x y z w.
         source: for errors.
-
-    Raises:
-        RecordingError: the frame stands still, or turns about more than one axis.
     """
     turned = Rotation.from_quat(quaternions)
     since = (turned[0].inv() * turned).as_quat()
@@ -117,9 +112,6 @@ def read_table(text: str) -> tuple[Times, Floats]:
     """Times [ns] and angles, shape (n,) each, of `FILE.csv[:COLUMN]`.
 
     The first line names its columns: `time_s` or `time_ns` since 1970, and the angle.
-
-    Raises:
-        RecordingError: there is no such file or column, or a line is no numbers.
     """
     name, _, column = text.partition(":")
     path = Path(name)

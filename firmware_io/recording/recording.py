@@ -9,6 +9,8 @@ Where there is a /scan_beams, the even grid of /scan is rounded for those who kn
 and time are true. Reading takes the true ones.
 
 `log_time` is the stamp. A metadata record named `scanwright` says where the recording comes from.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -100,11 +102,7 @@ class MessageWriter:
         self._add(JOINT_TOPIC, time_ns, ros_messages.encode_joint(time_ns, position_rad))
 
     def other(self, topic: str, message_type: str, time_ns: int, message: object) -> None:
-        """Append a message of another topic, of a type that comes with ROS 2.
-
-        Raises:
-            RecordingError: it is of no such type.
-        """
+        """Append a message of another topic, of a type that comes with ROS 2."""
         self._check(time_ns)
         if topic not in self._channels:
             what = f"{self._path}: {topic}: {message_type} is no type that comes with ROS 2"
