@@ -120,6 +120,9 @@ class StampCounter:
 class DeviceClock:
     """Host times of the scans of one sensor, one after the other, in constant memory."""
 
+    _origin_ms: float | None  # first stamp
+    _sync: TimeSync | None
+
     def __init__(self, scan_period_s: float, *, smallest_delay_ns: int, first_beam_ns: int = 0) -> None:
         """Nothing is known yet.
 
@@ -164,8 +167,7 @@ class DeviceClock:
         return ScanMoment(time_ns + self._first_beam_ns, uncertainty_ns)
 
     def _begin_anew(self) -> None:
-        self._origin_ms: float | None = None
-        self._sync: TimeSync | None = None
+        self._origin_ms = self._sync = None
         self._stamps = StampLine(self._period_ms)
         self._arrivals = ArrivalLine(
             smallest_delay_ns=self._delay_ns,
