@@ -18,9 +18,9 @@ from scipy.spatial.transform import Rotation
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.poses.gyro import Gyro
-from scanwright.firmware_io.poses.tables import csv_rows
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
+from scanwright.firmware_io.tables import csv_rows
 
 IMU = "sensor_msgs/msg/Imu"
 STATIC = "/tf_static"

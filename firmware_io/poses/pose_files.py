@@ -11,10 +11,10 @@ from typing import Any
 
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign
-from scanwright.firmware_io.poses.tables import Row, csv_rows, lines_of, row_of
 from scanwright.firmware_io.poses.trajectory import Trajectory, trajectory_of
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
+from scanwright.firmware_io.tables import Row, csv_rows, lines_of, row_of
 
 _COLUMNS = {
     "x": {"x", "tx", "px", "p_x", "pos_x", "position_x", "p_rs_r_x"},

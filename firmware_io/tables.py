@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from scanwright.design.errors import RecordingError
+from scanwright.design.errors import RecordingError, suggest
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 
@@ -76,7 +76,7 @@ def lines_of(path: Path) -> list[str]:
 def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
     columns = [column for column, heading in enumerate(names) if heading in known]
     if len(columns) != 1:
-        raise RecordingError(
-            f"{path}: {len(columns)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
-        )
+        hint = suggest(min(known), names) if len(known) == 1 else ""
+        wanted = f"the first line names {'one of ' if len(known) > 1 else ''}{', '.join(sorted(known))}{hint}"
+        raise RecordingError(f"{path}: {len(columns)} columns for {name}: {wanted}")
     return columns[0]
