@@ -32,7 +32,7 @@ from scanwright.firmware_io.assembly.options import COLUMNS, DEFAULT, AssembleOp
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
-from scanwright.firmware_io.clouds.ply import PlyWriter
+from scanwright.firmware_io.clouds.ply import ply_writer
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import Block, straight
@@ -145,7 +145,7 @@ def assemble_recording(
         scans = int(np.sum(cloud_from_rows == which))
         comments = _comments(source, angles, width, scans, lag_s, platform is not None)
         before = counts[Verdict.POINT]
-        with PlyWriter(path, fields, comments) as cloud:
+        with ply_writer(path, fields, comments) as cloud:
             for _ in ahead(cloud.write, (rows_of(block) for _, block in tagged)):
                 pass
             if not counts[Verdict.POINT] and which == cloud_from_rows[-1]:

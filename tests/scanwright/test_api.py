@@ -129,11 +129,11 @@ def test_a_linkage_comes_as_a_shape_of_cadquery():
 
 
 def test_a_recording_comes_as_arrays(tmp_path):
-    from scanwright.firmware_io.recording.recording import RecordingWriter
+    from scanwright.firmware_io.recording.recording import recording_writer
     from scanwright.firmware_io.samples import Scan
 
     start_ns = 1_700_000_000_000_000_000
-    with RecordingWriter(tmp_path / "two.mcap", {}) as writer:
+    with recording_writer(tmp_path / "two.mcap", {}) as writer:
         for k, beams in enumerate((3, 5)):
             writer.joint(start_ns + k * 25_000_000, 0.1 * k)
             writer.scan(
