@@ -10,7 +10,7 @@ import numpy as np
 
 import scanwright as sw
 from scanwright.firmware_io.recording.arrays import RecordingArrays
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import Scan
 
 TASK = {
@@ -31,7 +31,7 @@ def write(seen: RecordingArrays, path: Path, start_ns: int = START_NS) -> None:
     log = seen.joint_log
     messages = [(int(t), "angle", k) for k, t in enumerate(log.time_ns)]
     messages += [(int(t), "scan", k) for k, t in enumerate(seen.time_ns[:, 0])]
-    with RecordingWriter(path, {"source": "examples/06_write_a_recording.py"}) as recording:
+    with recording_writer(path, {"source": "examples/06_write_a_recording.py"}) as recording:
         for time_ns, kind, k in sorted(messages):
             if kind == "angle":
                 recording.joint(start_ns + time_ns, float(log.position_rad[k]))

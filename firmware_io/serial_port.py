@@ -26,18 +26,11 @@ class _UntouchedLines(serial.Serial):  # type: ignore[misc]
 
 
 def open_serial_port(port: str, baud: int, read_timeout_s: float | None = None) -> serial.Serial:
-    """Open a port, exclusively.
+    """Open a port, exclusively; a DeviceError if it is absent, in use, or may not be opened.
 
     DTR and RTS are left as they are, also when the port is closed: by default the system would drop DTR then, which
     starts the motor of an RPLIDAR A1. (Linux itself raises them when it opens a port that no program had open.)
-
-    Args:
-        port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a re-plug.
-        baud: bits per second.
-        read_timeout_s: how long reading waits; None for ever.
-
-    Raises:
-        DeviceError: no such port, it is in use, or may not be opened.
+    A read waits `read_timeout_s`, None for ever.
     """
     try:
         opened = _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=_WRITE_S)

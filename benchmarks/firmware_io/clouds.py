@@ -35,9 +35,9 @@ from scanwright.design.angles import Angles, AngleSet, load_angles
 from scanwright.design.arrays import Floats
 from scanwright.firmware_io.assembly.deskew import place
 from scanwright.firmware_io.assembly.deskew_kernel import place_block
-from scanwright.firmware_io.clouds.ply import PlyWriter
+from scanwright.firmware_io.clouds.ply import ply_writer
 from scanwright.firmware_io.poses.trajectory import Trajectory
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
 from scanwright.trials.axis import interpolations
 
@@ -211,7 +211,7 @@ def write(path: Path, count: int) -> None:
     log = joint_log(count * PERIOD_NS / 1e9, 100.0)
     samples = iter(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
     time_ns, position_rad = next(samples)
-    with RecordingWriter(path, {"source": "benchmark"}) as writer:
+    with recording_writer(path, {"source": "benchmark"}) as writer:
         for scan in scans(count):
             while time_ns <= scan.stamp_ns:
                 writer.joint(time_ns, position_rad)
@@ -230,7 +230,7 @@ def peer(recording: Path, angles_file: Path, out: Path) -> None:
         times.append(message.ros_msg.header.stamp.sec * 10**9 + message.ros_msg.header.stamp.nanosec)
         positions.append(message.ros_msg.position[0])
     since_s = (np.array(times) - times[0]) / 1e9
-    with PlyWriter(out, XYZ_I, []) as cloud:
+    with ply_writer(out, XYZ_I, []) as cloud:
         for message in read_ros2_messages(str(recording), topics=["/scan"]):
             scan = message.ros_msg
             range_m = np.array(scan.ranges)

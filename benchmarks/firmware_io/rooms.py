@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import JointLog, Scan
 
 Floats = NDArray[np.float64]
@@ -406,7 +406,7 @@ def write(path: Path, made: Simulated) -> Path:
     """Write a recording, its messages in the order of their times."""
     stamps = np.concatenate([made.log.time_ns, [scan.stamp_ns for scan in made.scans]])
     joints = made.log.time_ns.size
-    with RecordingWriter(path, {"source": "simulated"}) as writer:
+    with recording_writer(path, {"source": "simulated"}) as writer:
         for k in np.argsort(stamps, kind="stable").tolist():
             if k < joints:
                 writer.joint(int(made.log.time_ns[k]), float(made.log.position_rad[k]))

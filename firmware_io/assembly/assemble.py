@@ -32,8 +32,7 @@ from scanwright.firmware_io.assembly.options import COLUMNS, DEFAULT, AssembleOp
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
-from scanwright.firmware_io.clouds.ply import PlyWriter
-from scanwright.firmware_io.echo import Echo
+from scanwright.firmware_io.clouds.ply import ply_writer
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import Block, straight
@@ -44,46 +43,6 @@ _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
 _STEP_ERROR = 0.02  # of a whole number of the sensor's steps: clusters are told as such, rounded
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
-
-
-@dataclass(frozen=True, slots=True)
-class BeamLimits:
-    """Limits that a beam must keep to become a point.
-
-    Attributes:
-        min_range_m: shorter ranges are dropped, even if the sensor allows them.
-        max_range_m: longer ranges are dropped.
-        edges_deg: drop points between two surfaces, see `between_surfaces`; None keeps them.
-        echo: of each ray of a multi-echo scan.
-
-    Raises:
-        RecordingError: a limit is out of bounds.
-    """
-
-    min_range_m: float = 0.0
-    max_range_m: float = math.inf
-    edges_deg: float | None = None
-    echo: Echo = "all"
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.min_range_m < self.max_range_m:
-            raise RecordingError(
-                f"min_range_m = {self.min_range_m}, max_range_m = {self.max_range_m}: allowed 0 <= minimum < maximum"
-            )
-        if self.edges_deg is not None and not 0 < self.edges_deg < 45:
-            raise RecordingError(f"edges_deg = {self.edges_deg}: must be above 0 and below 45; 8 is usual")
-
-    def limited(self, block: Block) -> Block:
-        """The scans, as if their sensor saw no nearer and no farther."""
-        near_m, far_m = max(block.first.range_min_m, self.min_range_m), min(block.first.range_max_m, self.max_range_m)
-        return replace(block, first=replace(block.first, range_min_m=near_m, range_max_m=far_m))
-
-    def leave_out(self, block: Block, placed: PlacedBlock) -> None:
-        """Take other echoes, and what hangs between two surfaces, out of a placed block."""
-        if self.echo != "all":
-            _drop(placed, other_echoes(block, self.echo), Verdict.OTHER_ECHO)
-        if self.edges_deg is not None:
-            _drop(placed, between_surfaces(block, self.edges_deg), Verdict.BETWEEN_SURFACES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +111,6 @@ def assemble_recording(
         RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
     """
     columns, organised, lag_s, per = options.columns, options.organised, options.lag_s, options.per
-    beams = BeamLimits(options.min_range_m, options.max_range_m, options.edges_deg, options.echo)
     _check(out, lag_s, columns)
     source = open_recording(recording)
     if options.smooth:
@@ -169,9 +127,14 @@ def assemble_recording(
     clouds: dict[Path, int] = {}  # with their scans
 
     def rows_of(block: Block) -> NDArray[np.void]:
-        block, with_joint = beams.limited(block), "joint_rad" in columns
+        first, with_joint = block.first, "joint_rad" in columns
+        near_m, far_m = max(first.range_min_m, options.min_range_m), min(first.range_max_m, options.max_range_m)
+        block = replace(block, first=replace(first, range_min_m=near_m, range_max_m=far_m))
         placed = place_block(block, curve, angles, lag_s, poses=platform, own_body=own_body, with_joint=with_joint)
-        beams.leave_out(block, placed)
+        if options.echo != "all":
+            _drop(placed, other_echoes(block, options.echo), Verdict.OTHER_ECHO)
+        if options.edges_deg is not None:
+            _drop(placed, between_surfaces(block, options.edges_deg), Verdict.BETWEEN_SURFACES)
         counts.update(dict(enumerate(np.bincount(placed.verdict.ravel()).tolist())))
         rows = cloud_rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
         # a mask would take ten times as long
@@ -182,7 +145,7 @@ def assemble_recording(
         scans = int(np.sum(cloud_from_rows == which))
         comments = _comments(source, angles, width, scans, lag_s, platform is not None)
         before = counts[Verdict.POINT]
-        with PlyWriter(path, fields, comments) as cloud:
+        with ply_writer(path, fields, comments) as cloud:
             for _ in ahead(cloud.write, (rows_of(block) for _, block in tagged)):
                 pass
             if not counts[Verdict.POINT] and which == cloud_from_rows[-1]:

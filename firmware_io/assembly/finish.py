@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,40 +18,13 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import AssembleSummary
+from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.clouds import filters
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 from scanwright.firmware_io.poses.trajectory import Trajectory
 
 SeenFrom = Callable[[Cloud], Float64[ndarray, "n 3"]]
-
-
-@dataclass(frozen=True, slots=True)
-class Finish:
-    """What is done to a cloud, in this order.
-
-    Attributes:
-        outlier_sigmas: leave out points that stand alone, beyond so many standard deviations; None for none.
-        voxel_m: one point to a voxel of this edge; None for all.
-        normals: add columns nx ny nz, towards where the scanner stood.
-
-    Raises:
-        RecordingError: a number is not above 0.
-    """
-
-    outlier_sigmas: float | None = None
-    voxel_m: float | None = None
-    normals: bool = False
-
-    def __post_init__(self) -> None:
-        for name, value in (("outliers", self.outlier_sigmas), ("voxel_m", self.voxel_m)):
-            if value is not None and not 0 < value < np.inf:
-                raise RecordingError(f"{name} = {value}: must be above 0 and finite")
-
-    @property
-    def thins(self) -> bool:
-        """Whether points may go."""
-        return self.outlier_sigmas is not None or self.voxel_m is not None
 
 
 def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
@@ -71,9 +44,7 @@ def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
     return of
 
 
-def finish_clouds(
-    summary: AssembleSummary, out: Path, finish: Finish, where: SeenFrom, *, organised: bool
-) -> AssembleSummary:
+def finish_clouds(summary: AssembleSummary, out: Path, options: AssembleOptions, where: SeenFrom) -> AssembleSummary:
     """Write the clouds of a summary again, finished, in the format and under the names that `out` asks for.
 
     Raises:
@@ -84,10 +55,10 @@ def finish_clouds(
     written: list[Path] = []
     for path in summary.clouds:
         (cloud, *_), _ = read_clouds(path)
-        cloud, dropped = _finished(cloud, finish, where)
+        cloud, dropped = _finished(cloud, options, where)
         left_out.update(dropped)
         target = out.with_name(f"{path.stem}{out.suffix}")
-        wrote = write_clouds(target, [cloud], organised=organised)
+        wrote = write_clouds(target, [cloud], organised=options.organised)
         rows += wrote.rows
         notes += [line for line in wrote.notes if line not in notes]
         written += wrote.paths
@@ -102,17 +73,17 @@ def finish_clouds(
     )
 
 
-def _finished(cloud: Cloud, finish: Finish, where: SeenFrom) -> tuple[Cloud, dict[str, int]]:
+def _finished(cloud: Cloud, options: AssembleOptions, where: SeenFrom) -> tuple[Cloud, dict[str, int]]:
     dropped: dict[str, int] = {}
-    if finish.outlier_sigmas is not None:
-        stray = filters.outliers(cloud.points_m, finish.outlier_sigmas)
+    if options.outliers is not None:
+        stray = filters.outliers(cloud.points_m, options.outliers)
         dropped["outlier"] = int(stray.sum())
         cloud = cloud.select(np.flatnonzero(~stray))
-    if finish.voxel_m is not None:
-        chosen = filters.one_to_a_voxel(cloud.points_m, finish.voxel_m)
+    if options.voxel_m is not None:
+        chosen = filters.one_to_a_voxel(cloud.points_m, options.voxel_m)
         dropped["another_point_of_the_voxel"] = len(cloud.points_m) - len(chosen)
         cloud = cloud.select(chosen)
-    if finish.normals:
+    if options.normals:
         there = cloud.valid
         normal = np.full(cloud.points_m.shape, np.nan, np.float32)
         normal[there] = filters.normals(cloud.points_m[there], where(cloud)[there])

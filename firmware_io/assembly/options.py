@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.echo import Echo
 
 if TYPE_CHECKING:
@@ -37,6 +38,9 @@ class AssembleOptions:
         outliers: drop isolated points beyond this many standard deviations; 2 is usual.
         voxel_m: keep one point per voxel of this edge.
         normals: add normals nx ny nz that face the scanner.
+
+    Raises:
+        RecordingError: a number is out of bounds.
     """
 
     organised: bool = False
@@ -55,6 +59,21 @@ class AssembleOptions:
     outliers: float | None = None
     voxel_m: float | None = None
     normals: bool = False
+
+    def __post_init__(self) -> None:
+        low, high = self.min_range_m, self.max_range_m
+        if not 0 <= low < high:
+            raise RecordingError(f"min_range_m = {low}, max_range_m = {high}: allowed 0 <= minimum < maximum")
+        if self.edges_deg is not None and not 0 < self.edges_deg < 45:
+            raise RecordingError(f"edges_deg = {self.edges_deg}: must be above 0 and below 45; 8 is usual")
+        for name in ("outliers", "voxel_m"):
+            if (value := getattr(self, name)) is not None and not 0 < value < math.inf:
+                raise RecordingError(f"{name} = {value}: must be above 0 and finite")
+
+    @property
+    def thins(self) -> bool:
+        """Whether points may go once the cloud is assembled."""
+        return self.outliers is not None or self.voxel_m is not None
 
 
 DEFAULT = AssembleOptions()

@@ -148,10 +148,7 @@ def _plane(mine: Mask, point: Array, normal: Array, weight: Array) -> tuple[Arra
 def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping:
     """The same surfaces without the tiles that scatter about them more than chance allows.
 
-    Args:
-        grouping: the surfaces.
-        misfit: of each tile, mean squared residual in units of its variance, shape (m,).
-        beams: of each tile, shape (m,).
+    `misfit` is the mean squared residual of each tile in units of its variance, `beams` their number, shape (m,) each.
     """
     chance = 1 + _MISFIT * np.sqrt(2 / np.maximum(beams, 1))
     return replace(grouping, surface=np.where(misfit < chance, grouping.surface, -1))

@@ -1,4 +1,7 @@
-"""A cloud as all formats see it, and the lines of text that carry what a format has no field for."""
+"""A cloud as all formats see it, and the lines of text that carry what a format has no field for.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -100,11 +103,7 @@ class Cloud:
 
 
 def check_pose(T: Pose) -> None:
-    """Refuse what is no pose.
-
-    Raises:
-        RecordingError: not (4, 4), not finite, not orthonormal, a mirror, or with another last row than 0 0 0 1.
-    """
+    """Refuse what is no pose."""
     if T.shape != (4, 4) or T.dtype.kind != "f" or not np.isfinite(T).all():
         raise RecordingError(f"pose: shape {T.shape}, {T.dtype}: 4 x 4 finite numbers")
     R = T[:3, :3]
@@ -117,11 +116,7 @@ def check_pose(T: Pose) -> None:
 
 
 def as_type(values: Column, kind: np.dtype[Any] | str) -> Column:
-    """The values in another type.
-
-    Raises:
-        RecordingError: it cannot hold them; fractions of floats are rounded where the type is a float, nowhere else.
-    """
+    """The values in another type, which must hold them; only fractions are rounded, and only to a type of floats."""
     kind = np.dtype(kind)
     with np.errstate(all="ignore"):
         converted = values.astype(kind)
@@ -150,11 +145,7 @@ def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
 
 
 def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
-    """The cloud of a structured array with x y z, and of what the lines of its header tell.
-
-    Raises:
-        RecordingError: there is no x, y or z, or a line tells nonsense.
-    """
+    """The cloud of a structured array with x y z, and of what the lines of its header tell."""
     names = rows.dtype.names or ()
     if not {*"xyz"} <= set(names):
         raise RecordingError(f"the columns are {' '.join(names)}; a cloud has x y z")
@@ -176,11 +167,7 @@ def headlines(cloud: Cloud) -> list[str]:
 
 
 def with_header(cloud: Cloud, lines: Iterable[str]) -> Cloud:
-    """The cloud with what `headlines` wrote.
-
-    Raises:
-        RecordingError: the pose is none, or the start is no time.
-    """
+    """The cloud with what `headlines` wrote."""
     shape, T, start_ns = list(cloud.shape), cloud.T_world_cloud, cloud.start_ns
     for line in lines:
         match line.split():
@@ -210,11 +197,7 @@ def pose_numbers(T: Pose) -> Float64[ndarray, " 7"]:
 
 
 def pose_matrix(numbers: Iterable[float]) -> Pose:
-    """Inverse of `pose_numbers`.
-
-    Raises:
-        RecordingError: a number is not finite, or the quaternion is none.
-    """
+    """Inverse of `pose_numbers`."""
     from scipy.spatial.transform import Rotation
 
     x, y, z, *quaternion = numbers

@@ -2,6 +2,8 @@
 
 An installed package adds one without a line here: an entry point of the group "scanwright.cloud_formats" that names a
 `CloudFormat`; its module has `read(path) -> (clouds, notes)` and, if it can write, `write(path, cloud) -> notes`.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -58,11 +60,7 @@ FORMATS = (
 
 @cache
 def all_formats() -> dict[str, CloudFormat]:
-    """Return the shipped formats and those of installed packages, by name.
-
-    Raises:
-        RecordingError: an installed package names something else, or a format that there is already.
-    """
+    """Return the shipped formats and those of installed packages, by name."""
     return with_installed(GROUP, CloudFormat, FORMATS, RecordingError)
 
 
@@ -166,12 +164,7 @@ def _format(path: Path) -> CloudFormat:
 
 
 def cloud_module(path: Path) -> Any:
-    """Return the module of the format of a file.
-
-    Raises:
-        InstallError: it needs a package that is not installed.
-        RecordingError: the format is unknown.
-    """
+    """Return the module of the format of a file; InstallError without a package that it needs."""
     return _module(_format(path), path)
 
 

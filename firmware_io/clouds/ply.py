@@ -2,17 +2,19 @@
 
 Format: G. Turk, "The PLY polygon file format" (1994). Written by ourselves, because the usual library is GPL. It holds
 everything but integers of 64 bits.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from types import TracebackType
+from typing import IO
 
 import numpy as np
 from jaxtyping import Float64
@@ -42,39 +44,31 @@ _DIGITS = 20  # of a count: an int64 has 19
 _LONGEST_HEADER = 1 << 20  # bytes: thousands of comments
 
 
-class PlyWriter:
-    """Writes rows as they come; use it in a `with` statement. The file appears only when that ends well.
+@contextmanager
+def ply_writer(path: Path, fields: np.dtype[np.void], comments: Iterable[str]) -> Iterator[PlyRows]:
+    """Write rows as they come; the file appears only when the body ends well.
 
-    The header's number of rows is filled in at the end: nothing has to be known before, nothing is kept.
+    The header's number of rows is filled in at the end: nothing has to be known before, nothing is kept. `fields` is a
+    structured type of little-endian scalars.
+    """
+    with atomic_write(path, RecordingError) as part, foreign(f"{path}: cannot write", part.open, "wb") as stream:
+        rows = PlyRows(stream, fields, [line for comment in comments for line in comment.splitlines()])
+        yield rows
+        stream.seek(0)
+        stream.write(rows.header())
+
+
+class PlyRows:
+    """Rows on their way to a file; its header counts them.
 
     Attributes:
         rows: written so far.
-
-    Raises:
-        RecordingError: the file cannot be written.
     """
 
-    def __init__(self, path: Path, fields: np.dtype[np.void], comments: Iterable[str]) -> None:
-        """`fields` is a structured type of little-endian scalars."""
-        self._path = path
-        self._fields = fields
-        self._comments = [line for comment in comments for line in comment.splitlines()]
+    def __init__(self, stream: IO[bytes], fields: np.dtype[np.void], comments: Sequence[str]) -> None:
+        self._stream, self._fields, self._comments = stream, fields, comments
         self.rows = 0
-        self._stack = ExitStack()
-
-    def __enter__(self) -> PlyWriter:
-        with ExitStack() as stack:
-            part = stack.enter_context(atomic_write(self._path, RecordingError))
-            self._stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
-            self._stream.write(self._header())
-            stack.push(self._finish)
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, trace)
+        stream.write(self.header())
 
     def write(self, rows: NDArray[np.void]) -> None:
         """Append rows of the writer's fields, any shape."""
@@ -83,15 +77,9 @@ class PlyWriter:
         self._stream.write(np.ascontiguousarray(rows).data)
         self.rows += rows.size
 
-    def _finish(
-        self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self._stream.seek(0)
-            self._stream.write(self._header())
-
-    def _header(self) -> bytes:
-        # A last comment gives back what the number takes, so that the header's length never changes.
+    def header(self) -> bytes:
+        """Return the header, whose length never changes."""
+        # A last comment gives back what the number takes.
         filler = "-" * (_DIGITS - len(str(self.rows)))
         columns = [f"property {_WORDS[self._fields[name].str[1:]]} {name}" for name in self._fields.names or ()]
         lines = [
@@ -107,11 +95,7 @@ class PlyWriter:
 
 
 def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterable[str] = ()) -> None:
-    """Write bare points (n, 3) as a cloud of x y z.
-
-    Raises:
-        RecordingError: the file cannot be written, or is no .ply.
-    """
+    """Write bare points (n, 3) as a cloud of x y z."""
     check_place(path, RecordingError)
     if path.suffix != ".ply":
         raise RecordingError(f"{path}: clouds are written as PLY; name it {path.with_suffix('.ply').name}")
@@ -119,7 +103,7 @@ def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterab
     rows = np.empty(len(points_m), fields)
     for column, axis in enumerate("xyz"):
         rows[axis] = points_m[:, column]
-    with PlyWriter(path, fields, comments) as cloud:
+    with ply_writer(path, fields, comments) as cloud:
         cloud.write(rows)
 
 
@@ -173,11 +157,7 @@ class PlyHeader:
 
 
 def read_header(path: Path) -> PlyHeader:
-    """Read the header of any PLY file with a cloud.
-
-    Raises:
-        RecordingError: the file is missing, is no PLY, or has no element `vertex` of x y z; a line is named.
-    """
+    """Read the header of any PLY file with a cloud."""
     with foreign(f"{path}: cannot read", path.open, "rb") as stream:
         text = foreign(f"{path}: cannot read", stream.read, _LONGEST_HEADER)
     end = re.search(rb"^end_header[ \t]*(\r\n|\n|\r)", text, re.MULTILINE) or re.search(rb"\rend_header(\r)", text)
@@ -256,11 +236,7 @@ def _rows_before(header: PlyHeader) -> int:
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
-    """Read the rows of a cloud, shape (n,); binary ones are mapped: columns are loaded when touched.
-
-    Raises:
-        RecordingError: as for `read_header`; or the file is cut off, or a line of text is not numbers.
-    """
+    """Read the rows of a cloud, shape (n,); binary ones are mapped: columns are loaded when touched."""
     header = read_header(path)
     if header.form == "ascii":
         return next(_chunks(path, header, header.vertex.rows))
@@ -349,7 +325,7 @@ def _write(path: Path, head: Cloud, parts: Iterable[Cloud]) -> list[str]:
     fields = cloud_rows(head.select(np.empty(0, np.int64))).dtype
     wide = [name for name in fields.names or () if fields[name].kind in "iu" and fields[name].itemsize == 8]
     kinds = [(name, "<f8" if name in wide else fields[name].str) for name in fields.names or ()]
-    with PlyWriter(path, np.dtype(kinds), [*headlines(head), "x y z in m"]) as stream:
+    with ply_writer(path, np.dtype(kinds), [*headlines(head), "x y z in m"]) as stream:
         for part in parts:
             stream.write(cloud_rows(part).astype(kinds))
     return [f"PLY has no 64-bit integers: {name} is written as double" for name in wide]

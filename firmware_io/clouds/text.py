@@ -2,6 +2,8 @@
 
 A first line of words names the columns; else the first three are x y z. Separators are spaces, tabs, commas or
 semicolons. Decimal commas are read only on request, since `1,5,2,5` may be two numbers or four.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -238,9 +240,6 @@ def read_numbers(
         place: number of the first of them in the file.
         separator: of the words; None for spaces.
         columns: which words to read; None for all, which must be as many in each line.
-
-    Raises:
-        RecordingError: a line has another count of words, or one that is no number; its number is named.
     """
     last = [place - 1, ""]
 
@@ -261,11 +260,7 @@ def read_numbers(
 
 @contextmanager
 def decimal_points(path: Path) -> Iterator[Path]:
-    """Yield a copy of a text file that has points for its decimal commas; errors name the file itself.
-
-    Raises:
-        RecordingError: the file cannot be read, or is no text.
-    """
+    """Yield a copy of a text file that has points for its decimal commas; errors name the file itself."""
     with TemporaryDirectory() as folder:
         copy = Path(folder, path.name)
         with foreign(f"{path}: cannot read", path.open, "rb") as source, copy.open("wb") as out:

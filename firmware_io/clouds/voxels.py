@@ -12,10 +12,7 @@ from scanwright.design.arrays import Array, Floats, Ints
 def voxel_of(points_m: Floats, edge_m: float, level: NDArray[np.uint8] | None = None) -> Ints:
     """Return the voxel of each point, shape (n,), numbered in the order of their first points.
 
-    Args:
-        points_m: shape (n, 3), finite.
-        edge_m: of a voxel of level 0.
-        level: of the voxel of each point, whose edge is `edge_m * 2**level`, shape (n,); None for 0.
+    Points are finite, shape (n, 3); a voxel has the edge `edge_m * 2**level`, of level 0 without levels, shape (n,).
     """
     return _numbered(points_m, edge_m, np.zeros(len(points_m), np.uint8) if level is None else level)
 

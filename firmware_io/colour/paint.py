@@ -27,7 +27,7 @@ from scanwright.design.arrays import Floats, Times
 from scanwright.design.camera import Camera
 from scanwright.design.errors import TaskError
 from scanwright.design.task.task import LoadedTask
-from scanwright.firmware_io.clouds.ply import PlyWriter, read_header, read_ply
+from scanwright.firmware_io.clouds.ply import ply_writer, read_header, read_ply
 from scanwright.firmware_io.colour.camera_views import CameraView, load_views, opened
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
@@ -241,7 +241,7 @@ def _write(
     fields_copied = [(name, rows.dtype[name].str) for name in rows.dtype.names or () if name not in COLOURS]
     fields = np.dtype([*fields_copied, *((name, "|u1") for name in COLOURS)])
     comments = [line for line in read_header(path).comments if organised or line.split()[0] not in ("width", "height")]
-    with PlyWriter(path, fields, comments) as cloud:
+    with ply_writer(path, fields, comments) as cloud:
         for begin in range(0, rows.size, _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
             out = np.empty(rows[part].size, fields)

@@ -126,11 +126,7 @@ class LdrobotMachine:
 def ldrobot_emulator(
     lidar: Lidar, ranging: Ranging, seed: int = 0, *, rate_error: float = 0.0, first_ms: int = 0
 ) -> LidarLine[LdrobotMachine]:
-    """The emulator of a sensor of the catalogue; `rate_error` and `first_ms` of its clock.
-
-    Raises:
-        DeviceError: there is no emulator of this model.
-    """
+    """The emulator of a sensor of the catalogue; `rate_error` and `first_ms` are of its clock."""
     if lidar.name not in BAUDS:
         raise DeviceError(f"no LDROBOT emulator of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
     machine = LdrobotMachine(lidar, ranging, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)

@@ -132,14 +132,7 @@ class Actuation:
 
 
 def walked_rad(elapsed_s: float, start: float, goal: float, rate_rad_s: float) -> float:
-    """Where the goal position has walked to [rad].
-
-    Args:
-        elapsed_s: since it set out; before that it stands.
-        start: where it set out.
-        goal: where it ends.
-        rate_rad_s: of its walk.
-    """
+    """Where the goal position has walked to [rad], from `start` to `goal`, so long after it set out."""
     most_rad = rate_rad_s * elapsed_s if elapsed_s > 0 else 0.0
     return start + max(-most_rad, min(most_rad, goal - start))
 
@@ -155,14 +148,7 @@ def effort(
 ) -> tuple[float, float]:
     """Duty of the loop, and torque of the motor as a fraction of the stall torque.
 
-    Args:
-        plant: the servo.
-        drive: what acts.
-        setpoint: goal of a position loop, where it has walked to [rad].
-        m_rate: rate of the motor, and what follows, as the states of `equations`.
-        h: horn angle.
-        i: integral of the velocity loop.
-        seen: angle that the loop knows.
+    `setpoint` is where the goal of a position loop has walked to [rad], the rest are states as in `equations`.
     """
     if drive.mode == "off":
         return 0.0, 0.0

@@ -1,58 +1,78 @@
 """A sensor's even clock on the host's, from packets that can be late and never early.
 
 The straight line below all arrivals of the last seconds, as close to them as it goes, gives rate and offset: it is that
-edge of their lower convex hull which spans the middle. `device_clock` is the same for stamps of whole turns in
-milliseconds; here the sensor's time comes in nanoseconds, packet after packet.
+edge of their lower convex hull which spans the middle (of each bucket of time the earliest arrival is kept).
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 from scanwright.firmware_io.lidar.tick_line import half_hull, middle_slope
 
-_BUCKET_NS = 200_000_000  # of which the earliest arrival is kept
-_BUCKETS = 300  # a minute of them: longer averages better, shorter follows a warming quartz
+QUARTZ_RATE = 2e-4  # quartz is better than 100 ppm, and there are two of them
+
+_BUCKET_NS, _BUCKETS = 200_000_000, 300  # a minute: longer averages better, shorter follows a warming quartz
+_EVEN_BUCKET_NS, _EVEN_BUCKETS = 1_000_000_000, 100  # of packets whose spacing is known
 _FEWEST = 3  # buckets that tell a rate
 _NEAR = 320  # arrivals among which the earliest must touch the line
+_CHANCE = 2.0  # times the earliness that is usual among so many arrivals
+_USUAL = 0.25  # of the largest rate error: the usual one [assumed]
 _BEHIND_NS = 50_000_000  # longer than a busy computer delays all arrivals of two buckets, shorter than a lidar's turn
 
 
 class ArrivalLine:
     """Host times of a sensor's, in constant memory."""
 
-    def __init__(self, *, smallest_delay_ns: int, rate_max: float, grain_ns: float) -> None:
+    def __init__(
+        self, *, smallest_delay_ns: int, rate_max: float, grain_ns: float, spacing_ns: float | None = None
+    ) -> None:
         """Nothing is known yet.
 
         Args:
             smallest_delay_ns: from the sensor's time of a packet to its arrival, undelayed: arrivals alone cannot tell.
             rate_max: how far the sensor's seconds may differ from the host's.
             grain_ns: standard deviation of what may stay unknown of the sensor's own times.
+            spacing_ns: between packets; with it the rate of a few arrivals is weighed against the usual one, and a line
+                that the last arrivals stay above is lifted to them.
         """
         self._delay_ns, self._rate_max, self._grain_ns = smallest_delay_ns, rate_max, grain_ns
-        self._earliest: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)  # sensor time, lateness
+        self._spacing_ns = spacing_ns
+        self._every_ns = _BUCKET_NS if spacing_ns is None else _EVEN_BUCKET_NS
+        buckets = _BUCKETS if spacing_ns is None else _EVEN_BUCKETS
+        self._earliest: deque[tuple[float, float, int]] = deque(maxlen=buckets)  # sensor time, lateness, number
         self._origin = (0.0, 0)
         self._bucket_ns = -math.inf
-        self._slope = self._offset_ns = self._late_ns = self._newest_ns = 0.0
+        self._slope = self._offset_ns = self._late_ns = self._newest_ns = self._reach_ns = self._near_ns = 0.0
         self._count = 0
 
-    def add(self, sensor_ns: float, arrival_ns: int) -> None:
-        """A packet that was whole at `sensor_ns`, later than the last one, has come."""
+    def add(self, sensor_ns: float, arrival_ns: int, number: int = 0) -> None:
+        """A packet that was whole at `sensor_ns`, later than the last one, has come; `number` is for `retime`."""
         if not self._count:
             self._origin = (sensor_ns, arrival_ns)
         self._count += 1
         since_ns = self._newest_ns = sensor_ns - self._origin[0]
-        late_ns = arrival_ns - self._origin[1] - since_ns
-        if since_ns - self._bucket_ns >= _BUCKET_NS:
+        here = (since_ns, arrival_ns - self._origin[1] - since_ns, number)
+        if since_ns - self._bucket_ns >= self._every_ns:
             self._bucket_ns = since_ns
-            self._earliest.append((since_ns, late_ns))
+            self._earliest.append(here)
             self._fit()
-        elif self._above((since_ns, late_ns)) < self._above(self._earliest[-1]):
-            self._earliest[-1] = (since_ns, late_ns)
+        elif self._above(here) < self._above(self._earliest[-1]):
+            self._earliest[-1] = here
             self._fit()
-        above_ns = self._above((since_ns, late_ns)) - self._offset_ns
+        above_ns = self._above(here) - self._offset_ns
         self._late_ns += (above_ns - self._late_ns) * max(1 / self._count, 1e-3)
+
+    def retime(self, sensor_ns: Callable[[int], float | None]) -> None:
+        """The sensor's times of packets by their numbers are known better now; None for those that stay."""
+        for k, (since_ns, late_ns, number) in enumerate(self._earliest):
+            if (better := sensor_ns(number)) is not None:
+                now_ns = better - self._origin[0]
+                self._earliest[k] = now_ns, late_ns + since_ns - now_ns, number
+        if self._earliest:
+            self._fit()
 
     def host_ns(self, sensor_ns: float) -> int:
         """Host time of a sensor time."""
@@ -60,19 +80,20 @@ class ArrivalLine:
 
     def arrives_ns(self, sensor_ns: float) -> int:
         """When what was whole at a sensor time arrives, if nothing holds it up."""
-        since_ns = sensor_ns - self._origin[0]
-        return self._origin[1] + round(since_ns * self.rate + self._offset_ns)
+        lift_ns = max(self._near_ns - _CHANCE * self._chance_ns, 0.0)
+        return self._origin[1] + round((sensor_ns - self._origin[0]) * self.rate + self._offset_ns + lift_ns)
 
     @property
     def uncertainty_ns(self) -> int:
         """Standard uncertainty of the newest times; the declared smallest delay counts as exact."""
-        chance_ns = self._late_ns / min(max(self._count, 1), _NEAR)
-        span_ns = max(self._newest_ns - self._earliest[0][0], _BUCKET_NS) if self._earliest else _BUCKET_NS
-        # two arrivals hold the line, some half of the span apart; few of them tell the rate no better than the bound
-        reach_ns = self._rate_max * span_ns / 2
-        if len(self._earliest) >= _FEWEST:
-            reach_ns = min(reach_ns, 2 * self._late_ns / len(self._earliest))
-        return round(math.hypot(chance_ns, reach_ns, self._grain_ns))
+        reach_ns = self._reach_ns
+        if self._spacing_ns is None:
+            span_ns = max(self._newest_ns - self._earliest[0][0], _BUCKET_NS) if self._earliest else _BUCKET_NS
+            # two arrivals hold the line, some half of the span apart; few tell the rate no better than the bound
+            reach_ns = self._rate_max * span_ns / 2
+            if len(self._earliest) >= _FEWEST:
+                reach_ns = min(reach_ns, 2 * self._late_ns / len(self._earliest))
+        return round(math.hypot(self._chance_ns, reach_ns, self._grain_ns))
 
     @property
     def rate(self) -> float:
@@ -85,11 +106,27 @@ class ArrivalLine:
         last = list(self._earliest)[-2:]
         return min(map(self._above, last)) - self._offset_ns > _BEHIND_NS if last else False
 
-    def _above(self, arrival: tuple[float, float]) -> float:
+    @property
+    def _chance_ns(self) -> float:
+        return self._late_ns / min(max(self._count, 1), _NEAR)
+
+    def _above(self, arrival: tuple[float, float, int]) -> float:
         return arrival[1] - self._slope * arrival[0]
 
     def _fit(self) -> None:
-        points = list(self._earliest)
-        slope = middle_slope(half_hull(points, 1)) if len(points) >= _FEWEST else 0.0
+        enough = self._spacing_ns is not None or len(self._earliest) >= _FEWEST
+        points = [(since_ns, late_ns) for since_ns, late_ns, _ in self._earliest]
+        slope = middle_slope(half_hull(points, 1)) if enough else 0.0
+        if self._spacing_ns is not None:
+            # Two arrivals hold the line, some half of the span apart, each late by the mean over half of all: that is
+            # the uncertainty of their rate. Few tell it less well than the usual quality of quartzes does.
+            span_ns = max(self._newest_ns - points[0][0], self._spacing_ns)
+            unsure, usual = 12 * self._late_ns * self._spacing_ns / span_ns**2, _USUAL * self._rate_max
+            slope /= 1 + (unsure / usual) ** 2
+            self._reach_ns = span_ns / 2 * unsure * usual / math.hypot(unsure, usual)
         self._slope = min(max(slope, -self._rate_max), self._rate_max)
-        self._offset_ns = min(self._above(point) for point in points)
+        above_ns = [self._above(arrival) for arrival in self._earliest]
+        self._offset_ns = min(above_ns)
+        if self._spacing_ns is not None:
+            near = max(round(_NEAR * self._spacing_ns / self._every_ns), 1)
+            self._near_ns = min(above_ns[-near:]) - self._offset_ns

@@ -33,11 +33,7 @@ FAMILIES = (
 
 @cache
 def all_families() -> dict[str, LidarFamily]:
-    """The shipped families and those of installed packages, by name.
-
-    Raises:
-        DeviceError: an installed package names something else, or a family that there is already.
-    """
+    """The shipped families and those of installed packages, by name; raises as `with_installed`."""
     return with_installed(LIDAR_GROUP, LidarFamily, FAMILIES)
 
 

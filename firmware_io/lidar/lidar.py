@@ -69,51 +69,29 @@ class LidarDriver(Protocol):
     ) -> None: ...
 
     def condition(self) -> tuple[str, ...]:
-        """What it tells of its own age and state, in words, one thing each; trouble is a scan's `warning`, or an error.
-
-        Asked before `start` only: in some sensors an answer comes among scans.
-
-        Raises:
-            DeviceError: it does not answer, or is gone.
-        """
+        """What it tells of its own age and state, in words, one thing each; asked before `start` only."""
         ...
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Scan until `stop`.
+        """Scan until `stop`; a DeviceError if it refuses or cannot do that.
 
         Args:
             intensity: measure it too.
             cluster: beams that share one value, the least range among them.
             skip: turns to leave out between two.
-
-        Raises:
-            DeviceError: the sensor refuses, cannot do that, or is gone.
         """
         ...
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
-        """The next turn; None waits as long as this sensor may take.
-
-        Raises:
-            DeviceTimeoutError: none came in time.
-            DeviceError: it was unplugged, or reports a fault.
-        """
+        """Return the next turn; without a time it is waited for as long as this sensor may take."""
         ...
 
     def stop(self) -> None:
-        """Laser off, or where a sensor cannot: listen no more.
-
-        Raises:
-            DeviceError: the sensor is gone.
-        """
+        """Laser off, or if a sensor cannot do that: listen no more."""
         ...
 
     def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Find the sensor again after an unplug or a reset, and scan on if it did; its clock is learnt anew.
-
-        Raises:
-            DeviceError: it did not turn up in time.
-        """
+        """Find the sensor again after an unplug or a reset, and scan on if it did; its clock is learnt anew."""
         ...
 
 

@@ -2,6 +2,8 @@
 
 Arrival times of bytes are right only if the bytes are read when they arrive. A reader that was held up (a stopped
 process, a busy computer) finds bytes that waited in the buffers of kernel and adapter, and others are missing.
+
+A device that is gone, silent or refuses raises DeviceError.
 """
 
 from __future__ import annotations
@@ -41,11 +43,7 @@ class SensorLine:
     """
 
     def __init__(self, address: str, longest: int) -> None:
-        """Open it.
-
-        Raises:
-            DeviceError: no such port or host, or it is in use.
-        """
+        """Open it."""
         self.address, self.longest, self.received = address, longest, 0
         self._open(address)
 
@@ -60,11 +58,7 @@ class SensorLine:
         return self.stream if isinstance(self.stream, SerialStream) else None
 
     def send(self, data: bytes) -> None:
-        """Send all of it.
-
-        Raises:
-            DeviceError: the connection broke.
-        """
+        """Send all of it."""
         with self.broken_line_as_error():
             self.stream.write(data)
 
@@ -125,11 +119,7 @@ class SensorLine:
         self.stream.close()
 
     def reopen(self, address: str | None = None) -> None:
-        """Open it again, where it was or elsewhere.
-
-        Raises:
-            DeviceError: no such port or host, or it is in use.
-        """
+        """Open it again, where it was or elsewhere."""
         self.close()
         self._open(address or self.address)
         self.address = address or self.address

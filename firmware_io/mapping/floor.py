@@ -1,4 +1,7 @@
-"""The floor of a levelled cloud: the level that most of what lies lowest has in common."""
+"""The floor of a levelled cloud: the level that most of what lies lowest has in common.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +30,6 @@ def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> 
     Args:
         points_m: shape (n, 3), finite, z up.
         below_m: the floor lies below this height, such as that of the scanner.
-
-    Raises:
-        RecordingError: there is no such level, or it is tilted: the cloud is not levelled.
     """
     squares = np.floor(points_m[:, :2] / _CELL_M).astype(np.int64)
     order = np.lexsort((points_m[:, 2], squares[:, 1], squares[:, 0]))

@@ -1,4 +1,4 @@
-"""`scanwright map`: files of clouds become a map to drive by."""
+"""`scanwright map`: files of clouds become a map to drive by. Input that cannot be used raises RecordingError."""
 
 from __future__ import annotations
 
@@ -92,9 +92,6 @@ def map_files(
         resolution_m: edge of a cell.
         seen_through_m: leave out points that another cloud was seen through, by more than this; None for none.
         progress: callback.
-
-    Raises:
-        RecordingError: a file cannot be read or written, there is no floor, or the numbers make no map.
     """
     check_map_place(out)
     check_resolution(resolution_m)

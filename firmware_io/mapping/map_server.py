@@ -1,4 +1,4 @@
-"""The two files that a ROS map_server reads: YAML and PGM."""
+"""The two files that a ROS map_server reads: YAML and PGM. Input that cannot be used raises RecordingError."""
 
 from __future__ import annotations
 
@@ -22,11 +22,7 @@ def image_path(path: Path) -> Path:
 
 
 def check_map_place(path: Path) -> None:
-    """Refuse a map that cannot be written, before the work that it is to hold.
-
-    Raises:
-        RecordingError: its name does not end in .yaml, or no file can be there.
-    """
+    """Refuse a map that cannot be written, before the work that it is to hold."""
     check_place(path, RecordingError)
     if path.suffix not in (".yaml", ".yml"):
         raise RecordingError(
@@ -40,9 +36,6 @@ def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
 
     The first row of the image is the one with the largest y; the origin is the lower left corner of the lower left
     pixel, its third number the yaw.
-
-    Raises:
-        RecordingError: it cannot be written there.
     """
     check_map_place(path)
     image = image_path(path)

@@ -1,4 +1,7 @@
-"""Points and the beams that led to them as an occupancy grid: occupied, free, unknown."""
+"""Points and the beams that led to them as an occupancy grid: occupied, free, unknown.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -71,11 +74,7 @@ class OccupancyGrid:
 
 
 def check_resolution(resolution_m: float) -> None:
-    """Refuse cells that no map has.
-
-    Raises:
-        RecordingError: so small or so large.
-    """
+    """Refuse cells that no map has."""
     if not _FINEST_M <= resolution_m <= _COARSEST_M:
         raise RecordingError(f"resolution_m = {resolution_m}: allowed {_FINEST_M:g} to {_COARSEST_M:g}")
 
@@ -101,9 +100,6 @@ def occupancy_grid(
         eyes_m: where each point was seen from, shape (n, 3); NaN if unknown: such a point frees nothing.
         heights: of what is in the way.
         resolution_m: edge of a cell.
-
-    Raises:
-        RecordingError: the cells are too small, too large or too many, or no point and no beam is between the heights.
     """
     check_resolution(resolution_m)
     low_m, high_m = heights.floor_m + heights.from_m, heights.floor_m + heights.to_m

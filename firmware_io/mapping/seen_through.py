@@ -2,6 +2,8 @@
 
 The place of each point is looked up among the directions in which the other stand saw something. If its nearest
 beams all ended well behind the point, nothing stood there then, and what the point was seen on has come or gone.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -49,9 +51,6 @@ def seen_through(positions: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool
     Args:
         positions: at least two with a known eye, of one frame; others are left as they are.
         beyond_m: more than three times the noise, and than what the poses are off by.
-
-    Raises:
-        RecordingError: `beyond_m` is none, or fewer than two stands have an eye.
     """
     if not 0 < beyond_m < np.inf:
         raise RecordingError(f"seen_through_m = {beyond_m}: must be above 0 and finite; 0.1 is usual")

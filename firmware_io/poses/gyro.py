@@ -5,6 +5,8 @@ that misses the next pose by is the gyro's bias, its noise and the error of the 
 between them, so that every pose keeps its orientation. Positions still go straight.
 
 Source: the strapdown integral of D. Titterton, J. Weston, Strapdown Inertial Navigation Technology (2nd ed.), ch. 11.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -61,10 +63,6 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
     Returns:
         The same poses and what lies between them, and what a person should know of it. Between poses without gyro the
         orientation goes about one axis as before.
-
-    Raises:
-        RecordingError: the gyro has no time in common with two neighbouring poses, is no denser than they are, or turns
-            otherwise than they do: other axes, another unit, another clock.
     """
     rate_rad_s = gyro.rate_rad_s @ R_platform_imu.T
     informative = _informative(poses.time_ns, gyro.time_ns)

@@ -1,4 +1,7 @@
-"""The rates of a gyro, from a topic of the recording or from CSV, and the orientation of its IMU on the platform."""
+"""The rates of a gyro, from a topic of the recording or from CSV, and the orientation of its IMU on the platform.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +18,9 @@ from scipy.spatial.transform import Rotation
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.poses.gyro import Gyro
-from scanwright.firmware_io.poses.tables import csv_rows
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
+from scanwright.firmware_io.tables import csv_rows
 
 IMU = "sensor_msgs/msg/Imu"
 STATIC = "/tf_static"
@@ -33,9 +36,6 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
     Args:
         spec: a `.csv` file with a header (time, wx wy wz [rad/s]), or a topic of `sensor_msgs/Imu` in the recording.
         recording: where topics are.
-
-    Raises:
-        RecordingError: there is no such file or topic, or it holds no rates.
     """
     path = Path(spec)
     if path.is_file():
@@ -69,9 +69,6 @@ def imu_mount(
         gyro: names the IMU's frame.
         platform: the frame that the poses are of.
         recording: whose /tf_static joins the two, if they differ.
-
-    Raises:
-        RecordingError: its orientation is unknown.
     """
     if rpy_deg is not None:
         if not all(map(math.isfinite, rpy_deg)):

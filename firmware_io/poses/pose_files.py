@@ -1,4 +1,7 @@
-"""Platform poses from a file (TUM, CSV) or from a topic of the recording."""
+"""Platform poses from a file (TUM, CSV) or from a topic of the recording.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,10 @@ from typing import Any
 
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign
-from scanwright.firmware_io.poses.tables import Row, csv_rows, lines_of, row_of
 from scanwright.firmware_io.poses.trajectory import Trajectory, trajectory_of
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
+from scanwright.firmware_io.tables import Row, csv_rows, lines_of, row_of
 
 _COLUMNS = {
     "x": {"x", "tx", "px", "p_x", "pos_x", "position_x", "p_rs_r_x"},
@@ -31,9 +34,6 @@ def load_trajectory(spec: str, recording: Path) -> Trajectory:
         spec: a file, `.csv` with a header or else TUM (`t x y z qx qy qz qw` in each line, s and m); or
             TOPIC[:PARENT:CHILD] of the recording, the frames if the topic has several (/tf).
         recording: where topics are.
-
-    Raises:
-        RecordingError: there is no such file or topic, or it does not hold poses.
     """
     path = Path(spec)
     if path.is_file():

@@ -2,6 +2,8 @@
 
 Between two poses the position goes straight and the orientation about one axis at constant speed (slerp); that is off
 by what the platform accelerates meanwhile, at most a h^2 / 8 for poses h apart. Outside the poses: NaN.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -155,9 +157,6 @@ def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]], plat
     """Poses as files and messages have them: x y z qx qy qz qw each, the quaternion printed with a few digits.
 
     `platform` names the frame that moves.
-
-    Raises:
-        RecordingError: as for `Trajectory`.
     """
     values = np.array(poses, float).reshape(-1, 7)
     quaternion = values[:, 3:]

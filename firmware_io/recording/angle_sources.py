@@ -1,13 +1,14 @@
 """Where the axis angle of somebody's recording stands: a number in messages, a pair of frames in `/tf`, or a table.
 
 And what speaks against the unit that it is said to have.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,18 +19,16 @@ from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
 from scanwright.design.arrays import Floats, Times
-from scanwright.design.errors import RecordingError, suggest
-from scanwright.design.files.text_files import read_text
-from scanwright.firmware_io.foreign import foreign
+from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.bags import Source, numbers_at
 from scanwright.firmware_io.samples import JointLog
+from scanwright.firmware_io.tables import csv_rows
 
 TF = "tf2_msgs/msg/TFMessage"
-SECONDS, NANOSECONDS = ("time_s", "time", "t"), ("time_ns",)
-ANGLES = ("angle", "angle_deg", "angle_rad", "position", "position_rad")
+ANGLES = {"angle", "angle_deg", "angle_rad", "position", "position_rad"}
 ACROSS_RAD = math.radians(0.5)  # what an axis may wander: more is no turning about one
-MOST_ANGLE, MOST_NS = 1e9, 2**63 - 1  # years of turns; what an int64 holds
+MOST_ANGLE = 1e9  # years of turns
 STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
 WRAP, WRAP_LEAST, WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
 FEWEST_COUNTS = 512  # of an encoder turn: of fewer, degrees are as likely
@@ -63,11 +62,7 @@ def parse_frames(text: str) -> FrameSource | None:
 
 
 def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[tuple[float, ...], int]]:
-    """Values of a message and their stamps [ns] (0: none): one number, or the quaternions x y z w of a pair of frames.
-
-    Raises:
-        RecordingError: the message holds no such thing.
-    """
+    """Values of a message and their stamps [ns] (0: none): a number, or the quaternion x y z w of a pair of frames."""
     if isinstance(source, Source):
         numbers, stamp_ns = numbers_at(body, source, bag)
         return [(numbers, stamp_ns)] if numbers else []
@@ -89,9 +84,6 @@ def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source)
     Args:
         quaternions: x y z w.
         source: for errors.
-
-    Raises:
-        RecordingError: the frame stands still, or turns about more than one axis.
     """
     turned = Rotation.from_quat(quaternions)
     since = (turned[0].inv() * turned).as_quat()
@@ -114,36 +106,16 @@ def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source)
 
 
 def read_table(text: str) -> tuple[Times, Floats]:
-    """Times [ns] and angles, shape (n,) each, of `FILE.csv[:COLUMN]`.
-
-    The first line names its columns: `time_s` or `time_ns` since 1970, and the angle.
-
-    Raises:
-        RecordingError: there is no such file or column, or a line is no numbers.
-    """
+    """Times [ns] and angles, shape (n,) each, of `FILE.csv[:COLUMN]`, whose first line names its columns."""
     name, _, column = text.partition(":")
     path = Path(name)
-    lines = foreign(f"{path}: cannot read the angles", read_text, path).splitlines()
-    header = [word.strip().lstrip("#").strip() for word in next(csv.reader(lines[:1]), [])]
-    when = _column(path, header, (*SECONDS, *NANOSECONDS), "time")
-    angle = _column(path, header, (column,) if column else ANGLES, "angle")
-    scale = 1 if header[when] in NANOSECONDS else 1_000_000_000
-    time_ns, values = [], []
-    for number, words in enumerate(csv.reader(lines[1:]), 2):
-        if not words:
-            continue
-        try:
-            seconds, value = words[when].strip(), float(words[angle])
-            time_ns.append(_nanoseconds(seconds, scale))
-        except (IndexError, ValueError, OverflowError) as error:
-            raise RecordingError(f"{path}:{number}: not a time and an angle: {', '.join(words)[:80]}") from error
-        if not (abs(value) <= MOST_ANGLE and abs(time_ns[-1]) <= MOST_NS):
-            bounds = f"{', '.join(words)[:80]}: an angle of at most {MOST_ANGLE:g}, a time within 292 years of 1970"
-            raise RecordingError(f"{path}:{number}: {bounds}")
-        values.append(value)
-    if not values:
+    rows = list(csv_rows(path, {"angle": {column.lower()} if column else ANGLES}))
+    if not rows:
         raise RecordingError(f"{path}: no line with an angle")
-    return np.array(time_ns, np.int64), np.array(values, float)
+    time_ns, angle = np.array([when for when, _ in rows], np.int64), np.array([value for _, (value,) in rows])
+    if not (possible := np.abs(angle) <= MOST_ANGLE).all():
+        raise RecordingError(f"{path}: row {np.argmin(possible) + 1}: an angle of at most {MOST_ANGLE:g}")
+    return time_ns, angle
 
 
 def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[str]:
@@ -206,21 +178,3 @@ def _return_rad(position_rad: Floats) -> float:
         return 0.0
     onward = position_rad if position_rad[-1] >= position_rad[0] else -position_rad
     return float(np.max(np.maximum.accumulate(onward) - onward))
-
-
-def _nanoseconds(text: str, scale: int) -> int:
-    seconds, _, part = text.partition(".")  # a float64 rounds the seconds of today to 256 ns
-    if scale == 1 or not part.isdigit():
-        return round(float(text) * scale) if scale > 1 else int(text)
-    sign = -1 if seconds.startswith("-") else 1
-    return int(seconds or 0) * scale + sign * int(part[:9].ljust(9, "0"))
-
-
-def _column(path: Path, header: Sequence[str], known: Sequence[str], what: str) -> int:
-    values = [i for i, name in enumerate(header) if name in known]
-    if len(values) != 1:
-        hint = suggest(known[0], header) if len(known) == 1 else ""
-        raise RecordingError(
-            f"{path}: {len(values)} columns of {what}: the first line names {' or '.join(known)}{hint}"
-        )
-    return values[0]

@@ -1,4 +1,7 @@
-"""A recording as arrays: every scan a row, every beam a column. For notebooks; commands read recordings as streams."""
+"""A recording as arrays: every scan a row, every beam a column. For notebooks; commands read recordings as streams.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -38,11 +41,7 @@ class RecordingArrays:
 
 
 def arrays_of(scans: Sequence[Scan], joint_log: JointLog) -> RecordingArrays:
-    """All scans at once; short ones are filled up.
-
-    Raises:
-        RecordingError: there is no scan.
-    """
+    """All scans at once; short ones are filled up."""
     if not scans:
         raise RecordingError("no scan: there is nothing to put into arrays")
     shape = len(scans), max(scan.range_m.size for scan in scans)

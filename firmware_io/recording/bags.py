@@ -3,6 +3,8 @@
 A value inside a bag is named `TOPIC[:FIELD]`, FIELD being a dotted path such as `laserScan` or `position[0]`.
 ROS 1 and MCAP bags carry their message definitions; sqlite3 bags of older ROS 2 releases do not, and then only the
 types that come with ROS 2 can be read.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -52,11 +54,7 @@ class Message:
 
 
 def parse_source(text: str) -> Source:
-    """Read `TOPIC[:FIELD]`.
-
-    Raises:
-        RecordingError: the topic is empty or the field is not a dotted path.
-    """
+    """Read `TOPIC[:FIELD]`."""
     topic, _, field = text.partition(":")
     if not topic:
         raise RecordingError(f"'{text}': write TOPIC or TOPIC:FIELD, for example /slice:laserScan")
@@ -79,11 +77,7 @@ class Bag:
         return {connection.topic: connection.msgtype for connection in self._reader.connections}
 
     def check(self, topics: set[str]) -> None:
-        """That the bag has these topics, all of them, and knows their types.
-
-        Raises:
-            RecordingError: a topic is missing or its type unknown.
-        """
+        """That the bag has these topics, all of them, and knows their types."""
         missing = [f"no topic '{name}'{suggest(name, self.topics)}" for name in sorted(topics - self.topics.keys())]
         if missing:
             raise RecordingError(f"{self.path}: {'; '.join(missing)}")
@@ -95,11 +89,7 @@ class Bag:
                 )
 
     def messages(self, topics: set[str]) -> Iterator[Message]:
-        """The messages of these topics, decoded, in the order of their recording.
-
-        Raises:
-            RecordingError: a topic is missing, its type unknown, or the bag damaged.
-        """
+        """The messages of these topics, decoded, in the order of their recording."""
         self.check(topics)
         wanted = [connection for connection in self._reader.connections if connection.topic in topics]
         raw_messages: Iterable[tuple[Any, int, bytes]] = self._reader.messages(connections=wanted)
@@ -114,11 +104,7 @@ class Bag:
 
 @contextmanager
 def open_bag(path: Path, *more: Path) -> Iterator[Bag]:
-    """Open a bag: a `.bag`, `.mcap` or `.db3` file, or a folder of one; the parts of a split bag as one.
-
-    Raises:
-        RecordingError: there is no such bag, or it cannot be read.
-    """
+    """Open a bag: a `.bag`, `.mcap` or `.db3` file, or a folder of one; the parts of a split bag as one."""
     paths = [_bag_file(part) for part in (path, *more)]
     reader = foreign(_unreadable(path), AnyReader, paths, default_typestore=get_typestore(Stores.ROS2_JAZZY))
     foreign(_unreadable(path), reader.open)
@@ -170,11 +156,7 @@ def _unreadable(path: Path) -> str:
 
 
 def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
-    """What `source` names inside a message, and the stamp [ns] of the nearest header around it (0: there is none).
-
-    Raises:
-        RecordingError: a field or an index is not there.
-    """
+    """What `source` names inside a message, and the stamp [ns] of the nearest header around it (0: there is none)."""
     value, stamp_ns = body, _stamp(body)
     for step in source.field.split(".") if source.field else []:
         name, index = _STEP.fullmatch(step).groups()  # type: ignore[union-attr]  # parse_source has checked it
@@ -193,11 +175,7 @@ def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
 
 
 def laser_scan_at(body: Any, source: Source, bag: Path, echo: str = "first") -> tuple[Any, int]:
-    """Return the LaserScan that `source` names, and its stamp [ns] (0: none); of several echoes one, of all the first.
-
-    Raises:
-        RecordingError: it is something else; the line says what, and where LaserScans are.
-    """
+    """Return the LaserScan that a source names and its stamp [ns] (0: none); of all echoes the first."""
     value, stamp_ns = value_at(body, source, bag)
     if _kind(value) == ros_messages.MULTI_ECHO:
         return ros_messages.single_echo(value, echo), stamp_ns
@@ -226,9 +204,6 @@ def numbers_at(body: Any, source: Source, bag: Path) -> tuple[tuple[float, ...],
 
     Without a field: the only joint of a JointState, `data` of a std_msgs message. Of a JointState a field may also be
     the name of a joint. A JointState without it, or without its position, has no numbers: others publish there, too.
-
-    Raises:
-        RecordingError: it is not a number; the line says what it is, and what is there instead.
     """
     if not source.field:
         if _kind(body) == ros_messages.JOINT_STATE:

@@ -46,7 +46,7 @@ from scanwright.firmware_io.recording.recording import (
     JOINT_TOPIC,
     SCAN_TOPIC,
     MessageWriter,
-    RecordingWriter,
+    recording_writer,
 )
 from scanwright.firmware_io.samples import JointLog, with_all_echoes
 
@@ -196,7 +196,7 @@ def import_bag(
             "hold": str(still).lower(),
             "warnings": "\n".join(finding.message for finding in findings if finding.severity == "warning"),
         }
-        with RecordingWriter(out, note) as writer:
+        with recording_writer(out, note) as writer:
             _write(opened, scan_source, clock, log, writer, also, corrections, increment_s, survey.echoes)
     return ImportSummary(
         out=out,

@@ -2,6 +2,8 @@
 
 The layout is https://mcap.dev/spec. The `mcap` package reads the summary and unpacks the chunks; the records inside a
 chunk are cut here, because its reader makes an object of each record, which takes longer than all the rest.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -58,11 +60,7 @@ class TimedChunks(Writer):
 
 
 def read_topics(path: Path) -> dict[str, str]:
-    """Message type of each topic in a file.
-
-    Raises:
-        RecordingError: the file is missing, cut off or not MCAP.
-    """
+    """Message type of each topic in a file."""
     with _opened(path) as stream:
         summary = _summary(path, stream)
     return {channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()}
@@ -80,9 +78,6 @@ def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -
 
     Holds the chunks that overlap in time, commonly one, and unpacks the next ones while these are used. `summed`: their
     check sums are compared, as they need not be where the file was read before.
-
-    Raises:
-        RecordingError: the file is missing, not MCAP, or damaged.
     """
     with _opened(path) as stream:
         summary = _summary(path, stream)
@@ -173,11 +168,7 @@ def _unchunked(stream: BinaryIO, topics: Collection[str]) -> list[_Timed]:
 
 
 def unchunked_messages(path: Path, topics: Collection[str]) -> list[tuple[int, str, bytes]] | None:
-    """Return times [ns], topics and data of the messages of a file without chunks, by time; None if it has chunks.
-
-    Raises:
-        RecordingError: the file cannot be read.
-    """
+    """Return times [ns], topics and data of the messages of a file without chunks, by time; None if it has chunks."""
     with _opened(path) as stream:
         if _summary(path, stream).chunk_indexes:
             return None

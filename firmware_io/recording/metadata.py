@@ -2,6 +2,8 @@
 
 In MCAP it is a metadata record. In a bag it is a latched message of text, JSON of the same names and values, so that
 `import` of such a bag knows what the recording knew: above all whether the motor stood still during each scan.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -27,11 +29,7 @@ def rests_in_scans(note: dict[str, str]) -> bool:
 
 
 def note_in(bag: Bag) -> dict[str, str]:
-    """The note of a recording of ours, or of a bag that was made from one; empty for others.
-
-    Raises:
-        RecordingError: the bag has our topic, and what is in it is no note.
-    """
+    """The note of a recording of ours, or of a bag that was made from one; empty for others."""
     if bag.path.suffix == ".mcap" and bag.path.is_file() and (note := read_note(bag.path, NOTE)):
         return note
     if bag.topics.get(NOTE_TOPIC) != NOTE_TYPE:

@@ -9,16 +9,17 @@ Where there is a /scan_beams, the even grid of /scan is rounded for those who kn
 and time are true. Reading takes the true ones.
 
 `log_time` is the stamp. A metadata record named `scanwright` says where the recording comes from.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -73,7 +74,7 @@ class MessageWriter:
         attached: Mapping[str, str],
         writer: type[Writer] = TimedChunks,
     ) -> None:
-        """Args as for `RecordingWriter`; `attached` holds files (name -> text) that explain the messages.
+        """Args as for `recording_writer`; `attached` holds files (name -> text) that explain the messages.
 
         Chunks end by the messages' times; `writer` is a plain one where `flush` ends them.
         """
@@ -100,11 +101,7 @@ class MessageWriter:
         self._add(JOINT_TOPIC, time_ns, ros_messages.encode_joint(time_ns, position_rad))
 
     def other(self, topic: str, message_type: str, time_ns: int, message: object) -> None:
-        """Append a message of another topic, of a type that comes with ROS 2.
-
-        Raises:
-            RecordingError: it is of no such type.
-        """
+        """Append a message of another topic, of a type that comes with ROS 2."""
         self._check(time_ns)
         if topic not in self._channels:
             what = f"{self._path}: {topic}: {message_type} is no type that comes with ROS 2"
@@ -132,38 +129,16 @@ class MessageWriter:
         self._writer.add_message(self._channels[topic], log_time=time_ns, publish_time=time_ns, data=data)
 
 
-class RecordingWriter:
-    """Writes a recording; use it in a `with` statement. The file appears under its name only when that ends well.
+@contextmanager
+def recording_writer(path: Path, note: Mapping[str, str]) -> Iterator[MessageWriter]:
+    """Write a recording; the file appears under its name only when the body ends well.
 
-    Raises:
-        RecordingError: the file cannot be written.
+    `note` is kept with the recording: where it comes from, in words.
     """
-
-    def __init__(self, path: Path, note: Mapping[str, str]) -> None:
-        """`note` is kept with the recording: where it comes from, in words."""
-        self._path = path
-        self._note = note
-        self._stack = ExitStack()
-
-    def __enter__(self) -> MessageWriter:
-        with ExitStack() as stack:
-            part = stack.enter_context(atomic_write(self._path, RecordingError))
-            stream = stack.enter_context(foreign(f"{self._path}: cannot write", part.open, "wb"))
-            self._messages = MessageWriter(stream, self._path, self._note, {})
-            stack.push(self._finish)
-            self._stack = stack.pop_all()
-        return self._messages
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, trace)
-
-    def _finish(
-        self, kind: type[BaseException] | None, _error: BaseException | None, _trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self._messages.finish()
+    with atomic_write(path, RecordingError) as part, foreign(f"{path}: cannot write", part.open, "wb") as stream:
+        messages = MessageWriter(stream, path, note, {})
+        yield messages
+        messages.finish()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.firmware_io.clouds.cloud import Cloud
-from scanwright.firmware_io.registration.thin import joined_means, voxel_means
+from scanwright.firmware_io.registration.thin import voxel_means
 
 _SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 
@@ -31,11 +31,11 @@ def merge(clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"], spacing_m
         valid = np.isfinite(cloud.points_m).all(axis=1)
         world = frames.apply(T, cloud.points_m[valid].astype(float))
         rows = np.column_stack([world, cloud.columns["intensity"][valid]]) if bright else world
-        mean, count = voxel_means(world, rows, spacing_m, np.zeros(len(rows), np.uint8))
+        mean, count = voxel_means(world, rows, spacing_m)
         means.append(mean)
         counts.append(count)
     every, level = np.concatenate(means), np.zeros(sum(map(len, means)), np.uint8)
-    joined, number = joined_means(every[:, :3], every, np.concatenate(counts), spacing_m, level)
+    joined, number = voxel_means(every[:, :3], every, spacing_m, level, np.concatenate(counts))
     real = np.float32 if np.abs(joined[:, :3]).max() < _SINGLE_M else np.float64
     columns = {"intensity": joined[:, 3].astype(np.float32)} if bright else {}
     return Cloud(joined[:, :3].astype(real), columns | {"count": number.astype(np.uint32)})

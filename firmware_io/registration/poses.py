@@ -1,4 +1,7 @@
-"""Poses of clouds as TUM lines (`time x y z qx qy qz qw`, s and m), their covariances as a table beside them."""
+"""Poses of clouds as TUM lines (`time x y z qx qy qz qw`, s and m), their covariances as a table beside them.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -53,11 +56,7 @@ def cloud_names(clouds: Sequence[tuple[Path, int]]) -> list[str]:
 
 
 def read_poses(path: Path, names: Sequence[str]) -> list[Pose]:
-    """Poses of clouds, one TUM line for each: by the names in the comments above the lines, or in the clouds' order.
-
-    Raises:
-        RecordingError: the file does not hold that, or its comments name other clouds.
-    """
+    """Poses of clouds, one TUM line for each: by the names in the comments above the lines, or in the clouds' order."""
     text = foreign(f"{path}: cannot read", read_text, path)
     lines, notes = [], []
     above = ""

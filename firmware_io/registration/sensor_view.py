@@ -1,4 +1,7 @@
-"""A cloud made ready to be registered: thinned at two scales, with normals, and what its scanner saw where."""
+"""A cloud made ready to be registered: thinned at two scales, with normals, and what its scanner saw where.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -76,22 +79,19 @@ def make_view(
         spacing_m: edge of the finest voxels.
         scanner: angle set that the cloud was assembled with, if its covariance is to count.
         joint_rad: angle of the axis at each point, shape (n,), where `scanner` is given.
-
-    Raises:
-        RecordingError: too few points to be registered, or `scanner` or `joint_rad` do not say what is needed.
     """
     points_m = np.ascontiguousarray(points_m, float)
     finite = np.isfinite(points_m).all(axis=1)
     joint_rad = _joints(name, scanner, joint_rad)
     if not finite.all():
         points_m, joint_rad = points_m[finite], joint_rad[finite[: len(joint_rad)]]
-    voxels_m, counts = voxel_means(points_m, points_m, spacing_m, np.zeros(len(points_m), np.uint8))
+    voxels_m, counts = voxel_means(points_m, points_m, spacing_m)
     thinned = thin(voxels_m, counts, spacing_m, beam_step_rad(points_m)) if len(points_m) > 1 else points_m
     if len(thinned) < _MIN_POINTS:
         raise RecordingError(
             f"{name}: {len(thinned)} points {spacing_m:g} m apart: registering takes {_MIN_POINTS} at least"
         )
-    coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m, np.zeros(len(thinned), np.uint8))
+    coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m)
     beams = _beams(points_m, voxels_m, counts, joint_rad, scanner)
     return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE), beams)
 

@@ -36,7 +36,7 @@ def thin(means: Floats, counts: NDArray[np.int64], spacing_m: float, step_rad: f
     gap_m = np.linalg.norm(means, axis=1) * line_gaps_rad(means, counts, step_rad)
     level = np.clip(np.ceil(np.log2(np.maximum(gap_m, spacing_m) / spacing_m)), 0, _LEVELS).astype(np.uint8)
     # Fine voxels nest in coarse ones, so that nothing is lost by starting from their means
-    return joined_means(means, means, counts, spacing_m, level)[0]
+    return voxel_means(means, means, spacing_m, level, counts)[0]
 
 
 def line_gaps_rad(
@@ -67,18 +67,16 @@ def beam_step_rad(points_m: Float64[ndarray, "n 3"]) -> float:
 
 
 def voxel_means(
-    points_m: Floats, values: Floats, spacing_m: float, level: NDArray[np.uint8]
+    points_m: Floats,
+    values: Floats,
+    spacing_m: float,
+    level: NDArray[np.uint8] | None = None,
+    counts: NDArray[np.int64] | None = None,
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Return the mean of `values`, shape (n, k), in each occupied voxel, shape (m, k), and its points, shape (m,).
 
-    Voxels have the edge `spacing_m * 2**level`, and come in the order in which their first points do.
+    Voxels are those of `voxel_of`; with `counts` the values are means themselves, of so many points each.
     """
-    return joined_means(points_m, values, np.ones(len(points_m), np.int64), spacing_m, level)
-
-
-def joined_means(
-    points_m: Floats, values: Floats, counts: NDArray[np.int64], spacing_m: float, level: NDArray[np.uint8]
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Return `voxel_means` of values that are means themselves, of `counts` points each."""
-    sums = voxel_sums(voxel_of(points_m, spacing_m, level), np.column_stack([values * counts[:, None], counts]))
+    weight = np.ones(len(points_m), np.int64) if counts is None else counts
+    sums = voxel_sums(voxel_of(points_m, spacing_m, level), np.column_stack([values * weight[:, None], weight]))
     return sums[:, :-1] / sums[:, -1:], sums[:, -1].astype(np.int64)

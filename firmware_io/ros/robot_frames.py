@@ -22,6 +22,7 @@ from scanwright.design.arrays import Array, Pose
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
+from scanwright.firmware_io.foreign import foreign
 
 URDF = "scanner.urdf"
 _RANGE_M = 10.0  # at which a difference of frames is stated
@@ -149,17 +150,8 @@ def description(folder: Path, angles: AngleSet) -> str | None:
 
 
 def read_urdf(path: Path) -> str:
-    """The text of a URDF.
-
-    Raises:
-        RecordingError: it cannot be read.
-    """
-    try:
-        return read_text(path)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot read: {error.strerror}") from error
-    except ValueError as error:
-        raise RecordingError(f"{path}: cannot read: {error}") from error
+    """The text of a URDF; a RecordingError if it cannot be read."""
+    return foreign(f"{path}: cannot read", read_text, path)
 
 
 def calibrated_urdf_place(out: Path) -> Path:

@@ -3,6 +3,8 @@
 It asks at uneven times. At even ones an axis may pass very nearly a whole step of its encoder from one question to the
 next (an AX-12A at 30 deg/s does): all answers of a while are then rounded by the same part of a step, which no
 smoothing can find. At uneven times the rounding differs from sample to sample, and averages out.
+
+A device that is gone, silent or refuses raises DeviceError.
 """
 
 from __future__ import annotations
@@ -72,11 +74,7 @@ class AxisThread:
             return False
 
     def go(self) -> None:
-        """Make the motion anew from where the axis stands; `begins_ns` tells when it begins.
-
-        Raises:
-            DeviceError: the servo failed meanwhile.
-        """
+        """Make the motion anew from where the axis stands; `begins_ns` tells when it begins."""
         self._unread = self.hear()
         self._order(self.window[-1].position_rad if self.window else 0.0)
 
@@ -86,11 +84,7 @@ class AxisThread:
         self.orders.put(moves)
 
     def hear(self) -> list[ServoState]:
-        """Return what is new and fit to be recorded.
-
-        Raises:
-            DeviceError: the servo failed, and all that came before has been returned.
-        """
+        """Return what is new and fit to be recorded."""
         good, self._unread = self._unread, []
         while not self.received.empty() and self._failure is None:
             state = self.received.get()
@@ -136,11 +130,7 @@ class AxisThread:
 
 @contextmanager
 def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
-    """The servo makes its motion, and is asked where it is, while the body runs.
-
-    Raises:
-        DeviceError: it stands where it cannot tell its angle.
-    """
+    """The servo makes its motion, and is asked where it is, while the body runs."""
     start_rad = servo.read().position_rad
     if math.isnan(start_rad):
         raise DeviceError(

@@ -7,9 +7,12 @@ first, then read; whoever drives it goes on. A lidar measures for a few seconds,
 from __future__ import annotations
 
 import platform
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
@@ -25,8 +28,8 @@ from scanwright.firmware_io.scan.host import examine_host
 from scanwright.firmware_io.scan.lidar_scans import CLOCK_GOOD_NS
 from scanwright.firmware_io.serial_port import latency_timer
 from scanwright.firmware_io.servo import settings
-from scanwright.firmware_io.servo.examine import examine_servo
-from scanwright.firmware_io.servo.fitness import ServoSetupError
+from scanwright.firmware_io.servo.find import find_servo, listen_first, open_bus
+from scanwright.firmware_io.servo.fitness import ServoSetupError, slow_adapter, unfit_settings
 
 SERVO_SETTING = "servo_setting"  # code of a finding that a set-up of the servo at port `subject` solves
 
@@ -34,6 +37,7 @@ _MEASURED_S = 4.0  # 40 turns of the slowest lidar: a rate to a fortieth
 _RATE_WITHIN = 0.02  # data sheets allow a motor 1 to 2 %
 _RETURNS_LEAST = 0.1  # of the beams; fewer come back from outdoors only
 _BOUND_MS = 2.0  # 0.12 deg at 60 deg/s
+_READS = 100  # a second of them
 _READS_HZ = 1.2 * SERVO_HZ  # with some reserve
 
 
@@ -132,14 +136,14 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[Finding]:
     jitter_ms, uncertainty_ms = (max(late_ns) - min(late_ns)) / 1e6, timed.uncertainty_ns / 1e6
     share = float(np.isfinite(timed.scan.range_m).mean())
     rate = f"scan rate: {rate_hz:.1f} Hz (nominal {lidar.scan_rate_hz:.1f})"
-    time = f"timestamp uncertainty: {uncertainty_ms:.2f} ms; scans arrive up to {jitter_ms:.1f} ms late"
+    late = f"timestamp uncertainty: {uncertainty_ms:.2f} ms; scans arrive up to {jitter_ms:.1f} ms late"
     slip_ring = "check cable and slip ring, and route the servo's supply apart from them"
     even = abs(rate_hz / lidar.scan_rate_hz - 1) < _RATE_WITHIN
     yield _judged(even, "scan_rate", port, rate, rate_hz, lidar.scan_rate_hz, "Hz", f"no USB hub; {slip_ring}")
     bad = lidar.bad_packets
     yield _judged(not bad, "bad_packets", port, f"bad packets: {bad}", bad, 0, "", slip_ring)
     exact = timed.uncertainty_ns < CLOCK_GOOD_NS
-    yield _judged(exact, "timestamp", port, time, uncertainty_ms, CLOCK_GOOD_NS / 1e6, "ms", "end other programs")
+    yield _judged(exact, "timestamp", port, late, uncertainty_ms, CLOCK_GOOD_NS / 1e6, "ms", "end other programs")
     if timed.warning:
         yield Finding("lidar_warning", "error", port, f"{port}: {timed.warning}")
     returns, window = f"beams with a return: {share:.0%}", "check whether the window is covered or dirty"
@@ -147,24 +151,37 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[Finding]:
 
 
 def _examine_servo(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> Iterator[Finding]:
-    servo = examine_servo(port, model, servo_id, spins=spins)
-    yield _ok("servo_identity", port, f"{servo.name} ({servo.model}), {servo.protocol}")
-    if servo.reports:
+    """Listen, then ask."""
+    with closing(open_bus(port)) as bus:
+        listen_first(bus)
+        unit = find_servo(bus, model, servo_id)
+        table, name = unit.table, str(unit)
+        protocol = f"protocol {table.protocol} at {bus.baud} baud"
+        reports, has_torque = unit.reported_fault(unit.present()), unit.has_torque()
+        unfit = unfit_settings(unit, spins=spins)
+        bus.return_delay_ns = unit.value(table.return_delay_ns)
+        began_s = time.monotonic()
+        answers = [unit.present() for _ in range(_READS)]
+        reads_hz = _READS / (time.monotonic() - began_s)
+    bound_ms = median(answer.bound_ns for answer in answers) / 1e6
+    volts, degC = (table.pick(one, answers[-1].data) for one in (table.voltage, table.temperature))
+    yield _ok("servo_identity", port, f"{name} ({table.model}), {protocol}")
+    if reports:
         hint = "find the cause before it turns again; a scan resets it"
-        yield Finding("servo_fault", "warning", port, f"{servo.name} reports {servo.reports}", hint=hint)
-    if servo.has_torque:
-        moving = f"{servo.name} has its torque on: a program drives it, and it may move"
+        yield Finding("servo_fault", "warning", port, f"{name} reports {reports}", hint=hint)
+    if has_torque:
+        moving = f"{name} has its torque on: a program drives it, and it may move"
         yield Finding("servo_torque", "warning", port, moving)
-    for change in servo.unfit:
-        yield Finding(SERVO_SETTING, "warning", port, f"{servo.name}: {change}")
-    if servo.slow_adapter:
-        yield Finding("adapter_latency", "warning", port, f"{port}: {servo.slow_adapter}")
-    yield _ok("servo_supply", port, f"{port}: {servo.voltage_V:.1f} V, {servo.temperature_degC:.0f} deg C")
+    for change in unfit:
+        yield Finding(SERVO_SETTING, "warning", port, f"{name}: {change}")
+    if timer := slow_adapter(port):
+        yield Finding("adapter_latency", "warning", port, f"{port}: {timer}")
+    yield _ok("servo_supply", port, f"{port}: {volts:.1f} V, {degC:.0f} deg C")
     hint = "set the latency timer of the adapter to 1 ms" if latency_timer(port) else "end other programs"
-    reads = f"read rate: {servo.reads_hz:.0f} Hz (required {SERVO_HZ:.0f})"
-    time = f"timestamp uncertainty of an angle: {servo.bound_ms:.2f} ms"
-    yield _judged(servo.reads_hz > _READS_HZ, "read_rate", port, reads, servo.reads_hz, _READS_HZ, "Hz", hint)
-    yield _judged(servo.bound_ms < _BOUND_MS, "angle_time", port, time, servo.bound_ms, _BOUND_MS, "ms", hint)
+    reads = f"read rate: {reads_hz:.0f} Hz (required {SERVO_HZ:.0f})"
+    angle_time = f"timestamp uncertainty of an angle: {bound_ms:.2f} ms"
+    yield _judged(reads_hz > _READS_HZ, "read_rate", port, reads, reads_hz, _READS_HZ, "Hz", hint)
+    yield _judged(bound_ms < _BOUND_MS, "angle_time", port, angle_time, bound_ms, _BOUND_MS, "ms", hint)
 
 
 def _ok(code: str, subject: str, message: str) -> Finding:

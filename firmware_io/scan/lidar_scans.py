@@ -3,6 +3,8 @@
 A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. If the sensor is back within
 ten seconds, the servo turns on, up to nine times in ten minutes. A sensor that reports a fault of its own is not waited
 for.
+
+A device that is gone, silent or refuses raises DeviceError.
 """
 
 from __future__ import annotations
@@ -86,11 +88,7 @@ class LidarScans:
 
 
 def settle_clock(scans: LidarScans, reporter: Reporter) -> None:
-    """Read scans until the sensor's clock is known, or for so long that it will not be.
-
-    Raises:
-        DeviceError: as `LidarScans.next`.
-    """
+    """Read scans until the sensor's clock is known, or for so long that it will not be."""
     reporter.step("estimating the sensor's clock")
     began_s = time.monotonic()
     while (waited_s := time.monotonic() - began_s) < _CLOCK_LEAST_S or scans.clock_ns > CLOCK_GOOD_NS:

@@ -53,8 +53,23 @@ class Viewer(Watch, Protocol):
         """How the scan ended; the last call before `close`."""
 
 
-class Unwatched(Viewer):
+class Unwatched:
     """The `Viewer` of a recording without viewers."""
+
+    def joint(self, time_ns: int, position_rad: float) -> None:
+        """Nothing."""
+
+    def scan(self, scan: Scan) -> None:
+        """Nothing."""
+
+    def message(self, line: str) -> None:
+        """Nothing."""
+
+    def ended(self, end: ScanEnd) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Nothing."""
 
 
 UNWATCHED = Unwatched()

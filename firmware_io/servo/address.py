@@ -1,4 +1,7 @@
-"""Give a servo another number or speed, with care: a mistake makes it hard to find again."""
+"""Give a servo another number or speed, with care: a mistake makes it hard to find again.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -60,11 +63,7 @@ def set_address(
 
 
 def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUnit:
-    """The servo that is meant.
-
-    Raises:
-        DeviceError: it does not answer, or several do and no number was given.
-    """
+    """The servo that is meant."""
     listen_first(bus)
     if from_id is None:
         there = all_answering(bus, from_baud)
@@ -78,11 +77,7 @@ def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUni
 
 
 def _refuse_collision(unit: ServoUnit, wanted: dict[Register, int]) -> None:
-    """See that nobody else has the new number at the new speed, and that the adapter can have it.
-
-    Raises:
-        DeviceError: somebody has, or it cannot.
-    """
+    """See that nobody else has the new number at the new speed, and that the adapter can have it."""
     bus, table, before = unit.bus, unit.table, unit.bus.baud
     new_id, new_baud = wanted[table.id], table.bauds[wanted[table.baud]]
     if not bus.set_baud(new_baud):

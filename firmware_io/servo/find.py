@@ -1,4 +1,7 @@
-"""Find a servo on a port: its speed, its packets, its model. Only a mute servo is written to, and only on request."""
+"""Find a servo on a port: its speed, its packets, its model. Only a mute servo is written to, and only on request.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +24,7 @@ _LISTEN_S = 0.3  # thirty readings of another program at 100 Hz
 
 
 def open_bus(port: str) -> ServoBus:
-    """The port alone, before it is known who is on it.
-
-    Raises:
-        DeviceError: no such port, it is in use, or may not be opened.
-    """
+    """The port alone, before it is known who is on it."""
     return ServoBus(port, all_tables()[0].packets)
 
 
@@ -92,11 +91,7 @@ def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
 
 
 def listen_first(bus: ServoBus) -> None:
-    """Hear whether somebody speaks unasked, before anything is sent.
-
-    Raises:
-        DeviceError: somebody does.
-    """
+    """Hear whether somebody speaks unasked, before anything is sent."""
     if noise := bus.listen(_LISTEN_S):
         raise DeviceError(
             f"{bus.port}: {len(noise)} bytes came before any request: another program drives this bus, or no "
@@ -133,11 +128,7 @@ def _line_settings(model: str | None, baud: int | None) -> Iterator[tuple[int, P
 def _answering(
     bus: ServoBus, model: str | None, servo_id: int | None, baud: int | None, wait_s: float
 ) -> Iterator[ServoUnit]:
-    """A servo for each way in which one answers a ping, with the first table of those that speak so.
-
-    Raises:
-        DeviceError: several answer.
-    """
+    """A servo for each way in which one answers a ping, with the first table of those that speak so."""
     for speed, packets in _line_settings(model, baud):
         bus.packets = packets
         if bus.set_baud(speed):

@@ -1,4 +1,7 @@
-"""Make a servo ready to be driven: torque off, faults cleared. It never writes unasked what outlasts the power."""
+"""Make a servo ready to be driven: torque off, faults cleared. It never writes unasked what outlasts the power.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -73,11 +76,7 @@ def set_agreed(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: P
 
 
 def _torque_off(unit: ServoUnit) -> None:
-    """Turn the torque off, also of a servo that is set not to answer that.
-
-    Raises:
-        DeviceError: it stays on.
-    """
+    """Turn the torque off, also of a servo that is set not to answer that."""
     level, torque = unit.table.status_return, unit.table.torque
     if unit.count(level) == unit.table.answers_all:
         unit.write(torque, 0)

@@ -118,13 +118,12 @@ def assemble(
         True
     """
     from scanwright.firmware_io.assembly.assemble import assemble_recording
-    from scanwright.firmware_io.assembly.finish import Finish, finish_clouds, seen_from
+    from scanwright.firmware_io.assembly.finish import finish_clouds, seen_from
 
     options = replace(options, **fields)
     recording, scanner, target, organised = Path(recording), as_angle_set(angles), Path(out), options.organised
     check_target(target)
-    finish = Finish(options.outliers, options.voxel_m, options.normals)
-    if organised and finish.thins:
+    if organised and options.thins:
         raise RecordingError("`organised` cannot be combined with `outliers` or `voxel_m`, which drop beams")
     platform, remarks = _platform(recording, options)
     paint = None
@@ -135,7 +134,7 @@ def assemble(
         options = replace(options, organised=True)  # neighbours show how surfaces are turned to the camera
     own_body = None if isinstance(angles, AngleSet) else own_body_of(Path(angles))
     with ExitStack() as stack:
-        finished = target.suffix.lower() != ".ply" or finish != Finish()
+        finished = target.suffix.lower() != ".ply" or options.thins or options.normals
         folder = Path(stack.enter_context(TemporaryDirectory(dir=target.parent))) if finished else target.parent
         cloud = folder / f"{target.stem}.ply" if finished else target
         summary = assemble_recording(recording, scanner, cloud, options, platform=platform, own_body=own_body)
@@ -144,7 +143,8 @@ def assemble(
             summary = summary if organised else replace(summary, rows=summary.points, width=0, padding=0)
         summary = replace(summary, notes=(*summary.notes, *remarks))
         if finished:
-            summary = finish_clouds(summary, target, finish, seen_from(scanner, platform), organised=organised)
+            finishing = replace(options, organised=organised)
+            summary = finish_clouds(summary, target, finishing, seen_from(scanner, platform))
     return summary
 
 

@@ -6,7 +6,8 @@ from virtual_bus import VirtualBus
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.scip import dialogue
 from scanwright.firmware_io.lidar.sick import dialogue as cola_dialogue
-from scanwright.firmware_io.servo import examine, prepare
+from scanwright.firmware_io.scan import doctor
+from scanwright.firmware_io.servo import prepare
 from scanwright.firmware_io.servo.bus import bus, serial_line, unit
 
 
@@ -32,7 +33,7 @@ def virtual_bus(monkeypatch):
             return made.open(port, baud, timeout)
 
         monkeypatch.setattr(serial_line, "open_serial_port", open_port)
-        for module in (serial_line, unit, examine, prepare):
+        for module in (serial_line, unit, doctor, prepare):
             monkeypatch.setattr(module, "time", made)
         return made
 

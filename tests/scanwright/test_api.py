@@ -129,11 +129,11 @@ def test_a_linkage_comes_as_a_shape_of_cadquery():
 
 
 def test_a_recording_comes_as_arrays(tmp_path):
-    from scanwright.firmware_io.recording.recording import RecordingWriter
+    from scanwright.firmware_io.recording.recording import recording_writer
     from scanwright.firmware_io.samples import Scan
 
     start_ns = 1_700_000_000_000_000_000
-    with RecordingWriter(tmp_path / "two.mcap", {}) as writer:
+    with recording_writer(tmp_path / "two.mcap", {}) as writer:
         for k, beams in enumerate((3, 5)):
             writer.joint(start_ns + k * 25_000_000, 0.1 * k)
             writer.scan(
@@ -199,13 +199,13 @@ def test_arguments_of_version_0_1_still_work(monkeypatch):
 
 
 def test_options_of_assemble_can_be_a_record_or_keywords(monkeypatch):
-    from scanwright.firmware_io.assembly import finish
+    from scanwright.firmware_io.assembly import assemble
 
     given = []
-    monkeypatch.setattr(finish, "Finish", lambda *arguments: given.append(arguments) or 1 / 0)
+    monkeypatch.setattr(assemble, "assemble_recording", lambda *given_to, **_: given.append(given_to[3]) or 1 / 0)
     for arguments in ((sw.AssembleOptions(voxel_m=0.1), {}), (sw.AssembleOptions(), {"voxel_m": 0.1})):
         with pytest.raises(ZeroDivisionError):
             sw.assemble("r.mcap", "design/angle_sets/tilting_urg.json", "c.ply", arguments[0], **arguments[1])
-    assert given == [(None, 0.1, False)] * 2
+    assert given == [sw.AssembleOptions(voxel_m=0.1)] * 2
     with pytest.raises(TypeError, match="voxel"):
         sw.assemble("r.mcap", "design/angle_sets/tilting_urg.json", "c.ply", voxel=0.1)

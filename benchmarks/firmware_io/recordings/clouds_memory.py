@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from scanwright.firmware_io.clouds.ply import PlyWriter
+from scanwright.firmware_io.clouds.ply import ply_writer
 
 FORMATS = ("ply", "pcd", "las", "laz", "e57", "xyz")
 _FIELDS = np.dtype([*((axis, "<f4") for axis in "xyz"), ("intensity", "<f4"), ("time_s", "<f8")])
@@ -33,7 +33,7 @@ print(written.rows, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 def make(path: Path, millions: int) -> None:
     """Write a cloud of a room."""
     rng = np.random.default_rng(1)
-    with PlyWriter(path, _FIELDS, ["x y z in m"]) as writer:
+    with ply_writer(path, _FIELDS, ["x y z in m"]) as writer:
         for k in range(millions):
             rows = np.empty(_AT_ONCE, _FIELDS)
             for axis in "xyz":

@@ -15,7 +15,7 @@ from scanwright.design.motion import Spin
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import write_clouds
 from scanwright.firmware_io.recording.bag_export import export_bag
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import Scan
 
 FORMATS = ("ply", "pcd", "las", "laz", "e57", "npz", "xyz")
@@ -197,7 +197,7 @@ def _record(
     """A room of flat walls, seen by a laser that rolls; each scan with bearings and times of its own, if asked."""
     rng = np.random.default_rng(0)
     bearing_rad, step_ns = _bearings_rad(beams), 9_000_000 // (beams - 1)
-    with RecordingWriter(path, {"source": "wrong inputs"}) as writer:
+    with recording_writer(path, {"source": "wrong inputs"}) as writer:
         for k in range(scans):
             stamp_ns = _START_NS + k * _PERIOD_NS
             joint_rad = 2 * np.pi * turns * k / scans

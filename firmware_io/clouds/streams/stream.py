@@ -1,4 +1,7 @@
-"""Convert clouds that are too large for the memory, a million points at a time."""
+"""Convert clouds that are too large for the memory, a million points at a time.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +24,6 @@ def stream(source: Path, target: Path, *, least_bytes: int = STREAM_BYTES, rows:
         target: the same.
         least_bytes: size from which files are streamed.
         rows: points held at a time.
-
-    Raises:
-        RecordingError: the source cannot be read or the target cannot be written.
     """
     reader, writer = cloud_module(source), cloud_module(target)
     if not (hasattr(reader, "parts") and hasattr(writer, "write_parts")) or not source.is_file():

@@ -42,11 +42,8 @@ def status(protocol: str, servo_id: int, error: int, data: bytes) -> bytes:
 def fast_status(size: int, parts: Sequence[tuple[int, int, bytes]]) -> bytes:
     """The bytes of the one status that servos give to a fast read together: each adds its part, and none is stuffed.
 
-    A part is the error, the id, the data, and the CRC of all that went before it.
-
-    Args:
-        size: of the data of all servos that were asked, with 4 bytes for each: the length stands in front.
-        parts: id, error and data of those that answer, in the order in which they were asked.
+    A part (of id, error and data) is sent as error, id, data and the CRC of all that went before it. `size` is that of
+    the data of all servos that were asked, with 4 bytes for each: the length stands in front.
     """
     packet = b"\xff\xff\xfd\x00" + bytes([BROADCAST]) + (size + 1).to_bytes(2, "little") + b"\x55"
     for servo_id, error, data in parts:

@@ -241,11 +241,7 @@ def triangulation_offset_deg(range_mm: Times) -> Floats:
 
 
 def slamtec_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarLine[SlamtecMachine]:
-    """The emulator of a sensor of the catalogue.
-
-    Raises:
-        DeviceError: there is no emulator of this model.
-    """
+    """The emulator of a sensor of the catalogue; a DeviceError if there is none."""
     if lidar.name not in IDENTITIES:
         raise DeviceError(f"no RPLIDAR emulator of the lidar '{lidar.name}'{suggest(lidar.name, IDENTITIES)}")
     machine = SlamtecMachine(lidar, ranging, time.monotonic_ns(), _POINTS_ERROR)

@@ -16,7 +16,7 @@ import numpy as np
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceTimeoutError
-from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
+from scanwright.firmware_io.lidar.arrival_line import QUARTZ_RATE, ArrivalLine
 from scanwright.firmware_io.lidar.ldrobot import protocol
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine
@@ -30,7 +30,6 @@ _SILENCE_NS = 500_000_000  # after which the sensor may have restarted
 _PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which packets waited or were lost
 _FIRST_PAUSE_S = 0.1  # the same, before there is a line to tell what is late
 _FIRST = 3  # packets that must agree on how fast it measures
-_RATE_MAX = 2e-4  # quartz is better than 100 ppm, and there are two of them
 _STAMPS = 64  # packets over which the sensor's milliseconds are evened out
 
 
@@ -164,7 +163,7 @@ class LdrobotLidar(LineDriver):
         baud = _BAUDS[self.model]
         self._arrivals = ArrivalLine(
             smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9),
-            rate_max=_RATE_MAX,
+            rate_max=QUARTZ_RATE,
             grain_ns=_grain_ns(self._lidar),
         )
         self._clock = _PacketClock(protocol.POINTS / _points_s(self._lidar) * 1e3)

@@ -2,6 +2,8 @@
 
 47 bytes, little-endian: 54 2C, speed [deg/s], start [0.01 deg], 12 times range [mm] and intensity, end [0.01 deg],
 time [ms, from 0 again at 30000], CRC-8 (polynomial 4D, from 0, not reflected) of all before it. Angles grow clockwise.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -67,11 +69,7 @@ def crc8(data: bytes) -> int:
 
 
 def packet(data: bytes) -> LdrobotPacket:
-    """What the 47 bytes of a packet tell.
-
-    Raises:
-        ProtocolError: they are no packet, or say what cannot be.
-    """
+    """What the 47 bytes of a packet tell."""
     if len(data) != SIZE or data[:2] != HEAD:
         raise ProtocolError(f"LDROBOT: {len(data)} bytes that begin with {data[:2].hex()}: no packet")
     if crc8(data[:-1]) != data[-1]:

@@ -5,6 +5,8 @@
 
 Written from documents: SICK's telegram listing as users of it cite it, and the frames and checksum of the program
 sicktoolbox. Nobody has compared it with a sensor here.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -88,11 +90,7 @@ def variant(angle_deg: int, step_centideg: int) -> bytes:
 
 
 def accepted_variant(reply: LmsTelegram) -> tuple[int, int] | None:
-    """Field [deg] and step [0.01 deg] that it has now; None where it refuses.
-
-    Raises:
-        ProtocolError: it is no answer to VARIANT.
-    """
+    """Field [deg] and step [0.01 deg] that it has now; None where it refuses."""
     if reply.command != VARIANT | ANSWER or len(reply.values) != 6:
         raise ProtocolError(f"LMS 2xx: {len(reply.values)} bytes about its variant, not 6")
     done, angle_deg, step_centideg, _ = struct.unpack("<BHHB", reply.values)
@@ -100,11 +98,7 @@ def accepted_variant(reply: LmsTelegram) -> tuple[int, int] | None:
 
 
 def scan(reply: LmsTelegram) -> LmsScan:
-    """The ranges of a telegram that is a whole scan.
-
-    Raises:
-        ProtocolError: it is none, a part of one, of an unknown unit, or cut.
-    """
+    """The ranges of a telegram that is a whole scan."""
     if reply.command != SCAN or len(reply.values) < 3:
         raise ProtocolError(f"LMS 2xx: telegram {reply.command:02X}: no scan")
     head = reply.values[0] | reply.values[1] << 8

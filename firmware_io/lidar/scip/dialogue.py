@@ -1,4 +1,7 @@
-"""Questions to a SCIP lidar and what it answers, at whatever speed and in whatever version it listens."""
+"""Questions to a SCIP lidar and what it answers, at whatever speed and in whatever version it listens.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +29,7 @@ class ScipDialogue:
     """
 
     def __init__(self, address: str) -> None:
-        """Open the port and put the laser out, whatever the sensor is doing.
-
-        Raises:
-            DeviceError: no such port, it is in use, or what answers is no SCIP sensor.
-        """
+        """Open the port and put the laser out, whatever the sensor is doing."""
         self.line = SensorLine(address, protocol.LONGEST_REPLY)
         self._bad_before = 0
         self._begin()
@@ -66,11 +65,7 @@ class ScipDialogue:
                 return reply, arrival_ns
 
     def insist(self, request: bytes, *statuses: str) -> None:
-        """Ask, and take no other status for an answer.
-
-        Raises:
-            DeviceError: it has another one; or as `ask` does.
-        """
+        """Ask, and take no other status for an answer."""
         reply = self.ask(request)
         if reply.status not in statuses:
             raise DeviceError(f"{self.line.name}: {reply.echo.decode()}: status {reply.status}: {reply.meaning()}")

@@ -1,4 +1,7 @@
-"""What a Hokuyo is asked to measure, and the numbers that it tells, as pure functions of replies in SCIP 2.0."""
+"""What a Hokuyo is asked to measure, and the numbers that it tells, as pure functions of replies in SCIP 2.0.
+
+Bytes that mean something else raise ProtocolError.
+"""
 
 from __future__ import annotations
 
@@ -91,11 +94,7 @@ def is_scan(reply: Reply) -> bool:
 
 
 def measurement(reply: Reply) -> Measurement:
-    """The numbers of a scan reply.
-
-    Raises:
-        ProtocolError: it is none, or lines or numbers are missing, or too many.
-    """
+    """The numbers of a scan reply."""
     match = _SCAN_ECHO.fullmatch(reply.echo)
     if match is None or not is_scan(reply):
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
@@ -119,11 +118,7 @@ def measurement(reply: Reply) -> Measurement:
 
 
 def stamp(reply: Reply) -> int:
-    """The sensor's clock [ms, 24 bit] from a TM1 reply.
-
-    Raises:
-        ProtocolError: it is none.
-    """
+    """The sensor's clock [ms, 24 bit] from a TM1 reply."""
     if reply.echo[:3] != b"TM1" or reply.status != "00" or len(reply.lines) != 1 or len(reply.lines[0]) != 4:
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
     return int(decode(reply.lines[0], 4)[0])

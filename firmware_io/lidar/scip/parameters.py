@@ -1,4 +1,7 @@
-"""What Hokuyo lidars say of themselves, and what the small numbers among their ranges mean."""
+"""What Hokuyo lidars say of themselves, and what the small numbers among their ranges mean.
+
+Bytes that mean something else raise ProtocolError.
+"""
 
 from __future__ import annotations
 
@@ -70,11 +73,7 @@ class Parameters:
 
 
 def parameters(fields: Mapping[str, str]) -> Parameters:
-    """The record of a PP reply.
-
-    Raises:
-        ProtocolError: a value is missing, or the values contradict each other.
-    """
+    """The record of a PP reply."""
     try:
         known = Parameters(
             model=fields["MODL"].partition("(")[0].strip(),

@@ -9,6 +9,8 @@ bits wide, and blind to the upper two of each byte, so lengths and characters ar
 The echo has no sum at all: who asked compares it with what he asked.
 
 A sensor that wakes up in SCIP 1.1 answers with a status of one character and no sums; `SCIP_2` steps it up.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -93,11 +95,7 @@ def encode(values: Iterable[int], characters: int) -> bytes:
 
 
 def decode(text: bytes, characters: int) -> Integers:
-    """Numbers of a text that was written by `encode`.
-
-    Raises:
-        ProtocolError: the text has a character outside 0x30..0x6F, or does not divide into numbers.
-    """
+    """Numbers of a text that was written by `encode`."""
     sixes = np.frombuffer(text, np.uint8).astype(np.int32) - 0x30
     if len(text) % characters:
         raise ProtocolError(f"{len(text)} characters are no numbers of {characters}")
@@ -126,11 +124,7 @@ def data_lines(stamp_ms: int, payload: bytes) -> list[bytes]:
 
 
 def parse(block: bytes) -> Reply:
-    """Check and split one reply, without the two LF at its end.
-
-    Raises:
-        ProtocolError: a sum, a length or a character is wrong.
-    """
+    """Check and split one reply, without the two LF at its end."""
     echo, _, after = block.partition(b"\n")
     status, *rest = after.split(b"\n")
     if not _ECHO.fullmatch(echo):
@@ -180,11 +174,7 @@ class Splitter:
 
 
 def information(reply: Reply) -> dict[str, str]:
-    """Keys and texts of a VV, PP or II reply.
-
-    Raises:
-        ProtocolError: the sensor refused, or a line is not `KEY:text`.
-    """
+    """Keys and texts of a VV, PP or II reply."""
     if reply.status != "00":
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
     pairs = [line.decode("ascii", "replace").partition(":") for line in reply.lines]

@@ -8,6 +8,8 @@ What is said is the same in both: a word of three letters, a name, and values in
 stands, and a telegram that ends early, is all that tells a broken one.
 
 Sources: SICK LMS4000 manual 8023198 (framing), TiM781 manual 8024232 (error codes), LMS500 instructions 8013796.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -97,11 +99,7 @@ def framed(telegram: Telegram) -> bytes:
 
 
 def error_code(telegram: Telegram) -> int:
-    """The number of an sFA; some firmware writes a space before it, some does not, and it has one byte or two.
-
-    Raises:
-        ProtocolError: it holds none.
-    """
+    """The number of an sFA; some firmware writes a space before it, some does not, and it has one byte or two."""
     rest = telegram.payload[3:]
     if telegram.binary:
         rest = rest[1:] if rest[:1] == b" " else rest

@@ -1,4 +1,7 @@
-"""Questions to a SICK lidar in the dialect of CoLa that it understands, and what it answers or refuses."""
+"""Questions to a SICK lidar in the dialect of CoLa that it understands, and what it answers or refuses.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -60,11 +63,7 @@ class ColaDialogue:
     """
 
     def __init__(self, address: str) -> None:
-        """Open the port, find the dialect, and stop its telegrams.
-
-        Raises:
-            DeviceError: no such port, it is in use, or what answers speaks no CoLa.
-        """
+        """Open the port, find the dialect, and stop its telegrams."""
         self.line = SensorLine(address, LONGEST)
         self._bad_before = 0
         self._begin()
@@ -105,11 +104,7 @@ class ColaDialogue:
             time.sleep(POLL_S / 2)
 
     def insist(self, out: Writer, expect: int) -> None:
-        """Ask, and take no other first value for an answer.
-
-        Raises:
-            DeviceError: it is another one; or as `ask` does.
-        """
+        """Ask, and take no other first value for an answer."""
         name = out.telegram().name.decode()
         got = self.checked(name, self.ask(out).number, "u8")
         if got != expect:

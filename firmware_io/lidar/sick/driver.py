@@ -12,7 +12,8 @@ import numpy as np
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
-from scanwright.firmware_io.lidar.device_clock import DeviceClock, StampCounter
+from scanwright.firmware_io.lidar.arrival_line import QUARTZ_RATE, ArrivalLine
+from scanwright.firmware_io.lidar.device_clock import TICK_NS, StampCounter
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.sensor_line import LineDriver
 from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
@@ -178,7 +179,7 @@ class SickLidar(LineDriver):
         """What comes next is of another run of the sensor."""
         self._stamps.restart()
         self._count: int | None = None
-        self._clock: DeviceClock | None = None
+        self._clock: ArrivalLine | None = None
 
     def _timed(self, scan: ScanData, arrival_ns: int) -> TimedScan:
         if scan.status & FAULT:
@@ -194,13 +195,16 @@ class SickLidar(LineDriver):
         restarts = self._stamps.restarts
         sent_us = self._stamps.unwrap(scan.sent_us, arrival_ns)
         if self._clock is None or restarts != self._stamps.restarts:
-            self._clock = DeviceClock(self._every / scan.scan_rate_hz, smallest_delay_ns=0, fine=True)
-        moment = self._clock.update(sent_us / 1e3, arrival_ns)
+            spacing_ns = 1e9 * self._every / scan.scan_rate_hz
+            self._clock = ArrivalLine(
+                smallest_delay_ns=0, rate_max=QUARTZ_RATE, grain_ns=TICK_NS, spacing_ns=spacing_ns
+            )
+        self._clock.add(1e3 * sent_us, arrival_ns)
         start_deg, step_deg = first.bearing_deg
         shown = scan.channel("RSSI1")
         intensity = shown.raw * shown.scale + shown.offset if shown else np.empty(0)
         turn = Scan(
-            stamp_ns=moment.time_ns - round(scan.first_beam_before_sent_us * 1e3),
+            stamp_ns=self._clock.host_ns(1e3 * sent_us) - round(scan.first_beam_before_sent_us * 1e3),
             angle_min_rad=float(np.radians(start_deg)),
             angle_increment_rad=self._step_rad(step_deg),
             time_increment_s=scan.beam_us / 1e6,
@@ -211,7 +215,7 @@ class SickLidar(LineDriver):
             intensity=intensity.astype(np.float32),
         )
         dirty = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
-        return TimedScan(turn, arrival_ns, moment.uncertainty_ns, dirty)
+        return TimedScan(turn, arrival_ns, self._clock.uncertainty_ns, dirty)
 
     def _step_rad(self, step_deg: float) -> float:
         """A step of a third of a degree is sent as 0.3333: 0.027 deg are missing at the end of 811 beams."""

@@ -2,6 +2,8 @@
 
 Layout: SICK TiM5xx technical information 8015883; LMS4000 manual 8023198 for the binary form. What follows the 8-bit
 channels (position, name, comment, time of day, event) is not read.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -114,11 +116,7 @@ class ScanData:
 
 
 def scan_data(telegram: Telegram) -> ScanData:
-    """The scan in an sSN or sRA LMDscandata.
-
-    Raises:
-        ProtocolError: it is none, or it is cut or damaged.
-    """
+    """The scan in an sSN or sRA LMDscandata."""
     if telegram.word not in (b"sSN", b"sRA") or telegram.name != b"LMDscandata":
         raise ProtocolError("no LMDscandata")
     values = telegram.values()

@@ -1,4 +1,7 @@
-"""Rate, resolution and field of a SICK lidar that has a choice: set to those of the catalogue."""
+"""Rate, resolution and field of a SICK lidar that has a choice: set to those of the catalogue.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,7 @@ _SET_UP = {1: "its scan frequency", 2: "its resolution", 3: "its scan frequency 
 
 
 def set_rate(dialogue: ColaDialogue, lidar: Lidar) -> None:
-    """Set what is not as the catalogue says; a sensor without a choice is left as it is.
-
-    Raises:
-        DeviceError: it refuses that, does not answer, or is gone.
-    """
+    """Set what is not as the catalogue says; a sensor without a choice is left as it is."""
     step = round(3_600_000 / lidar.steps_per_turn)
     first = 900_000 + round((lidar.first_step - lidar.front_step) * 3_600_000 / lidar.steps_per_turn)
     last = 900_000 + round((lidar.last_step - lidar.front_step) * 3_600_000 / lidar.steps_per_turn)

@@ -1,4 +1,7 @@
-"""The values of a CoLa telegram, taken up one after the other in either dialect; no port, no clock."""
+"""The values of a CoLa telegram, taken up one after the other in either dialect; no port, no clock.
+
+Bytes that mean something else raise ProtocolError.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +25,7 @@ class Reader:
         self._values, self._binary, self._at = values, binary, 0
 
     def number(self, kind: Kind) -> int:
-        """One whole number.
-
-        Raises:
-            ProtocolError: there is none, or it does not fit its type.
-        """
+        """One whole number."""
         bits = _bits(kind)
         if self._binary:
             value = int.from_bytes(self._next(bits // 8), "big")
@@ -52,11 +51,7 @@ class Reader:
         return value
 
     def real(self) -> float:
-        """One number of IEEE 754, 32 bits.
-
-        Raises:
-            ProtocolError: there is none, or it is none.
-        """
+        """One number of IEEE 754, 32 bits."""
         if not self._binary and self._values[self._at : self._at + 1] == b"+":
             raise ProtocolError("a decimal where a float stands")
         value = float(struct.unpack(">f", struct.pack(">I", self.number("u32")))[0])
@@ -74,11 +69,7 @@ class Reader:
         return [self.number(kind) for _ in range(count)]
 
     def name(self, length: int) -> str:
-        """A name of fixed length.
-
-        Raises:
-            ProtocolError: it is cut, or not ASCII.
-        """
+        """A name of fixed length."""
         raw = self._next(length)
         if not self._binary:
             self._skip_space()

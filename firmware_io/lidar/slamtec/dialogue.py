@@ -1,4 +1,7 @@
-"""Questions to an RPLIDAR, what it answers, and which of its modes it streams best in."""
+"""Questions to an RPLIDAR, what it answers, and which of its modes it streams best in.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -26,28 +29,13 @@ class SlamtecDialogue:
     """
 
     def __init__(self, address: str) -> None:
-        """Open the line.
-
-        Raises:
-            DeviceError: no such port or host, or it is in use.
-        """
+        """Open the line."""
         self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))
         self._replies = protocol.ReplySplitter()
         self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
 
     def ask(self, command: int, kind: int, read: Callable[[bytes], Answer], payload: bytes = b"") -> Answer:
-        """Send a request and return its answer.
-
-        Args:
-            command: the request.
-            kind: type of the answer.
-            read: what the answer's bytes mean.
-            payload: of the request.
-
-        Raises:
-            DeviceTimeoutError: nothing in time.
-            DeviceError: something else.
-        """
+        """Send a request with its payload, and read the answer of one kind."""
         self.request(command, payload)
         deadline_s = time.monotonic() + _ANSWER_S
         while True:
@@ -56,11 +44,7 @@ class SlamtecDialogue:
                 return read(data)
 
     def request(self, command: int, payload: bytes = b"") -> None:
-        """Send a request, and drop what came before it.
-
-        Raises:
-            DeviceError: the connection broke.
-        """
+        """Send a request, and drop what came before it."""
         self._replies = protocol.ReplySplitter()
         self._waiting = []
         self.line.send(protocol.request(command, payload))
@@ -85,11 +69,7 @@ class StreamMode:
 
 
 def typical_mode(dialogue: SlamtecDialogue) -> StreamMode:
-    """The mode that it streams best in; firmware without modes has express scans.
-
-    Raises:
-        DeviceError: it does not answer, answers something else, or is gone.
-    """
+    """The mode that it streams best in; firmware without modes has express scans."""
     with suppress(DeviceTimeoutError):
         number = _configured(dialogue, protocol.CONF_TYPICAL, b"", "<H")
         of_mode = struct.pack("<H", number)

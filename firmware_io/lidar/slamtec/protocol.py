@@ -3,6 +3,8 @@
 A request is A5 and a command; a payload is preceded by its length and followed by the exclusive or of all. A reply
 begins with a descriptor: A5 5A, length (30 bits) with the mode in its two highest bits, and a type. After its first
 descriptor a stream has none: nodes of 5 bytes, capsules of 84, or ultra capsules of 132.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -108,11 +110,7 @@ def request(command: int, payload: bytes = b"") -> bytes:
 
 
 def descriptor(data: bytes) -> Descriptor:
-    """What the 7 bytes before a reply say.
-
-    Raises:
-        ProtocolError: they are no descriptor.
-    """
+    """What the 7 bytes before a reply say."""
     if len(data) != _DESCRIPTOR_SIZE or data[:2] != _MARK:
         raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no descriptor")
     word, kind = struct.unpack_from("<IB", data, 2)
@@ -120,44 +118,28 @@ def descriptor(data: bytes) -> Descriptor:
 
 
 def info(data: bytes) -> Info:
-    """The reply to INFO.
-
-    Raises:
-        ProtocolError: it has not 20 bytes.
-    """
+    """The reply to INFO."""
     if len(data) != 20:
         raise ProtocolError(f"RPLIDAR: {len(data)} bytes about itself, not 20")
     return Info(data[0], f"{data[2]}.{data[1]:02d}", data[4:].hex().upper())
 
 
 def health(data: bytes) -> tuple[int, int]:
-    """The reply to HEALTH: 0 good, 1 a warning, 2 a fault; and its number.
-
-    Raises:
-        ProtocolError: it has not 3 bytes, or says something else.
-    """
+    """The reply to HEALTH: 0 good, 1 a warning, 2 a fault; and its number."""
     if len(data) != 3 or data[0] > 2:
         raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no state of health")
     return data[0], data[1] | data[2] << 8
 
 
 def sample_times(data: bytes) -> tuple[int, int]:
-    """The reply to SAMPLE_TIMES: between two points of a standard and of an express scan [us].
-
-    Raises:
-        ProtocolError: it has not 4 bytes.
-    """
+    """The reply to SAMPLE_TIMES: between two points of a standard and of an express scan [us]."""
     if len(data) != 4:
         raise ProtocolError(f"RPLIDAR: {len(data)} bytes of sample times, not 4")
     return struct.unpack("<HH", data)
 
 
 def node(data: bytes) -> SlamtecPacket:
-    """A node: one point with its own angle.
-
-    Raises:
-        ProtocolError: its check bits are wrong.
-    """
+    """A node: one point with its own angle."""
     if len(data) != _NODE_SIZE or (data[0] ^ data[0] >> 1) & 1 == 0 or not data[1] & 1:
         raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no node")
     angle, distance = struct.unpack_from("<HH", data, 1)
@@ -173,11 +155,7 @@ def node(data: bytes) -> SlamtecPacket:
 
 
 def capsule(data: bytes) -> SlamtecPacket:
-    """An express capsule: 32 points between its start and the next one's.
-
-    Raises:
-        ProtocolError: it does not begin as one, or its sum is wrong.
-    """
+    """An express capsule: 32 points between its start and the next one's."""
     start_deg, first = _capsule_start(data, _CAPSULE_SIZE)
     cabins = np.frombuffer(data, _CABINS, 16, 4)
     distance = cabins["distance"].astype(np.int64)
@@ -190,21 +168,13 @@ def capsule(data: bytes) -> SlamtecPacket:
 
 
 def ultra(data: bytes) -> SlamtecPacket:
-    """An ultra capsule: 96 points between its start and the next one's; see `SlamtecPacket.before`.
-
-    Raises:
-        ProtocolError: it does not begin as one, or its sum is wrong.
-    """
+    """An ultra capsule: 96 points between its start and the next one's; see `SlamtecPacket.before`."""
     start_deg, first = _capsule_start(data, _ULTRA_SIZE)
     return _ultra(start_deg, np.frombuffer(data, "<u4", 32, 4).astype(np.int64), 0, first=first)
 
 
 def dense(data: bytes) -> SlamtecPacket:
-    """A dense capsule: 40 points, evenly between its start and the next one's.
-
-    Raises:
-        ProtocolError: it does not begin as one, or its sum is wrong.
-    """
+    """A dense capsule: 40 points, evenly between its start and the next one's."""
     start_deg, first = _capsule_start(data, _CAPSULE_SIZE)
     range_mm = np.frombuffer(data, "<u2", 40, 4)
     return SlamtecPacket(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))

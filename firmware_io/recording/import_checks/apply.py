@@ -15,11 +15,7 @@ def corrected_scan(
 ) -> Scan:
     """Return a scan with its header corrected.
 
-    Args:
-        scan: as received.
-        corrections: of bearings.
-        time_increment_s: to use; None for that of the scan.
-        limits_rad: angle_min and angle_max of its header.
+    `time_increment_s` None leaves that of the scan; `limits_rad` are angle_min and angle_max of its header.
     """
     if time_increment_s is not None:
         scan = replace(scan, time_increment_s=time_increment_s)

@@ -1,4 +1,7 @@
-"""Corrections of other people's recordings: chosen by a person, offered by the checks, applied by the import."""
+"""Corrections of other people's recordings: chosen by a person, offered by the checks, applied by the import.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,7 @@ _COUNTS = re.compile(r"(\d{1,12}(?:\.\d+)?)/turn")
 
 
 def radians_per(angle_unit: str) -> float:
-    """Return the radians of one unit of an angle: `deg`, `rad`, or counts such as `4096/turn`.
-
-    Raises:
-        RecordingError: it is no such unit.
-    """
+    """Return the radians of one unit of an angle: `deg`, `rad`, or counts such as `4096/turn`."""
     if angle_unit in ("deg", "rad"):
         return math.pi / 180 if angle_unit == "deg" else 1.0
     counts = _COUNTS.fullmatch(angle_unit)
@@ -28,11 +27,7 @@ def radians_per(angle_unit: str) -> float:
 
 
 def read_time_increment(text: str) -> float | Literal["auto"]:
-    """Read a time increment: seconds, or `auto`.
-
-    Raises:
-        RecordingError: it is neither.
-    """
+    """Read a time increment: seconds, or `auto`."""
     try:
         return "auto" if text == "auto" else float(text)
     except ValueError as error:

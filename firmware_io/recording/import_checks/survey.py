@@ -1,4 +1,7 @@
-"""First pass over somebody's bag: times, headers and angles of all usable messages."""
+"""First pass over somebody's bag: times, headers and angles of all usable messages.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -60,9 +63,6 @@ def survey_bag(
         angle_source: of the angles; None if they are in a table.
         table: times and angles.
         corrections: which echo to use.
-
-    Raises:
-        RecordingError: there is no usable scan or angle.
     """
     left_out: Counter[str] = Counter()
     scans: list[tuple[int, int, bool]] = []

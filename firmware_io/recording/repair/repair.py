@@ -8,6 +8,8 @@ An MCAP file is a chain of records (https://mcap.dev/spec). What proves that byt
 - where the chain breaks, it begins anew where two records in a row can be read to their last byte.
 
 A file is called whole only when all of that holds, indexes say what they index, and the readers read it.
+
+Input that cannot be used raises RecordingError.
 """
 
 from __future__ import annotations
@@ -73,11 +75,7 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
 
 
 def repaired_place(path: Path) -> Path:
-    """Where the repaired recording goes: beside the damaged one.
-
-    Raises:
-        RecordingError: there is no file of that name.
-    """
+    """Where the repaired recording goes: beside the damaged one."""
     if not path.is_file():
         raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
     return path.with_name(f"{path.stem}.repaired.mcap")

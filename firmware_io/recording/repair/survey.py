@@ -128,83 +128,108 @@ class Survey:
 
 def survey(data: memoryview) -> Survey:
     """Find everything that can be read, and count what cannot."""
-    result = Survey()
-    lost, repaired = result.summary, result.summary.repaired
-    index, end_of_data = index_at_the_end(data)
-    chunk_indexes = {record.chunk_start_offset: record for record in index if isinstance(record, mcap.ChunkIndex)}
-    for record in index:
-        if isinstance(record, mcap.Statistics):
-            result.announced = record.message_count
-            result.summary_ns = (record.message_start_time, record.message_end_time)
-    result.learn(index)
-    repaired["the index at the end"] += not index
-    repaired["the first or last bytes"] += not between_magics(data)
-    unsure: list[Any] = []
-    closed = False
-    due: Counter[tuple[int, int, int]] | None = None  # what message indexes have to say of the chunk before them
-    at = len(MCAP0_MAGIC)
+    surveyor = _Surveyor(data)
+    at, end_of_data = len(MCAP0_MAGIC), surveyor.end_of_data
     while at < end_of_data:
-        record, end = record_at(data, at)
-        noted = chunk_indexes.get(at)
-        chunk = chunk_at(data, at, end, noted) if record is None or isinstance(record, mcap.Chunk) else None
-        if due is not None and not isinstance(record, mcap.MessageIndex):
-            repaired["indexes of chunks"] += due.total() != 0
-            due = None
+        at = surveyor.take(at)
+    return surveyor.finish()
+
+
+class _Surveyor:
+    """Reads one record after the other; what follows a damaged one is looked for."""
+
+    def __init__(self, data: memoryview) -> None:
+        self._data = data
+        self._result = Survey()
+        self._lost, self._repaired = self._result.summary, self._result.summary.repaired
+        self._index, self.end_of_data = index_at_the_end(data)
+        self._noted = {
+            record.chunk_start_offset: record for record in self._index if isinstance(record, mcap.ChunkIndex)
+        }
+        for record in self._index:
+            if isinstance(record, mcap.Statistics):
+                self._result.announced = record.message_count
+                self._result.summary_ns = (record.message_start_time, record.message_end_time)
+        self._result.learn(self._index)
+        self._repaired["the index at the end"] += not self._index
+        self._repaired["the first or last bytes"] += not between_magics(data)
+        self._unsure: list[Any] = []
+        self._closed = False
+        self._due: Counter[tuple[int, int, int]] | None = None  # what message indexes have to say of the chunk before
+
+    def take(self, at: int) -> int:
+        """Take the record at a place; where the next one is."""
+        record, end = record_at(self._data, at)
+        noted = self._noted.get(at)
+        chunk = chunk_at(self._data, at, end, noted) if record is None or isinstance(record, mcap.Chunk) else None
+        if self._due is not None and not isinstance(record, mcap.MessageIndex):
+            self._repaired["indexes of chunks"] += self._due.total() != 0
+            self._due = None
         if chunk is not None:
-            inside = list(inside_of(unpacked_at(data, chunk.begin, chunk.end, chunk.packing)[0]))
-            result.learn(item for _, item in inside)
-            result.chunks.append(chunk)
-            records = Counter(
-                (item.channel_id, item.log_time, place) for place, item in inside if isinstance(item, mcap.Message)
-            )
-            due = records if noted is None or noted.message_index_offsets else None
-            repaired["heads of chunks"] += chunk.doubtful or not fits(record, noted, records)
-            end = chunk.end
+            self._chunk(chunk, record, noted)
+            return chunk.end
+        if record is None:
+            end = min(next_record(self._data, at, end, noted), self.end_of_data)
+            self._lose(at, end, chunk=noted is not None)
         elif isinstance(record, mcap.Chunk):
-            lost.damaged_chunks += 1
-            lost.lost_bytes += end - at
-            result.lost_at.append(at)
+            self._lose(at, end, chunk=True)
         elif isinstance(record, mcap.MessageIndex):
-            if due is None:
-                lost.lost_messages += len(record.records)
-            else:
-                indexed = Counter((record.channel_id, time_ns, place) for time_ns, place in record.records)
-                repaired["indexes of chunks"] += bool(indexed - due)
-                due -= indexed
-        elif record is None:
-            end = min(next_record(data, at, end, noted), end_of_data)
-            lost.damaged_chunks += noted is not None
-            lost.lost_bytes += end - at
-            result.lost_at.append(at)
+            self._message_index(record)
         elif isinstance(record, mcap.Message):
             # any bytes are a message: one of a damaged length ends where nothing begins, and others begin within it
-            begins = end if record_at(data, end)[0] is not None else next_record(data, at, at, None)
+            known = record_at(self._data, end)[0] is not None
+            begins = end if known else next_record(self._data, at, at, None)
             if begins < end:
-                lost.lost_bytes += begins - at
-                result.lost_at.append(at)
-                end = begins
-            else:
-                result.loose.append((at, end))
-        elif isinstance(record, mcap.Attachment) and not sealed(data, at, end):
-            lost.lost_bytes += end - at
+                self._lose(at, begins)
+                return begins
+            self._result.loose.append((at, end))
+        elif isinstance(record, mcap.Attachment) and not sealed(self._data, at, end):
+            self._lost.lost_bytes += end - at
         elif isinstance(record, mcap.Attachment | mcap.Metadata):
-            result.extras.append(record)
-        elif isinstance(record, mcap.Header) and result.header is None:
-            result.header = record
+            self._result.extras.append(record)
+        elif isinstance(record, mcap.Header) and self._result.header is None:
+            self._result.header = record
         else:
             if isinstance(record, mcap.DataEnd):
-                closed = not record.data_section_crc or record.data_section_crc == zlib.crc32(data[:at])
-            unsure.append(record)
-        at = end
-    result.learn(unsure)
-    if result.chunks or lost.damaged_chunks:  # any bytes may look like a message, and nothing vouches for these
-        lost.lost_bytes += sum(end - at for at, end in result.loose)
-        result.loose.clear()
-    repaired["the end of the data"] += bool(index) and not closed
-    repaired["the header"] += result.header is None
-    for what in [what for what, count in repaired.items() if not count]:
-        del repaired[what]
-    return result
+                self._closed = record.data_section_crc in (0, zlib.crc32(self._data[:at]))
+            self._unsure.append(record)
+        return end
+
+    def finish(self) -> Survey:
+        """Return the survey, when all records are taken."""
+        result, lost, repaired = self._result, self._lost, self._repaired
+        result.learn(self._unsure)
+        if result.chunks or lost.damaged_chunks:  # any bytes may look like a message, and nothing vouches for these
+            lost.lost_bytes += sum(end - at for at, end in result.loose)
+            result.loose.clear()
+        repaired["the end of the data"] += bool(self._index) and not self._closed
+        repaired["the header"] += result.header is None
+        for what in [what for what, count in repaired.items() if not count]:
+            del repaired[what]
+        return result
+
+    def _lose(self, at: int, end: int, *, chunk: bool = False) -> None:
+        self._lost.damaged_chunks += chunk
+        self._lost.lost_bytes += end - at
+        self._result.lost_at.append(at)
+
+    def _chunk(self, chunk: IntactChunk, record: Any, noted: mcap.ChunkIndex | None) -> None:
+        inside = list(inside_of(unpacked_at(self._data, chunk.begin, chunk.end, chunk.packing)[0]))
+        self._result.learn(item for _, item in inside)
+        self._result.chunks.append(chunk)
+        records = Counter(
+            (item.channel_id, item.log_time, place) for place, item in inside if isinstance(item, mcap.Message)
+        )
+        self._due = records if noted is None or noted.message_index_offsets else None
+        self._repaired["heads of chunks"] += chunk.doubtful or not fits(record, noted, records)
+
+    def _message_index(self, record: mcap.MessageIndex) -> None:
+        if self._due is None:
+            self._lost.lost_messages += len(record.records)
+            return
+        indexed = Counter((record.channel_id, time_ns, place) for time_ns, place in record.records)
+        self._repaired["indexes of chunks"] += bool(indexed - self._due)
+        self._due -= indexed
 
 
 def intact_messages(data: memoryview, result: Survey) -> Iterator[tuple[int, mcap.Message]]:

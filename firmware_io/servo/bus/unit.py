@@ -1,4 +1,7 @@
-"""One servo on a bus, by its registers: values, settings that outlast the power, speed."""
+"""One servo on a bus, by its registers: values, settings that outlast the power, speed.
+
+A device that is gone, silent or refuses raises DeviceError.
+"""
 
 from __future__ import annotations
 
@@ -69,11 +72,7 @@ class ServoUnit:
         return self.table.names(answer.conditions if fault is None else self.count(fault))
 
     def set_permanent(self, register: Register, count: int) -> int:
-        """Set an entry that outlasts the power, torque being off; its count before. Written if it differs: it wears.
-
-        Raises:
-            DeviceError: it keeps its value.
-        """
+        """Set an entry that outlasts the power, torque being off; its count before. Written if it differs: it wears."""
         was = self.count(register)
         if was != count:
             self._unlock(True)
@@ -96,11 +95,7 @@ class ServoUnit:
                 raise
 
     def set_baud(self, baud: int) -> None:
-        """Set its speed, torque being off, and find it at its new one.
-
-        Raises:
-            DeviceError: it knows no such speed, the adapter cannot have it, or it answers at no speed with that count.
-        """
+        """Set its speed, torque being off, and find it at its new one."""
         register, count, before = self.table.baud, self.table.baud_count(baud), self.bus.baud
         if not self.bus.set_baud(baud):
             raise DeviceError(f"{self.bus.port}: this adapter cannot do {baud} baud; nothing was changed")
@@ -119,11 +114,7 @@ class ServoUnit:
         )
 
     def set_id(self, new_id: int) -> ServoUnit:
-        """Give it another number, torque being off; the servo with it, read back.
-
-        Raises:
-            DeviceError: it does not answer with it.
-        """
+        """Give it another number, torque being off; the servo with it, read back."""
         register = self.table.id
         self._unlock(True)
         self.bus.write_unanswered(self.id, register, register.encode(new_id))

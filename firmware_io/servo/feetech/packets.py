@@ -6,6 +6,8 @@ is left of it once these are worked around is this page, so this page stands her
 
 The frame and its sum are those of Dynamixel's protocol 1.0, so each family answers the other's pings; the status byte,
 the registers and the signs are not. A servo that gets a damaged request says nothing.
+
+Bytes that mean something else raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -41,11 +43,7 @@ def packet_length(data: bytes) -> int:
 
 
 def status(data: bytes) -> Status:
-    """Take a whole status apart.
-
-    Raises:
-        ProtocolError: its sum is wrong.
-    """
+    """Take a whole status apart."""
     if data[-1] != checksum(data[2:-1]):
         raise ProtocolError(f"damaged answer {data.hex(' ')}: check cable, ground and other senders")
     return Status(data[2], data[4], data[5:-1], len(data))

@@ -22,7 +22,7 @@ from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.ply import read_ply
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.importer import import_bag
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import JointLog, Scan
 
 DATA = os.environ.get("SCANWRIGHT_DATA")
@@ -70,7 +70,7 @@ def a_log(start_rad, stop_rad, begin_ns=START - 10**9, end_ns=START + 10**9):
 
 
 def write(path, scans, log):
-    with RecordingWriter(path, {}) as writer:
+    with recording_writer(path, {}) as writer:
         for time_ns, position_rad in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
             writer.joint(time_ns, position_rad)
         for scan in scans:
@@ -376,7 +376,7 @@ def test_the_steps_of_the_encoder_are_smoothed_unless_the_motor_stopped_or_one_a
     scans = [a_scan(k, 60, START + k * 100_000_000, range_m=np.full(60, 20, np.float32)) for k in range(40)]
     off_m = {}
     for name, note, options in (("smooth", {}, {}), ("asked", {}, {"smooth": False}), ("held", {"hold": "true"}, {})):
-        with RecordingWriter(tmp_path / "r.mcap", note) as writer:
+        with recording_writer(tmp_path / "r.mcap", note) as writer:
             for sample in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
                 writer.joint(*sample)
             for scan in scans:
@@ -397,7 +397,7 @@ def test_time_without_a_scan_is_said_but_not_the_way_between_two_stops(tmp_path,
     for stops in (True, False):
         joints_s = np.arange(-0.1, 3, 0.01) if stops else np.array([-0.1, *times_s, 3])
         log = JointLog(START + np.rint(joints_s * 1e9).astype(np.int64), 0.1 * joints_s)
-        with RecordingWriter(tmp_path / "r.mcap", {"hold": hold}) as writer:
+        with recording_writer(tmp_path / "r.mcap", {"hold": hold}) as writer:
             for sample in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
                 writer.joint(*sample)
             for k, time_s in enumerate(times_s):

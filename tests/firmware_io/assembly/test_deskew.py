@@ -16,7 +16,7 @@ from scanwright.firmware_io.assembly.deskew_kernel import _sin_cos, place_block
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.clouds.ply import read_ply
 from scanwright.firmware_io.poses.trajectory import Trajectory
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import JointLog, Scan, blocks
 
 START = 1_436_377_047_737_469_125
@@ -195,7 +195,7 @@ def simulate(seed, speed_deg_s, moving):
 def test_a_simulated_recording_is_within_a_tenth_of_a_millimetre(tmp_path, command, seed, speed_deg_s, moving):
     angles, joint, platform, range_m, true_m = simulate(seed, speed_deg_s, moving)
     (tmp_path / "angles.json").write_text(angles)
-    with RecordingWriter(tmp_path / "r.mcap", {}) as writer:
+    with recording_writer(tmp_path / "r.mcap", {}) as writer:
         for k in range(len(range_m) + 2):
             begin_ns = k * 25_000_000
             for late_ns in range(begin_ns - 25_000_000, begin_ns, 2_500_000):

@@ -8,7 +8,7 @@ from matplotlib.image import imread
 from benchmarks.firmware_io.cloud_picture import cloud_picture
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.cloud_rows import cloud_fields
-from scanwright.firmware_io.clouds.ply import PlyWriter, read_ply
+from scanwright.firmware_io.clouds.ply import ply_writer, read_ply
 
 FIELDS = cloud_fields(has_intensity=True)
 
@@ -22,7 +22,7 @@ def some_rows(count, seed=0):
 
 
 def write(path, *chunks, comments=()):
-    with PlyWriter(path, FIELDS, comments) as cloud:
+    with ply_writer(path, FIELDS, comments) as cloud:
         for chunk in chunks:
             cloud.write(chunk)
     return path
@@ -48,14 +48,14 @@ def test_another_reader_agrees_nan_rows_included(tmp_path):
 
 
 def test_a_failure_leaves_no_file(tmp_path):
-    with pytest.raises(KeyboardInterrupt), PlyWriter(tmp_path / "c.ply", FIELDS, ()) as cloud:
+    with pytest.raises(KeyboardInterrupt), ply_writer(tmp_path / "c.ply", FIELDS, ()) as cloud:
         cloud.write(some_rows(3))
         raise KeyboardInterrupt
     assert not list(tmp_path.iterdir())
 
 
 def test_rows_of_other_fields_are_a_bug(tmp_path):
-    with pytest.raises(ValueError, match="the file holds"), PlyWriter(tmp_path / "c.ply", FIELDS, ()) as cloud:
+    with pytest.raises(ValueError, match="the file holds"), ply_writer(tmp_path / "c.ply", FIELDS, ()) as cloud:
         cloud.write(np.zeros(3, cloud_fields(has_intensity=False)))
 
 

@@ -8,7 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanwright.design.errors import DeviceError
-from scanwright.firmware_io.lidar.device_clock import DeviceClock, Exchange, StampCounter, TimeSync, synchronised
+from scanwright.firmware_io.lidar.arrival_line import QUARTZ_RATE, ArrivalLine
+from scanwright.firmware_io.lidar.device_clock import (
+    TICK_NS,
+    DeviceClock,
+    Exchange,
+    StampCounter,
+    TimeSync,
+    synchronised,
+)
 from scanwright.firmware_io.lidar.tick_line import StampLine
 
 DELAY_NS = 21_000_000
@@ -67,8 +75,12 @@ def test_fine_stamps_are_taken_as_they_are_where_turns_are_uneven():
     shown_ms = 77.0 + np.cumsum(20 + rng.uniform(-1.0, 1.0, 6000))  # no line passes near such turns
     true_ns = np.int64(7e15) + np.rint((shown_ms - shown_ms[0]) / (1 + 50e-6) * 1e6).astype(np.int64)
     arrival_ns = np.maximum.accumulate(true_ns + np.rint(rng.uniform(0, 5e6, true_ns.size)).astype(np.int64))
-    clock = DeviceClock(0.02, smallest_delay_ns=0, fine=True)
-    time_ns, uncertainty_ns = host_times(clock, np.floor(shown_ms * 1e3) / 1e3, arrival_ns)
+    line = ArrivalLine(smallest_delay_ns=0, rate_max=QUARTZ_RATE, grain_ns=TICK_NS, spacing_ns=2e7)
+    moments = []
+    for sensor_ns, came_ns in zip((np.floor(shown_ms * 1e3) * 1e3).tolist(), arrival_ns.tolist(), strict=True):
+        line.add(sensor_ns, came_ns)
+        moments.append((line.host_ns(sensor_ns), line.uncertainty_ns))
+    time_ns, uncertainty_ns = np.array(moments).T
     error_ns, late = time_ns - true_ns, settled(true_ns)
     assert np.abs(error_ns[late]).max() < 200_000
     assert np.mean(np.abs(error_ns[late]) < 2 * uncertainty_ns[late]) > 0.95

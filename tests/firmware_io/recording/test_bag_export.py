@@ -9,7 +9,7 @@ import pytest
 from benchmarks.firmware_io.calibration import designed
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, write
 from scanwright.firmware_io.recording.importer import import_bag
-from scanwright.firmware_io.recording.recording import RecordingWriter, open_recording
+from scanwright.firmware_io.recording.recording import open_recording, recording_writer
 from scanwright.firmware_io.samples import Scan
 
 SETUP = Setup(beams=30, sweeps=((180.0, 90.0),))
@@ -52,7 +52,7 @@ def test_turns_of_beams_of_their_own_come_back_with_them(tmp_path, command, name
         for k in range(4)
     ]  # fmt: skip
     source = tmp_path / "turns.mcap"
-    with RecordingWriter(source, {"source": "test", "hold": "false"}) as writer:
+    with recording_writer(source, {"source": "test", "hold": "false"}) as writer:
         for scan in scans:
             writer.joint(scan.stamp_ns, scan.stamp_ns / second)
             writer.scan(scan)

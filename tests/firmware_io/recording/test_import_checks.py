@@ -1,6 +1,7 @@
 """Faults of other people's recordings are reported, harmless ones are not, and corrections correct."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 
 from benchmarks.firmware_io.recordings.import_mutations import AT_M, FAULTS, errors_mm, good, sample, write
 from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.import_checks.angles import outliers
+from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
 from scanwright.firmware_io.recording.importer import import_bag
 from scanwright.firmware_io.recording.recording import open_recording
@@ -65,6 +68,30 @@ def test_a_finding_states_what_it_costs_and_what_corrects_it(tmp_path):
     speed = np.median(np.abs(np.gradient(one.angle_rad, one.angle_ns / 1e9)))
     late_s = one.true_time_increment * (one.beams - 1)
     assert stated_mm == pytest.approx(1000 * AT_M * speed * late_s, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("drift_s", "stalled", "seen"), [(0.002, False, True), (0.0, False, False), (0.0, True, False)]
+)
+def test_a_clock_that_drifts_by_two_milliseconds_is_seen_and_a_stall_is_no_drift(drift_s, stalled, seen, seed):
+    rng = np.random.default_rng(seed)
+    true_ns = 10**18 + np.arange(80) * 25_000_000
+    late_ns = rng.integers(1_000_000, 4_000_000, 80) + np.where(stalled & (np.arange(80) // 5 == 7), 80_000_000, 0)
+    stamp_ns = true_ns + np.rint(1e9 * drift_s * np.arange(80) / 80).astype(np.int64)
+    angle_ns = 10**18 + np.arange(200) * 10_000_000
+    scans = Stamps(stamp_ns, np.maximum.accumulate(true_ns + late_ns))
+    angles = Stamps(angle_ns, angle_ns + rng.integers(300_000, 3_000_000, 200))
+    found = [one.code for one in clock_findings(scans, angles, np.zeros(80, np.int64), 3.0, same_clock=False)]
+    assert found == ["clock_offset_unknown", *["clocks_drift"] * seen]
+
+
+def test_what_a_clock_offset_that_cannot_be_seen_costs_is_noted(tmp_path):
+    _, summary = made("none", tmp_path)
+    (finding,) = [finding for finding in summary.findings if finding.code == "clock_offset_unknown"]
+    assert (finding.severity, finding.value) == ("note", 0.01)
+    assert re.search(r"less than 10 ms cannot be seen here: up to \d+ mm at 5 m", finding.message)
+    assert summary.warnings == ()
 
 
 def test_ranges_that_mean_no_return_become_none(tmp_path):

@@ -16,7 +16,7 @@ from rosbags.highlevel import AnyReader
 
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.recording import ros_messages
-from scanwright.firmware_io.recording.recording import RecordingWriter, open_recording
+from scanwright.firmware_io.recording.recording import open_recording, recording_writer
 from scanwright.firmware_io.samples import JointLog, Scan
 
 float32 = st.floats(-1e3, 1e3, width=32)
@@ -38,7 +38,7 @@ def a_scan(stamp_ns=1_436_377_047_737_469_125, range_m=(1.0, np.nan, np.inf, -np
 
 
 def write(path, scans, joints=((0, 0.0), (2**31 * 10**9 - 1, 1.0))):
-    with RecordingWriter(path, {"source": "test"}) as writer:
+    with recording_writer(path, {"source": "test"}) as writer:
         for time_ns, position_rad in joints:
             writer.joint(time_ns, position_rad)
         for scan in scans:
@@ -159,7 +159,7 @@ def test_equal_recordings_are_equal_bytes(tmp_path):
 def test_a_failure_leaves_what_was_there(tmp_path):
     path = tmp_path / "r.mcap"
     path.write_text("old")
-    with pytest.raises(KeyboardInterrupt), RecordingWriter(path, {}) as writer:
+    with pytest.raises(KeyboardInterrupt), recording_writer(path, {}) as writer:
         writer.scan(a_scan())
         raise KeyboardInterrupt
     assert path.read_text() == "old"
@@ -168,14 +168,14 @@ def test_a_failure_leaves_what_was_there(tmp_path):
 
 @pytest.mark.parametrize("time_ns", [-1, 2**31 * 10**9])
 def test_a_time_that_ros_cannot_hold_is_refused(tmp_path, time_ns):
-    with pytest.raises(RecordingError, match="does not fit a ROS time"), RecordingWriter(tmp_path / "r", {}) as writer:
+    with pytest.raises(RecordingError, match="does not fit a ROS time"), recording_writer(tmp_path / "r", {}) as writer:
         writer.joint(time_ns, 0.0)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("out", "says"), [("no/r.mcap", "does not exist"), (".", "folder")])
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path, out, says):
-    with pytest.raises(RecordingError, match=says), RecordingWriter(tmp_path / out, {}):
+    with pytest.raises(RecordingError, match=says), recording_writer(tmp_path / out, {}):
         pass
 
 
@@ -237,7 +237,7 @@ def test_a_broken_recording_is_one_line(tmp_path, broken):
 
 
 def test_a_chunk_holds_a_quarter_of_a_second_of_each_topic_whatever_its_clock(tmp_path):
-    with RecordingWriter(tmp_path / "r.mcap", {}) as writer:
+    with recording_writer(tmp_path / "r.mcap", {}) as writer:
         for k in range(200):  # 40 a second, and angles of a clock that is years behind
             writer.joint(k * 25_000_000, 0.1 * k)
             writer.scan(a_scan(10**18 + k * 25_000_000))

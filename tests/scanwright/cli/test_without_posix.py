@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import scanwright as sw
 from scanwright.firmware_io.clouds.ply import read_ply, write_points
-from scanwright.firmware_io.recording.recording import RecordingWriter
+from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import Scan
 from scanwright.cli.app import run as main
 
@@ -33,7 +33,7 @@ def run(*words):
 Path("ahead.toml").write_text(sys.argv[1], encoding="utf-8")
 angles = sw.load_task("ahead.toml").angle_set((0, 0, 0, -60))
 seen = sw.simulate(angles, noise_mm=1.0)
-with RecordingWriter(Path("seen.mcap"), {}) as recording:
+with recording_writer(Path("seen.mcap"), {}) as recording:
     messages = [(t, None, p) for t, p in zip(seen.joint_log.time_ns, seen.joint_log.position_rad)]
     messages += [(t, k, None) for k, t in enumerate(seen.time_ns[:, 0])]
     for t, k, p in sorted(messages, key=lambda message: message[0]):

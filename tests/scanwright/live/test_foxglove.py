@@ -23,7 +23,7 @@ from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError, TaskError
 from scanwright.firmware_io.assembly.deskew import deskew
-from scanwright.firmware_io.recording.recording import RecordingWriter, open_recording
+from scanwright.firmware_io.recording.recording import open_recording, recording_writer
 from scanwright.firmware_io.samples import straight
 from scanwright.firmware_io.scan.live_feed import Batch
 from scanwright.live.foxglove_channels import FoxgloveChannels
@@ -54,7 +54,7 @@ def folder(tmp_path_factory):
     (path / "scanner.urdf").write_text(URDF)
     simulated = simulate(FURNISHED, Setup(beams=60, sweeps=((90.0, 90.0),)), Truth())
     log = simulated.log
-    with RecordingWriter(path / "r.mcap", {"hold": "true"}) as writer:  # straight between angles, as the oracle goes
+    with recording_writer(path / "r.mcap", {"hold": "true"}) as writer:  # straight between angles, as the oracle goes
         for time_ns, position_rad in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True):
             writer.joint(time_ns, position_rad)
         for scan in simulated.scans:

@@ -1,4 +1,7 @@
-"""Tables of other programs: a time and numbers in each line, by the names of their columns."""
+"""Tables of other programs: a time and numbers in each line, by the names of their columns.
+
+Input that cannot be used raises RecordingError.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from scanwright.design.errors import RecordingError
+from scanwright.design.errors import RecordingError, suggest
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 
@@ -27,9 +30,6 @@ def csv_rows(path: Path, columns: Mapping[str, set[str]]) -> Iterator[Row]:
     Args:
         path: of the file. Its time is in seconds, or in nanoseconds if the column's name or unit is that.
         columns: what each wanted column may be called, in the order of the numbers.
-
-    Raises:
-        RecordingError: the file cannot be read, lacks a column, or a line is no numbers.
     """
     lines = csv.reader(lines_of(path))
     header = [word.strip().lstrip("#").strip().lower() for word in next(lines, [])]
@@ -53,9 +53,6 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
         time: as written there.
         digits: how many decimal places of the time are nanoseconds.
         values: as written there.
-
-    Raises:
-        RecordingError: something is no number, or no time of nanoseconds below 2^63.
     """
     try:
         # a float64 rounds the seconds of today to 256 ns
@@ -72,18 +69,14 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
 
 
 def lines_of(path: Path) -> list[str]:
-    """The lines of a text.
-
-    Raises:
-        RecordingError: the file cannot be read.
-    """
+    """The lines of a text."""
     return foreign(f"{path}: cannot read", read_text, path).splitlines()
 
 
 def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
     columns = [column for column, heading in enumerate(names) if heading in known]
     if len(columns) != 1:
-        raise RecordingError(
-            f"{path}: {len(columns)} columns for {name}: the first line names one of {', '.join(sorted(known))}"
-        )
+        hint = suggest(min(known), names) if len(known) == 1 else ""
+        wanted = f"the first line names {'one of ' if len(known) > 1 else ''}{', '.join(sorted(known))}{hint}"
+        raise RecordingError(f"{path}: {len(columns)} columns for {name}: {wanted}")
     return columns[0]
