@@ -12,22 +12,22 @@ from scanwright.design.catalogue.catalogue import LIDAR_GROUP, load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.installed import with_installed
-from scanwright.firmware_io.lidar.ldrobot.driver import open_ldrobot
+from scanwright.firmware_io.lidar.ldrobot.driver import LdrobotLidar
 from scanwright.firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
-from scanwright.firmware_io.lidar.lms2xx.driver import open_lms2xx
-from scanwright.firmware_io.lidar.scip.driver import open_scip
-from scanwright.firmware_io.lidar.sick.driver import open_sick
-from scanwright.firmware_io.lidar.slamtec.driver import open_slamtec
+from scanwright.firmware_io.lidar.lms2xx.driver import LmsLidar
+from scanwright.firmware_io.lidar.scip.driver import ScipLidar
+from scanwright.firmware_io.lidar.sick.driver import SickLidar
+from scanwright.firmware_io.lidar.slamtec.driver import SlamtecLidar
 
 _EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers must not import emulators
 
 # If no model is named, they are tried in this order: first the one that only listens.
 FAMILIES = (
-    LidarFamily("ldrobot", "LDROBOT", open_ldrobot, f"{_EMULATORS}.ldrobot:ldrobot_emulator"),
-    LidarFamily("scip", "Hokuyo (SCIP 2.0)", open_scip, f"{_EMULATORS}.lidar:scip_emulator", stamp_choice=True),
-    LidarFamily("slamtec", "Slamtec RPLIDAR", open_slamtec, f"{_EMULATORS}.slamtec.machine:slamtec_emulator"),
-    LidarFamily("sick", "SICK (CoLa A and B)", open_sick, f"{_EMULATORS}.sick.cola_emulator:sick_emulator"),
-    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", open_lms2xx, f"{_EMULATORS}.sick.lms_emulator:lms_emulator"),
+    LidarFamily("ldrobot", "LDROBOT", LdrobotLidar, f"{_EMULATORS}.ldrobot:ldrobot_emulator"),
+    LidarFamily("scip", "Hokuyo (SCIP 2.0)", ScipLidar, f"{_EMULATORS}.lidar:scip_emulator", stamp_choice=True),
+    LidarFamily("slamtec", "Slamtec RPLIDAR", SlamtecLidar, f"{_EMULATORS}.slamtec.machine:slamtec_emulator"),
+    LidarFamily("sick", "SICK (CoLa A and B)", SickLidar, f"{_EMULATORS}.sick.cola_emulator:sick_emulator"),
+    LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", LmsLidar, f"{_EMULATORS}.sick.lms_emulator:lms_emulator"),
 )
 
 

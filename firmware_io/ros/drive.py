@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from dataclasses import replace
 from typing import Protocol
 
@@ -17,6 +18,7 @@ from scanwright.firmware_io.servo.fitness import ServoSetupError
 _log = logging.getLogger(__name__)
 
 AGAIN_S = 3.0  # a device that was unplugged is there again after some seconds
+_MOST_TRIES, _WELL_S = 100, 60.0  # in a row: some minutes; a run of a minute begins a new row
 _POLL_S = 1.0  # for a parameter that starts the scanner
 
 
@@ -56,13 +58,15 @@ def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = 
 
     Raises:
         ServoSetupError: settings of the servo that outlast the power must change first.
+        DeviceError: devices have failed a hundred times in a row.
     """
-    watch = Both(steered, viewer)
+    watch, tries = Both(steered, viewer), 0
     while True:
         if not steered.running:
             steered.wait(_POLL_S)
             continue
         steered.begin()
+        began_s = time.monotonic()
         try:
             acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), progress, watch)
         except Interrupted:
@@ -70,6 +74,9 @@ def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = 
         except ServoSetupError:  # trying again would not help: somebody must agree
             raise
         except DeviceError as error:
+            tries = 1 if time.monotonic() - began_s > _WELL_S else tries + 1
+            if tries == _MOST_TRIES:
+                raise
             line = f"{error}; trying again in {AGAIN_S:g} s"
             steered.failed(line)
             _log.error("%s", line)

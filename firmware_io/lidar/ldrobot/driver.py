@@ -76,7 +76,7 @@ class _PacketClock:
 class LdrobotLidar(LineDriver):
     """An LDROBOT lidar, which tells no serial number and no version."""
 
-    def __init__(self, address: str, model: str | None = None) -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
         """Listen to it; without a model of the catalogue it is the first whose speed of measuring fits."""
         self.address = address
         self._bad_before = 0
@@ -203,8 +203,3 @@ def _grain_ns(lidar: Lidar) -> float:
     """What the mean of the stamps leaves unknown, standard deviation: packets begin at few phases of a millisecond."""
     phases = Fraction(round(protocol.POINTS * 1e3), round(_points_s(lidar))).denominator
     return 1e6 / math.sqrt(12) * math.hypot(1 / phases, 1 / _STAMPS)
-
-
-def open_ldrobot(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LdrobotLidar:
-    """Listen to the lidar at an address; raises as `open_lidar`."""
-    return LdrobotLidar(address, model)

@@ -37,7 +37,7 @@ _PATIENCE = 8  # telegrams: a fifth of a second
 class LmsLidar(LineDriver):
     """An LMS 2xx, which tells no serial number."""
 
-    def __init__(self, address: str, model: str | None = None) -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
         """Open it and stop its stream; `model` is a name of the catalogue, None for the one that it gives itself."""
         self.address = address
         self._bad_before = self._bad_scans = 0
@@ -221,8 +221,3 @@ class LmsLidar(LineDriver):
         if not warning and self._baud < _FAST_BAUD:
             warning = f"at {self._baud} baud most turns are lost; use an adapter with {_FAST_BAUD} baud"
         return TimedScan(scan, arrival_ns, self._line.widened(count.arrivals.uncertainty_ns), warning)
-
-
-def open_lms2xx(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> LmsLidar:
-    """Open the lidar at an address; raises as `open_lidar`."""
-    return LmsLidar(address, model)

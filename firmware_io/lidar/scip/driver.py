@@ -1,6 +1,6 @@
 """A Hokuyo lidar on a serial port, USB or Ethernet: it scans on, and says what it saw and when that arrived.
 
-with open_scip("/dev/ttyACM0") as lidar:
+with ScipLidar("/dev/ttyACM0") as lidar:
     lidar.start(intensity=True)
     scan = lidar.read().scan    # its times are the host's
 """
@@ -38,14 +38,19 @@ class ScipLidar(LineDriver):
     _clusters = True
 
     def __init__(
-        self, address: str, search: Callable[[], Iterable[str]] = lidar_ports, *, stamp_at: StampAt = "step_0"
+        self,
+        address: str,
+        _model: str | None = None,
+        stamp_at: StampAt = "step_0",
+        *,
+        search: Callable[[], Iterable[str]] = lidar_ports,
     ) -> None:
-        """Open it; raises as `open_lidar`.
+        """Open it; it says itself which model it is. Raises as `open_lidar`.
 
         Args:
             address: where it is.
-            search: the ports where it may turn up after a re-plug, besides its own address.
             stamp_at: which moment of a turn its stamps mean.
+            search: the ports where it may turn up after a re-plug, besides its own address.
         """
         self.address = address
         self.dropped = 0
@@ -198,8 +203,3 @@ class ScipLidar(LineDriver):
 
 def _is_well(status: str) -> bool:
     return status.rstrip(". ").lower() in _WELL
-
-
-def open_scip(address: str, _model: str | None = None, stamp_at: StampAt = "step_0") -> ScipLidar:
-    """Open the lidar at an address, which says itself which model it is; raises as `open_lidar`."""
-    return ScipLidar(address, stamp_at=stamp_at)

@@ -35,7 +35,7 @@ class SickLidar(LineDriver):
         dropped: telegrams that are missing between those that were read, by their counter.
     """
 
-    def __init__(self, address: str, model: str | None = None) -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
         """Open it; without a model of the catalogue it is the one that it calls itself, if the catalogue has that."""
         self.address = address
         self.dropped = 0
@@ -225,8 +225,3 @@ class SickLidar(LineDriver):
     @property
     def _name(self) -> str:
         return self._line.name
-
-
-def open_sick(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SickLidar:
-    """Open the lidar at an address; raises as `open_lidar`."""
-    return SickLidar(address, model)

@@ -31,7 +31,7 @@ _RPM = 600  # the SDK's default
 class SlamtecLidar(LineDriver):
     """An RPLIDAR."""
 
-    def __init__(self, address: str, model: str | None = None) -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
         """Open it and stop what it does; `model` is a name of the catalogue, None for whatever answers."""
         self.address = address
         self._bad_before = 0
@@ -157,8 +157,3 @@ class SlamtecLidar(LineDriver):
         if silent or self._count.broken:
             self._line.drop_waiting()
             self._resume()
-
-
-def open_slamtec(address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> SlamtecLidar:
-    """Open the lidar at an address; raises as `open_lidar`."""
-    return SlamtecLidar(address, model)

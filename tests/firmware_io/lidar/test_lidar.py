@@ -14,7 +14,7 @@ from scanwright.firmware_io.emulators import hokuyo_models, lidar_machine
 from scanwright.firmware_io.emulators.lidar import hokuyo_emulator
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.scip import dialogue, protocol
-from scanwright.firmware_io.lidar.scip.driver import ScipLidar, open_scip
+from scanwright.firmware_io.lidar.scip.driver import ScipLidar
 from scanwright.firmware_io.lidar.scip.raw_scan import to_laser_scan
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
@@ -34,7 +34,7 @@ def check(raw, count):
 @pytest.mark.parametrize("way", ["port", "address"])
 @pytest.mark.parametrize(("model", "beams"), [("UTM-30LX", 1081), ("URG-04LX", 682)])
 def test_scans_come_as_they_were_seen(way, model, beams):
-    with hokuyo_emulator(model, look) as emulator, open_scip(getattr(emulator, way)) as lidar:
+    with hokuyo_emulator(model, look) as emulator, ScipLidar(getattr(emulator, way)) as lidar:
         assert (lidar.model, lidar.firmware) == (model, emulator.machine.identity.firmware)
         assert lidar.serial_number == emulator.machine.identity.serial_number
         assert lidar.parameters == emulator.machine.identity.parameters
@@ -59,14 +59,14 @@ def test_the_sensor_may_be_in_any_state(state):
             emulator.machine.answer(b"TM0", time.monotonic_ns())
         if state == "half a request":
             Path(emulator.port).write_bytes(b"MD0000")
-        with open_scip(emulator.port) as lidar:
+        with ScipLidar(emulator.port) as lidar:
             lidar.start()
             check(lidar.read_raw(), 1081)
             assert lidar.bad_packets == 0
 
 
 def test_clusters_and_skips():
-    with hokuyo_emulator("UTM-30LX", look) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start(cluster=5, skip=1)
         first, second = lidar.read_raw(), lidar.read_raw()
         assert second.stamp_ms - first.stamp_ms in (50, 51)
@@ -93,7 +93,7 @@ def test_first_beams_get_their_true_times(model, intensity):
 
     with (
         hokuyo_emulator(model, timed, rate_error=5e-5, clock_ms=(1 << 24) - 300) as emulator,
-        open_scip(emulator.port) as lidar,
+        ScipLidar(emulator.port) as lidar,
     ):
         assert lidar.sync is not None
         lidar.start(intensity=intensity)
@@ -109,7 +109,7 @@ def test_first_beams_get_their_true_times(model, intensity):
 
 
 def test_bad_packets_are_counted_and_never_handed_out():
-    with hokuyo_emulator("UTM-30LX", look) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start(intensity=True)
         lidar.read_raw()
         emulator.garble(3)
@@ -122,7 +122,7 @@ def test_bad_packets_are_counted_and_never_handed_out():
 
 @pytest.mark.parametrize("way", ["port", "address"])
 def test_an_unplugged_sensor_is_told_and_comes_back(way):
-    with hokuyo_emulator("UTM-30LX", look) as emulator, open_scip(getattr(emulator, way)) as lidar:
+    with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(getattr(emulator, way)) as lidar:
         lidar.start(intensity=True)
         lidar.read_raw()
         emulator.unplug()
@@ -166,7 +166,7 @@ def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
 
 
 def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
-    with hokuyo_emulator("UTM-30LX", look, clock_ms=1_000_000) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("UTM-30LX", look, clock_ms=1_000_000) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start()
         lidar.read()
         before = lidar.read_raw()
@@ -185,7 +185,7 @@ def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
 
 def test_a_fault_of_the_sensor_is_told_and_the_laser_is_put_out():
     with hokuyo_emulator("UTM-30LX", look) as emulator:
-        with pytest.raises(DeviceError, match="hardware fault"), open_scip(emulator.port) as lidar:
+        with pytest.raises(DeviceError, match="hardware fault"), ScipLidar(emulator.port) as lidar:
             lidar.start()
             answer = emulator.machine.next_scan
             emulator.machine.next_scan = lambda: answer()[:0] + protocol.reply(lidar._request, "55")
@@ -194,7 +194,7 @@ def test_a_fault_of_the_sensor_is_told_and_the_laser_is_put_out():
 
 
 def test_what_a_sensor_cannot_do_is_told():
-    with hokuyo_emulator("URG-04LX", look) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         with pytest.raises(DeviceError, match="ME0044072501000: status 0E"):
             lidar.start(intensity=True)
         with pytest.raises(DeviceError, match="cluster = 0"):
@@ -203,17 +203,17 @@ def test_what_a_sensor_cannot_do_is_told():
 
 def test_absent_ports_and_ports_in_use_are_told(tmp_path):
     with pytest.raises(DeviceError, match="ttyACM7: no such port; serial ports here: "):
-        open_scip(str(tmp_path / "ttyACM7"))
+        ScipLidar(str(tmp_path / "ttyACM7"))
     with pytest.raises(DeviceError, match=r"127\.0\.0\.1:1: cannot connect: Connection refused: check address"):
-        open_scip("127.0.0.1:1")
+        ScipLidar("127.0.0.1:1")
     with pytest.raises(DeviceError, match="this is no serial port"):
-        open_scip("/dev/null")
+        ScipLidar("/dev/null")
     with (
         hokuyo_emulator("UTM-30LX", look) as emulator,
-        open_scip(emulator.port),
+        ScipLidar(emulator.port),
         pytest.raises(DeviceError, match="another program has it open"),
     ):
-        open_scip(emulator.port)
+        ScipLidar(emulator.port)
 
 
 def test_a_port_where_no_lidar_answers(monkeypatch):
@@ -221,7 +221,7 @@ def test_a_port_where_no_lidar_answers(monkeypatch):
     master, slave = os.openpty()
     try:
         with pytest.raises(DeviceTimeoutError, match="no SCIP sensor answers"):
-            open_scip(os.ttyname(slave))
+            ScipLidar(os.ttyname(slave))
     finally:
         os.close(master)
         os.close(slave)
@@ -249,7 +249,7 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     monkeypatch.setattr(SlowPort, "fastest", fastest)
     monkeypatch.setattr(dialogue, "_ANSWER_S", 0.4)
-    with hokuyo_emulator("URG-04LX", look) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         assert lidar._dialogue.line.stream.listens == lidar._dialogue.line.stream.baud == 115_200
         lidar.start()
         assert (
@@ -271,7 +271,7 @@ class BadLine(byte_stream.SerialStream):
 def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
     monkeypatch.setattr(dialogue, "_ANSWER_S", 0.2)
-    with hokuyo_emulator("URG-04LX", look) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start()
         assert lidar._dialogue.line.stream.baud == 115_200
         check(lidar.read_raw(), 682)
@@ -287,7 +287,7 @@ def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypa
         return answer(self, request, now_ns)
 
     monkeypatch.setattr(lidar_machine.LidarMachine, "answer", listening)
-    with hokuyo_emulator("UTM-30LX", look) as emulator, open_scip(emulator.port) as lidar:
+    with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         assert lidar.sync is None
         lidar.start()
         check(lidar.read_raw(), 1081)
@@ -339,6 +339,6 @@ def test_endless_garbage_ends_in_a_timeout(monkeypatch):
     monkeypatch.setattr(sensor_line, "open_stream", lambda _: port)
     monkeypatch.setattr(dialogue, "_ANSWER_S", 0.02)
     with pytest.raises(DeviceTimeoutError):
-        open_scip("somewhere")
+        ScipLidar("somewhere")
     assert port.closed
     assert set(port.written.split()) == {b"QT"}

@@ -12,7 +12,7 @@ from scanwright.firmware_io.emulators.sick.cola_emulator import SickMachine, sic
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.sick import driver
 from scanwright.firmware_io.lidar.sick.dialogue import RefusedError
-from scanwright.firmware_io.lidar.sick.driver import open_sick
+from scanwright.firmware_io.lidar.sick.driver import SickLidar
 
 MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151")
 
@@ -61,7 +61,7 @@ def test_scans_come_as_they_were_seen(model, dialects):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_sensor_says_which_model_it_is(model):
-    with emulator(model) as sensor, open_sick(sensor.port) as lidar:
+    with emulator(model) as sensor, SickLidar(sensor.port) as lidar:
         assert (lidar.model, lidar.scan_rate_hz) == (model, load_catalogue().get(model, Lidar).scan_rate_hz)
 
 
@@ -76,7 +76,7 @@ def test_first_beams_get_their_true_times(stamps_end):
         return range_m, level
 
     state = {"rate_error": 5e-5, "clock_us": (1 << 32) - 300_000, "stamps_end": stamps_end}
-    with emulator(ranging=timed, **state) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(ranging=timed, **state) as sensor, SickLidar(sensor.address) as lidar:
         lidar.start()
         read = [lidar.read() for _ in range(40)]  # its clock wraps meanwhile
     meant_ns = [true_ns[round(100 * (float(each.scan.range_m[0]) - 1))] for each in read]
@@ -87,7 +87,7 @@ def test_first_beams_get_their_true_times(stamps_end):
 
 
 def test_damage_is_counted_and_never_handed_out():
-    with emulator(dialects=(True,)) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(dialects=(True,)) as sensor, SickLidar(sensor.address) as lidar:
         lidar.start()
         lidar.read()
         sensor.garble(3)
@@ -99,7 +99,7 @@ def test_damage_is_counted_and_never_handed_out():
 
 
 def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
-    with emulator(status=2) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(status=2) as sensor, SickLidar(sensor.address) as lidar:
         lidar.start()
         timed = lidar.read()
         check(timed.scan, "LMS111")
@@ -116,7 +116,7 @@ def test_a_dirty_window_is_told_and_too_dirty_a_one_stops():
 @pytest.mark.parametrize("dialects", [(True,), (False,)], ids=["B", "A"])
 def test_it_tells_its_hours_where_it_counts_them(dialects):
     """The numbers 4F4 and A7 are those of a sensor in the notes of a driver: 126.8 hours, 167 times."""
-    with emulator(dialects=dialects, run_tenth_h=0x4F4, starts=0xA7) as sensor, open_sick(sensor.address) as lidar:
+    with emulator(dialects=dialects, run_tenth_h=0x4F4, starts=0xA7) as sensor, SickLidar(sensor.address) as lidar:
         filters = ("echo filter: last echo", "mean filter: off")
         assert lidar.condition() == ("it has run for 126.8 h", "it was switched on 167 times", *filters)
         sensor.machine.refusals = [3, 1, 3, 3]  # it knows no such variable, or this level may not read it
@@ -126,7 +126,7 @@ def test_it_tells_its_hours_where_it_counts_them(dialects):
 
 
 def test_an_unplugged_sensor_is_told_and_comes_back():
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         lidar.start(intensity=True)
         lidar.read()
         sensor.unplug()
@@ -144,7 +144,7 @@ def test_an_unplugged_sensor_is_told_and_comes_back():
 
 
 def test_silence_is_a_timeout_and_a_restarted_sensor_scans_on():
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         lidar.start()
         lidar.read()
         sensor.power_cycle()
@@ -156,7 +156,7 @@ def test_silence_is_a_timeout_and_a_restarted_sensor_scans_on():
 
 
 def test_a_busy_sensor_is_waited_for(monkeypatch):
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         sensor.machine.busy_until_ns = time.monotonic_ns() + 200_000_000
         lidar.start()
         assert time.monotonic_ns() >= sensor.machine.busy_until_ns
@@ -168,7 +168,7 @@ def test_a_busy_sensor_is_waited_for(monkeypatch):
 
 
 def test_refusals_have_the_sensors_words(monkeypatch):
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         with pytest.raises(DeviceError, match="cluster"):
             lidar.start(cluster=2)
         with pytest.raises(RefusedError, match="LMCstartmeas: error 1: access denied: login required"):
@@ -180,7 +180,7 @@ def test_refusals_have_the_sensors_words(monkeypatch):
 
 
 def test_a_busy_method_is_asked_again_and_other_codes_are_told_by_their_words():
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         sensor.machine.refusals[:] = [0x0D, 0x0D]
         lidar.start()
         check(lidar.read().scan, "LMS111")
@@ -195,13 +195,13 @@ def test_a_sensor_of_unknown_name_wants_its_model():
     with emulator() as sensor:
         sensor.machine.lidar = sensor.machine.lidar.model_copy(update={"name": "LMS1xx"})
         with pytest.raises(DeviceError, match=r"calls itself 'LMS1xx'.*name its model; known: LMS111"):
-            open_sick(sensor.address)
-        with open_sick(sensor.address, "LMS111") as lidar:
+            SickLidar(sensor.address)
+        with SickLidar(sensor.address, "LMS111") as lidar:
             assert lidar.model == "LMS111"
 
 
 def test_a_mean_filter_is_reported_and_a_scan_warns_of_it():
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         sensor.machine.filters = {"LFPmeanfilter": [1, 3, 0], "FREchoFilter": [0]}
         assert lidar.condition()[2:] == ("echo filter: first echo", "mean filter: 3 scans")
         lidar.start()
@@ -209,7 +209,7 @@ def test_a_mean_filter_is_reported_and_a_scan_warns_of_it():
 
 
 def test_skipped_turns_are_not_missing():
-    with emulator() as sensor, open_sick(sensor.address) as lidar:
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
         lidar.start(skip=1)
         scans = [lidar.read().scan for _ in range(16)]  # a busy computer moves single ones
         assert scans[0].scan_time_s == pytest.approx(0.02)
@@ -219,7 +219,7 @@ def test_skipped_turns_are_not_missing():
 
 def test_what_speaks_no_cola_is_told():
     with emulator(dialects=()) as sensor, pytest.raises(DeviceTimeoutError, match="no SICK sensor answers"):
-        open_sick(sensor.address)
+        SickLidar(sensor.address)
 
 
 # What sick_scan_xd 3.9 sends to a TiM5xx and an LMS1xx beyond our driver, in the layout of telegram listing 8014631.

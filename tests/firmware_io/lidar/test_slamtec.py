@@ -258,7 +258,7 @@ def test_another_model_is_refused_and_none_named_is_found():
     with slamtec_emulator(lidar("RPLIDAR A1"), ranging) as emulator:
         with pytest.raises(DeviceError, match="this is a RPLIDAR A1, not a RPLIDAR C1"):
             open_lidar(emulator.port, "RPLIDAR C1")
-        with driver.open_slamtec(emulator.port) as ours:
+        with driver.SlamtecLidar(emulator.port) as ours:
             assert ours.model == "RPLIDAR A1"
 
 
@@ -319,6 +319,6 @@ def test_a_server_that_says_nothing_is_not_asked_at_every_speed():
     """Its line has a speed of its own: `doctor` without a model would wait for each of the series in turn."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         with pytest.raises(DeviceError, match="no RPLIDAR answers"):
-            driver.open_slamtec(f"127.0.0.1:{server.getsockname()[1]}")
+            driver.SlamtecLidar(f"127.0.0.1:{server.getsockname()[1]}")
         with server.accept()[0] as heard:
             assert heard.recv(10_000).count(protocol.request(protocol.STOP)) == 3

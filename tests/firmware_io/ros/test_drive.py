@@ -1,5 +1,7 @@
 """What the node is fed with, without ROS 2: recordings at their pace, devices that come and go, rows of points."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -90,6 +92,21 @@ class Viewer:
 
     def message(self, line):
         self.lines.append(line)
+
+
+def test_devices_that_fail_again_and_again_end_the_node(monkeypatch):
+    steered, now_s = Steered(), [0.0]
+
+    def acquire(*_):
+        now_s[0] += 100.0 if len(steered.story) < 20 else 1.0
+        raise DeviceError("the lidar is gone")
+
+    monkeypatch.setattr(driving, "acquire", acquire)
+    monkeypatch.setattr(driving, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
+    plan = ScanPlan(**dict.fromkeys(ScanPlan.__dataclass_fields__))
+    with pytest.raises(DeviceError, match="the lidar is gone"):
+        driving.drive(plan, steered, lambda _: None)
+    assert 100 <= steered.story.count("begin") < 110
 
 
 def test_devices_that_fail_are_tried_again_and_parameters_are_obeyed(monkeypatch, caplog):
