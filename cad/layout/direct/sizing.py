@@ -51,7 +51,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
-    ring, count = scanner.slip_ring, len(scanner.lidar.cable_y_mm)
+    ring, count = scanner.slip_ring, max(1, len(scanner.lidar.cable_y_mm))
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     alone = DirectStack(
