@@ -25,7 +25,7 @@ from scanwright.cad.solids import building
 SLIDES = 0.02  # in the inner ring: the lower end of g6
 BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills
 UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
-BESIDE_LEADS = 0.4  # on either side of them in their channel
+LEAST_HALF_WIDTH, BESIDE_LEADS = 5.0, 0.4  # of the channel, and on either side of the leads in it
 COMPOUND = "retaining compound for metal, medium strength"
 RETAINING = "groove of the shaft, under the bearing's sleeve"
 
@@ -78,7 +78,7 @@ def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
         body: cq.Shape = solids.upright((stack.bearing.bore_mm - SLIDES) / 2, low, high)
         cuts: list[cq.Shape] = [solids.upright(bore, low - 1.0, high + 1.0)]
         if stack.ring_length > 0:
-            half = stack.leads_half_width + BESIDE_LEADS
+            half = max(LEAST_HALF_WIDTH, stack.leads_half_width + BESIDE_LEADS)
             corner = (stack.shaft_diameter / 2 + JOURNAL_WALL, -half, low - 1.0)
             channel = solids.box(corner, (stack.bearing.bore_mm, half, high + 1.0))
             turn = math.degrees(sum(p.cross_azimuths) / 2)

@@ -15,6 +15,7 @@ from scanwright.cad.layout.hub import JOURNAL_WALL
 from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
+LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size
 OVER_LEADS = 1.5  # height of the channel over its leads
 IN_HUB = 0.5  # where that height ends, before the slots of a tongue
 EAR_CORNER = 0.3  # of its half width
@@ -82,7 +83,8 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     if stack.bearing is None or stack.ring_length == 0:
         return []
     inner = (stack.shaft_diameter + p.fit) / 2 + JOURNAL_WALL
-    half, roof = stack.leads_half_width, stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS
+    half = max(LEAST_HALF_WIDTH, stack.leads_half_width)
+    roof = max(stack.shoulder + LEAST_ABOVE, stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS)
     low, out = (inner, -half, stack.shoulder - 1.0), stack.hub_radius + 20.0
     ends = [(out, roof)]
     if p.hub_tie is not None:  # lower where the leads are tied

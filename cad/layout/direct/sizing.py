@@ -51,7 +51,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
-    ring, count = scanner.slip_ring, len(scanner.lidar.cable_y_mm)
+    ring, count = scanner.slip_ring, max(1, len(scanner.lidar.cable_y_mm))
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     alone = DirectStack(
@@ -74,7 +74,10 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         bearing=None,
         sub_plate=None,
     )
-    bearing = bearing_for(scanner, alone) if _needs_bearing(scanner, alone) else None
+    needs_bearing = _needs_bearing(scanner, alone)
+    if needs_bearing and ring is not None:
+        ears_of(scanner, alone)  # raises what no other ring mends before what one mends
+    bearing = bearing_for(scanner, alone) if needs_bearing else None
     return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
 
 

@@ -10,9 +10,11 @@ from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
 from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
 from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.cables.room import room_of
+from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
 
 BORE, CAPSULE = "SNU11-P0210", "SRC022A-6"
@@ -89,6 +91,29 @@ def test_a_lead_turns_above_all_that_stands_still(setting):
         outside = points[np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + lead.diameter]
         assert outside[:, 2].min() > room.floor + lead.diameter / 2
         assert room.free(outside[3:-6], lead.diameter / 2, 0.4).all()
+
+
+@pytest.mark.parametrize("setting", ["upright", "bearing"])
+def test_the_leads_of_a_stator_leave_its_end_beside_flange_and_case_and_their_plug_passes_the_base(setting):
+    layout = layout_for(setting)
+    ring, case, stack = layout.scanner.slip_ring, layout.scanner.servo.case_max_mm, layout.stack
+    (leads,) = (cable for cable in layout.cables if cable.name == "stator_leads")
+    corners, half = np.array(leads.path.corners), ring.lead_diameter_mm / 2
+    assert leads.diameter == ring.lead_diameter_mm and leads.path.least_radius() >= ring.lead_bend_radius_mm
+    assert corners[0, 2] == stack.ring_bottom == pytest.approx(stack.leads_low - 6 - 38)
+    np.testing.assert_allclose(corners[1, :2], corners[0, :2])
+    assert max(stack.flange_radius, case[1]) < corners[0, 1] - half < corners[0, 1] + half < ring.outer_diameter_mm / 2
+    if setting == "bearing":
+        cage = layout.drive.of(BearingCage)
+        half_width, end = cage.lead_hole
+        assert 2 * half_width > ring.plug_mm[0] and end - stack.flange_radius > ring.plug_mm[1]
+        assert end < stack.cage_inner and corners[0, 1] + half < end
+        assert corners[1, 2] < cage.low, "straight through the base"
+
+
+def test_a_ring_whose_leads_pass_no_bearing_is_refused_with_what_to_do():
+    with pytest.raises(BuildError, match=r"lead_diameter_mm = 9\.5 .*take a ring with fewer circuits"):
+        layout_for("bearing", lead_diameter_mm=9.5)
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
