@@ -29,6 +29,10 @@ class Provenance(Record):
     verified: bool
 
 
+LONGEST = 60
+"""Characters of a value that a short list prints."""
+
+
 class Product(Record):
     """Base of the catalogue records: name, maker, the provenance of each value, and the values known to be wrong."""
 
@@ -62,16 +66,22 @@ class Product(Record):
         values = {field: to_jsonable_python(getattr(self, field)) for field in type(self).model_fields}
         return {**values, "provenance": sources}
 
-    def lines(self) -> list[str]:
-        """Every value with its source, in words."""
-        values = []
-        for field, origin in self._provenance.items():
-            value = json.dumps(to_jsonable_python(getattr(self, field)))
-            values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
-        wrong = [f"  ! {error.words(self)}   [{error.source}]" for error in self.known_wrong]
+    def lines(self, in_full: bool = True) -> list[str]:
+        """Return every value with its source; unless `in_full`, only the unverified and the wrong values, without it."""
+        values = {field: json.dumps(to_jsonable_python(getattr(self, field))) for field in self._provenance}
+        if in_full:
+            lines = [
+                f"  {' ' if origin.verified else '?'} {field} = {values[field]}   [{origin.source}]"
+                for field, origin in self._provenance.items()
+            ]
+        else:
+            short = {field: value if len(value) <= LONGEST else "..." for field, value in values.items()}
+            unverified = "; ".join(f"{field} = {short[field]}" for field in self.unverified())
+            lines = [f"  ? {unverified}"] if unverified else []
+        wrong = [f"  ! {error.words(self)}{f'   [{error.source}]' if in_full else ''}" for error in self.known_wrong]
         mark = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
         known = ["  ! does not agree with the real device"] if wrong else []
-        return [f"{self.name} ({self.maker})", *values, *wrong, mark, *known]
+        return [f"{self.name} ({self.maker})", *lines, *wrong, mark, *known]
 
 
 Rating = Literal["usb2", "ethernet100", "none"]

@@ -104,7 +104,7 @@ def _prompted(
 
     def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:
         of_kind = chosen(products, kind=kind)
-        show(table_lines(of_kind)[:-2])
+        show(table_lines(of_kind, in_full=False)[:-2])
         print(f"{MARK}: unverified number; -: unknown")
         return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
 
