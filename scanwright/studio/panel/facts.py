@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.metres import PlaneFigures, on_planes, planes_of
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
 from scanwright.design.objective.problem import NODES, Problem, problem_of
 from scanwright.design.objective.score import Score, score, score_on
 from scanwright.design.search.limits import blind_cones_deg, line_gaps_deg
-from scanwright.design.search.mounts.reference import reference_mounts
+from scanwright.design.search.mounts.reference import TunedMount, reference_mounts
 from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.task.task import Limits, LoadedTask
 from scanwright.studio.state import Setting
@@ -93,11 +95,11 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Judge:
-    """A task ready to judge settings: its numbers, and J of the reference mounts."""
+    """A task ready to judge settings: its numbers, and the reference mounts, the best one first."""
 
     loaded: LoadedTask
     problem: Problem
-    mounts: dict[str, float]
+    mounts: tuple[TunedMount, ...]
 
     @classmethod
     def for_task(cls, loaded: LoadedTask) -> Judge:
@@ -108,7 +110,11 @@ class Judge:
         """
         problem = problem_of(loaded)
         mounts = sorted(reference_mounts(problem, loaded.task), key=lambda mount: mount.score.J)
-        return cls(loaded, problem, {mount.name: mount.score.J for mount in mounts})
+        return cls(loaded, problem, tuple(mounts))
+
+    def references(self) -> dict[str, Setting]:
+        """Return the reference mounts, the best one first."""
+        return {mount.name: Setting.within_bounds(np.degrees(mount.angles_rad)) for mount in self.mounts}
 
     def quick(self, setting: Setting) -> Facts:
         """While the hand moves."""
@@ -138,7 +144,7 @@ class Judge:
             blind_weight=result.blind_weight,
             period_s=self._period_s(setting, DRAG_PERIOD_NODES) if within_reach else math.nan,
             density=self._least,
-            mounts=self.mounts,
+            mounts={mount.name: mount.score.J for mount in self.mounts},
             planes=tuple((region.words(), None) for region in planes_of(self.loaded)),
             least=result.least,
             limits=self.loaded.task.limits,

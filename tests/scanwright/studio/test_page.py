@@ -266,6 +266,17 @@ def test_a_link_opens_its_setting_and_what_is_wrong_is_said_at_its_field(studio,
     field.fill("0, 45, 0, -60")
     field.blur()
     until(lambda: studio.setting == Setting((0, 45, 0, -60)) and not studio.controls.typed_error.content)
+
+    # pads: arrow keys, and a drag that is one step
+    page.get_by_label("Where the axis points").press("ArrowRight")
+    until(lambda: studio.setting == Setting((1, 45, 0, -60)))
+    page.wait_for_function("location.hash === '#angles=1,45,0,-60'")
+    box = page.locator(".sw-pad").last.bounding_box()
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 0.25 * box["height"])
+    page.mouse.up()
+    until(lambda: np.allclose(studio.setting.angles_deg, (1, 45, 45, 45), atol=1))
     harmless(browser)
 
 
@@ -279,7 +290,7 @@ def test_on_a_phone_the_facts_can_be_read(studio, browser):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("size", [(1440, 900), (720, 450), (390, 844)])
 def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
     studio, gate = studio
     page = shown(browser, gate.address, *size, color_scheme=scheme)
