@@ -3,6 +3,8 @@
 // sw-setting holds the angles, and the id of the field that takes them.
 (() => {
   let wanted = new URLSearchParams(location.hash.slice(1)).get("angles");
+  let shown = null; // angles of the page before the link
+  let tries = 0;
   let held = null; // the pad on which a pointer is down,
   let box = null; // and where it was then: lines above it may come and go
   let angles = [];
@@ -12,6 +14,14 @@
     waits = false;
     const uuid = document.querySelector(".sw-setting").dataset.field;
     window.__viserMutable.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value: angles.join(",") } });
+  };
+  // viser ignores what a page sends before the server knows its camera
+  const ask = () => {
+    if (!wanted) return;
+    angles = wanted.split(",");
+    send();
+    if (++tries < 20) setTimeout(ask, 250);
+    else wanted = null;
   };
   const place = (pad) => {
     const [x, y] = angles.slice(pad.dataset.first);
@@ -35,10 +45,12 @@
     const setting = document.querySelector(".sw-setting");
     if (!setting) return;
     if (wanted) {
-      angles = wanted.split(",");
+      shown ??= setting.dataset.angles;
+      if (setting.dataset.angles === shown) {
+        if (!tries) ask();
+        return;
+      }
       wanted = null;
-      send();
-      return;
     }
     if (held || waits) return; // what arrives is of an earlier place
     angles = setting.dataset.angles.split(",").map(Number);
