@@ -17,14 +17,13 @@ from scanwright.cad.checks.checks_json import checks_text
 from scanwright.design.findings import Finding
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import NODES, problem_of
-from scanwright.design.objective.score import quick_J, score
+from scanwright.design.objective.score import quick_J
 from scanwright.design.self_occlusion import AXIS_STEPS, load_self_occlusion
-from scanwright.design.task.task import Limits, load_task
+from scanwright.design.task.task import load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_manifest
 from scanwright.report import page as report_page
 from scanwright.report.answer import answer
 from scanwright.report.assembly_steps import steps_html
-from scanwright.report.landscapes import other_mounts
 from scanwright.report.page import report_html
 
 PAGE = Path(report_page.__file__).parent
@@ -203,37 +202,6 @@ def test_one_of_a_thing_is_not_told_as_many(tmp_path):
     (tmp_path / "left_out.json").write_text(json.dumps({"schema": "scanwright/left_out/1", "left_out": entries}))
     left_out = Page(report_html(tmp_path)).text["more"]
     assert "1 part" in left_out and "1 parts" not in left_out and "2 parts" in left_out
-
-
-def test_the_table_of_mounts_names_the_lowest(page):
-    more = " ".join(page.text["more"].split())
-    assert re.search(r"\dmet\b", more).start() < more.index("blind to"), "those that meet the task come first"
-    assert "25 mounts of the lidar on the axis, 325 mounts of the axis on the robot" in more
-
-
-def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
-    """The setting of the shipped task that J alone would take, beside the best one without a hole."""
-    loaded = load_task(Path("ground_ahead"))
-    problem, built = problem_of(loaded), np.radians([0.0, -55.61, -78.72, 79.75])
-    planes = np.array([[-80.0, 75.0, -6.1285, 0.0, -55.0], [-80.0, 80.0, -6.128, 0.0, -55.0], [0.0, 0.0, np.inf, 0, 0]])
-    found = other_mounts(problem, loaded.task, built, planes)
-    ((kept,), (broken,)) = found.within, found.broken
-    assert (kept.angles_deg, kept.breaks) == ((0, -55, -80, 80), "")
-    assert (broken.angles_deg, broken.breaks) == ((0, -55, -80, 75), "blind to 0.019% of the weight")
-    assert broken.J < kept.J == score(problem, np.radians(kept.angles_deg)).J
-    assert (
-        "(0, -55, -80, 75) with J = -6.1284 would be best, which is blind ahead and 35 deg down: 0.58 deg"
-        in found.alone
-    )
-    assert found.alone.endswith("Keeping the requirements of the task costs 0.086% of the beams per ball.")
-    allowed = loaded.task.model_copy(update={"angles": loaded.task.angles.model_copy(update={"holes": "allow"})})
-    assert (
-        len(other_mounts(problem, allowed, built, planes).within) == 2
-        and not other_mounts(problem, allowed, built, planes).alone
-    )
-    limited = allowed.model_copy(update={"limits": Limits(min_density=50)})
-    (other,) = other_mounts(problem, limited, built, planes).broken
-    assert (other.angles_deg, other.breaks) == (broken.angles_deg, "breaks the limits")
 
 
 def test_the_manifest_in_the_page_is_that_of_the_folder(folder, page, text):
