@@ -39,7 +39,7 @@ from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
-from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.colours import bands_to
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.first_screen import cards
@@ -141,8 +141,6 @@ def _report(drawn: RandomTask, _: Path) -> None:
     json.dumps(room_scene(room_about(loaded.task), np.zeros(3), np.array(sphere.middle), sphere.below))
     cards(angles, found, on_planes(loaded, problem, setting, shadow), None)
     found.as_built.lines()
-    if shadow is not None:
-        hidden_by(shadow)
 
 
 def _studio(drawn: RandomTask, _: Path) -> None:

@@ -25,7 +25,7 @@ from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
 from scanwright.design.task.task import LoadedTask, load_task
-from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.answer import OFF_DEG, answer, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import packed, read, read_json, read_picture, read_text
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
@@ -75,7 +75,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "drawings": {path.stem: packed(read_picture(path)) for path in sorted((folder / "drawings").glob("*.svg"))},
         "sheets": [name for name in files if name.startswith("drawings/") and name.endswith(".pdf")],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
-        "manifest": read(folder / "manifest.json", _manifest),
+        "manifest": read(folder / "manifest.json", read_json),
         "task_text": read(folder / "task.toml", read_text),
         **on_task(),
         **on_bodies(),
@@ -164,7 +164,6 @@ def _on_bodies(folder: Path) -> dict[str, Any]:
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
     bodies = None if assembly is None else placed_bodies(assembly)
     return {
-        "hidden": None if own_body is None else hidden_by(own_body[0]),
         "scanner": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
         "still": None if bodies is None else still(bodies),
         "places": {} if bodies is None else _places(bodies, findings or (), {} if parts is None else parts.bought),
@@ -180,12 +179,6 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-
-
-def _manifest(path: Path) -> dict[str, Any]:
-    """Return the manifest without the report's own digest, so that a report made again is the same."""
-    manifest: dict[str, Any] = read_json(path)
-    return manifest | {"files": {name: facts for name, facts in manifest["files"].items() if name != REPORT}}
 
 
 def _not_drawn(folder: Path) -> str:

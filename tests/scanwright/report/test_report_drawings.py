@@ -9,7 +9,6 @@ from report_folder import ANGLES, Page, cell, drawn, own_body, picture, sphere
 
 from scanwright.design.motion import Sweep
 from scanwright.design.task.task import load_task
-from scanwright.report.answer import hidden_by
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
 from scanwright.report.colours import bands_to, ramp
 from scanwright.report.density_sphere import SHADES
@@ -54,7 +53,7 @@ def test_the_fan_knows_what_is_hidden_at_every_axis_step(folder):
         # as the page reads it
         hidden[int(beam)] = [row[step >> 3] >> (7 - (step & 7)) & 1 for step in range(fan["steps"])]
     np.testing.assert_array_equal(hidden, shadow.stator | shadow.beams[:, None])
-    assert hidden.mean() == pytest.approx(hidden_by(shadow).share)
+    assert hidden.mean() == pytest.approx(shadow.share())
 
 
 def test_a_sweep_stays_within_its_limits(folder):
