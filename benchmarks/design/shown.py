@@ -4,7 +4,7 @@
 
 Random tasks of `random_tasks` at random settings, two of five at whole 15, 45 or 90 deg, go through what stands behind
 `evaluate`, `compare`, the report and the studio. A message that refuses a task is right, anything else that is raised
-is a fault. One of 25 is compared in full, which searches mounts, and its pictures are drawn: that takes seconds.
+is a fault. One of 25 is compared in full, which searches mounts: that takes seconds.
 A seed of 0 is a new one every time.
 """
 
@@ -17,14 +17,12 @@ import traceback
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from benchmarks.design.random_tasks import RandomTask, random_task
-from scanwright.design.angles import standard_settings
 from scanwright.design.catalogue.products import Multibeam
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.comparison import compare, ready_made
@@ -41,11 +39,10 @@ from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
-from scanwright.report.answer import answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.colours import bands_to
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.first_screen import cards
-from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
 from scanwright.report.room import room_about, room_scene
 from scanwright.serving.density_room import density_colours
 from scanwright.studio.panel.facts import Judge
@@ -71,12 +68,12 @@ def shown(drawn: RandomTask, folder: Path, *, full: bool = False) -> tuple[list[
     Args:
         drawn: the task and its setting; beams that are missing stand for those that parts block.
         folder: where the files of the task are.
-        full: whether other mounts and scanners are searched as `compare` does it, and the report's pictures are drawn.
+        full: whether other mounts and scanners are searched as `compare` does it.
     """
     commands: dict[str, Callable[[RandomTask, Path], None]] = {
         "evaluate": _evaluate,
         "compare": _compare_fully if full else _compare,
-        "report": partial(_report, picture=full),
+        "report": _report,
         "studio": _studio,
     }
     failures, refused = [], []
@@ -134,25 +131,16 @@ def _compare_fully(drawn: RandomTask, _: Path) -> None:
     "\n".join([*table(rows), *notes(drawn.loaded, rows)])
 
 
-def _report(drawn: RandomTask, _: Path, picture: bool) -> None:
+def _report(drawn: RandomTask, _: Path) -> None:
     loaded, shadow = drawn.loaded, _shadow(drawn)
     angles = loaded.angle_set(drawn.angles_deg)
     problem, setting = problem_as_built(loaded, angles), mounting_rad(angles)
     found = answer(loaded, angles, shadow)
-    mounts = np.degrees([setting, *standard_settings().values()])
-    J = np.array([score(problem, np.radians(mount)).J for mount in mounts])
-    planes, axes = np.column_stack([mounts[:, 2:], J, mounts[:, :2]]), np.column_stack([mounts[:, :2], J])
     tuned = [mount.gain.mount for mount in found.as_built.mounts]
-    sphere = density_sphere(problem, angles, tuned, axes, loaded.task.angles.step_deg, shadow)
+    sphere = density_sphere(problem, angles, tuned, shadow)
     json.dumps(room_scene(room_about(loaded.task), np.zeros(3), np.array(sphere.middle), sphere.below))
-    if picture:
-        landscape(planes[:, :3], PLANE, angles, "J")
-        landscape(axes, AXIS, angles, "J")
     cards(angles, found, on_planes(loaded, problem, setting, shadow), None)
-    other_mounts(problem, loaded.task, setting, planes)
     found.as_built.lines()
-    if shadow is not None:
-        hidden_by(shadow)
 
 
 def _studio(drawn: RandomTask, _: Path) -> None:

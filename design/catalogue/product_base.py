@@ -28,6 +28,10 @@ class Provenance(Record):
     verified: bool
 
 
+LONGEST = 60
+"""Characters of a value that a short list prints."""
+
+
 class Product(Record):
     """Base of the catalogue records: name, maker, and the provenance of each value."""
 
@@ -55,14 +59,20 @@ class Product(Record):
         values = {field: to_jsonable_python(getattr(self, field)) for field in type(self).model_fields}
         return {**values, "provenance": sources}
 
-    def lines(self) -> list[str]:
-        """Every value with its source, in words."""
-        values = []
-        for field, origin in self._provenance.items():
-            value = json.dumps(to_jsonable_python(getattr(self, field)))
-            values.append(f"  {' ' if origin.verified else '?'} {field} = {value}   [{origin.source}]")
+    def lines(self, in_full: bool = True) -> list[str]:
+        """Return every value with its source; unless `in_full`, only the unverified values, without it."""
+        values = {field: json.dumps(to_jsonable_python(getattr(self, field))) for field in self._provenance}
+        if in_full:
+            lines = [
+                f"  {' ' if origin.verified else '?'} {field} = {values[field]}   [{origin.source}]"
+                for field, origin in self._provenance.items()
+            ]
+        else:
+            short = {field: value if len(value) <= LONGEST else "..." for field, value in values.items()}
+            unverified = "; ".join(f"{field} = {short[field]}" for field in self.unverified())
+            lines = [f"  ? {unverified}"] if unverified else []
         mark = "  ? not verified: measure yours, and override the product in a catalogue file of your own"
-        return [f"{self.name} ({self.maker})", *values, mark]
+        return [f"{self.name} ({self.maker})", *lines, mark]
 
 
 Rating = Literal["usb2", "ethernet100", "none"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
 from scanwright.design.catalogue.catalogue import KINDS
@@ -14,7 +15,9 @@ from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 
 MARK = "?"
-FOOTNOTE = f"{MARK} not verified: measure yours. `scanwright catalogue NAME` shows the source of every value."
+FOOTNOTE = f"{MARK}: unverified, measure yours; `scanwright catalogue NAME -v` prints all values and their sources"
+MOST_ROWS = 20  # of a short table: more products without a known price are one line of names
+MOST_COLUMNS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,22 +28,24 @@ class Figure:
         title: with its unit.
         fields: of the record, that it comes from: a doubt about one of them is a doubt about it.
         value: of a product; None if the product has none.
+        brief: whether a short table has it.
     """
 
     title: str
     fields: tuple[str, ...]
     value: Callable[[Any], float | str | None]
+    brief: bool = True
 
 
-def _of(title: str, field: str, scale: float = 1.0) -> Figure:
+def _of(title: str, field: str, scale: float = 1.0, *, brief: bool = True) -> Figure:
     def value(product: Product) -> float | str | None:
         stated: float | str | None = getattr(product, field)
         return stated * scale if isinstance(stated, float | int) else stated
 
-    return Figure(title, (field,), value)
+    return Figure(title, (field,), value, brief)
 
 
-MASS, PRICE = _of("mass g", "mass_g"), _of("price USD", "price_usd")
+MASS, PRICE = _of("mass g", "mass_g"), _of("USD", "price_usd")
 _STEPS = ("steps_per_turn", "first_step", "last_step")
 FIGURES: dict[type[Product], tuple[Figure, ...]] = {
     Lidar: (
@@ -66,8 +71,8 @@ FIGURES: dict[type[Product], tuple[Figure, ...]] = {
     SlipRing: (
         _of("bore mm", "bore_mm"),
         _of("outer mm", "outer_diameter_mm"),
-        _of("length mm", "length_mm"),
-        _of("speed rpm", "max_rpm"),
+        _of("length mm", "length_mm", brief=False),
+        _of("speed rpm", "max_rpm", brief=False),
         MASS,
         PRICE,
         _of("circuits", "circuits"),
@@ -132,18 +137,39 @@ def chosen(
     ]
 
 
-def table_lines(products: Iterable[Product]) -> list[str]:
-    """A table for each kind, in words; `MARK` behind unverified values."""
+def table_lines(products: Iterable[Product], in_full: bool = True) -> list[str]:
+    """Return a table for each kind, with `MARK` behind unverified values.
+
+    Args:
+        products: what to list.
+        in_full: False for the columns and rows that one chooses by, and only the names if there are several kinds.
+    """
     listed = list(products)
+    if not listed:
+        return ["no product of the catalogue is like that"]
+    groups = {word.replace("_", " "): [p for p in listed if type(p) is kind] for word, kind in KINDS.items()}
+    groups = {word: alike for word, alike in groups.items() if alike}
+    if not in_full and len(groups) > 1:
+        names = [_names(word, alike) for word, alike in groups.items()]
+        return [*names, "`scanwright catalogue --kind lidar` prints the figures of one kind, `-v` all tables"]
     lines: list[str] = []
-    for word, kind in KINDS.items():
-        alike = [product for product in listed if type(product) is kind]
-        if alike:
-            figures = FIGURES[kind]
-            heads = [word.replace("_", " "), *(figure.title for figure in figures), "maker"]
-            rows = [[p.name, *(_cell(p, figure) for figure in figures), p.maker] for p in alike]
-            lines += ["", *_aligned([heads, *rows])]
-    return [*lines[1:], "", FOOTNOTE] if lines else ["no product of the catalogue is like that"]
+    for word, alike in groups.items():
+        priced = [p for p in alike if getattr(p, "price_usd", None) is not None]
+        short = not in_full and len(alike) > MOST_ROWS and len(priced) < len(alike)
+        figures = [figure for figure in FIGURES[type(alike[0])] if figure.brief or in_full]
+        heads = [word, *(figure.title for figure in figures), *(["maker"] if in_full else [])]
+        rows = [
+            [p.name, *(_cell(p, figure) for figure in figures), *([p.maker] if in_full else [])]
+            for p in (priced if short else alike)
+        ]
+        lines += ["", *_aligned([heads, *rows])]
+        if short:
+            lines += [_names("price unknown", [p for p in alike if p not in priced])]
+    return [*lines[1:], "", FOOTNOTE]
+
+
+def _names(title: str, products: Iterable[Product]) -> str:
+    return fill(f"{title}: {', '.join(p.name for p in products)}", MOST_COLUMNS, subsequent_indent="  ")
 
 
 def _cell(product: Product, figure: Figure) -> str:
@@ -156,12 +182,12 @@ def _cell(product: Product, figure: Figure) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """First and last column to the left, the others to the right."""
+    """Align numbers to the right, names and a last column of words to the left."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    first, *others = widths[:-1]
+    words = any(row[-1][:1].isalpha() for row in rows[1:])
+    if words:
+        widths[-1] = 0
     return [
-        "  ".join(
-            [row[0].ljust(first), *(c.rjust(w) for c, w in zip(row[1:-1], others, strict=True)), row[-1]]
-        ).rstrip()
+        "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]).rstrip()
         for row in rows
     ]

@@ -14,16 +14,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from enum import Enum
 from types import FrameType
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import typer
 
 from scanwright.design.errors import DeviceError, NumericalError, ScanwrightError, require
-
-if TYPE_CHECKING:
-    from rich.progress import Progress
 
 
 class Verbosity(Enum):
@@ -51,7 +49,7 @@ _COLUMN = re.compile(r"\S {2,}(?=\S)")
 _MOST_GAPS = 2  # between words: a line with more is the row of a table
 _MOST_INDENT = 20  # of a line that continues another, to the column of its value
 _BAR_CHARACTERS = 24  # leaves 50 of a terminal's 80 for the step and the time that is left
-_SPEED_S = 3600.0  # over which the time that is left is estimated: stages of a build are minutes apart
+_LEAST_SHARE = 0.1  # done before the time left is estimated: an error of a small share is a large one of the time
 _NUMBER = re.compile(r"[\d.,]+")
 _FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
 _SETTING = re.compile(r'\b(\w+) = (true|"?([\w.+-]+)"?)')
@@ -203,19 +201,31 @@ class ConsoleProgress:
     one line every `_APART_S` seconds.
 
     Attributes:
-        clock: monotonic time [s].
+        clock: monotonic time [s], the same one in all processes.
+        began: time [s] and fraction of the first step with a fraction; None before it.
         printed_s: when a step with a fraction was last printed.
         printed: that step, without numbers.
     """
 
     clock: Callable[[], float] = time.monotonic
+    began: tuple[float, float] | None = None
     printed_s: float = -math.inf
     printed: str = ""
-    _bar: Progress | None = None
+    _fraction: float = 0.0
 
-    def __reduce__(self) -> tuple[type[ConsoleProgress], tuple[()]]:
-        """Begin anew in another process: a bar belongs to the process that draws it."""
-        return ConsoleProgress, ()
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Go on in another process, which estimates the time left from the same beginning."""
+        return ConsoleProgress, (time.monotonic, self.began)
+
+    def left_s(self, fraction: float) -> float | None:
+        """Return the time left at a fraction [s], from the time that it took so far; None if that is too short."""
+        now_s = self.clock()
+        if self.began is None or fraction < self._fraction - _LEAST_SHARE:  # other work, or steps that are done again
+            self.began, self._fraction = (now_s, fraction), fraction
+        fraction = self._fraction = max(fraction, self._fraction)
+        began_s, first = self.began
+        done = fraction - first
+        return (1 - fraction) * (now_s - began_s) / done if done >= _LEAST_SHARE * (1 - first) else None
 
     def __call__(self, step: str, fraction: float | None = None, /) -> None:
         """See `design.progress.Progress`."""
@@ -237,24 +247,17 @@ class ConsoleProgress:
     def _drawn(self, step: str, fraction: float) -> str:
         """Return the bar as text of one line."""
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
         from rich.table import Column
 
-        if self._bar is None or fraction < self._bar.tasks[0].completed:
-            column = Column(no_wrap=True, overflow="ellipsis")
-            words = TextColumn("{task.description}", markup=False, table_column=column)
-            self._bar = Progress(
-                *(BarColumn(_BAR_CHARACTERS), TaskProgressColumn(), TimeRemainingColumn(), words),
-                console=Console(stderr=True),
-                get_time=self.clock,
-                speed_estimate_period=_SPEED_S,
-            )
-            self._bar.add_task(step, total=1.0)
-            self._bar.update(TaskID(0), completed=max(fraction, 1e-9))  # rich times from here on, but not from 0
-        console = self._bar.console
-        self._bar.update(TaskID(0), completed=fraction, description=step)
+        left_s = self.left_s(fraction)
+        left = "-:--:--" if left_s is None else str(timedelta(seconds=round(left_s)))
+        words = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
+        console = Console(stderr=True)
+        bar = Progress(BarColumn(_BAR_CHARACTERS), TaskProgressColumn(), TextColumn(left), words, console=console)
+        bar.update(bar.add_task(step, total=1.0), completed=self._fraction)
         with console.capture() as capture:
-            console.print(self._bar.get_renderable(), end="", width=console.width - 1)
+            console.print(bar.get_renderable(), end="", width=console.width - 1)
         return capture.get().rstrip("\n")
 
 

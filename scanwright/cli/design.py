@@ -180,7 +180,9 @@ Kind = Literal["lidar", "servo", "slip_ring", "bearing", "belt", "printer", "mul
 
 @app.command(example="catalogue --kind lidar --min-range-m 8")
 def catalogue(
-    name: Annotated[str | None, Argument(metavar="NAME", help="Print one product with all sources.")] = None,
+    name: Annotated[
+        str | None, Argument(metavar="NAME", help="Print one product; -v: all values with sources.")
+    ] = None,
     kind: Annotated[Kind | None, Option(metavar="KIND", help=f"Only this kind: {', '.join(get_args(Kind))}.")] = None,
     min_range_m: Annotated[float | None, Option(metavar="M", help="Minimum range, practical if known.")] = None,
     max_mass_g: Annotated[float | None, Option(metavar="G", help="Maximum mass in grams.")] = None,
@@ -214,7 +216,18 @@ def catalogue(
 
         with atomic_write(sketch, TaskError) as place:
             place.write_bytes(sketch_svg(listed[0]))
-    show_result(lambda: listed[0].lines() if name else table_lines(listed), record, as_json)
+    in_full = verbosity() is Verbosity.VERBOSE
+
+    def lines() -> list[str]:
+        if name is None:
+            return table_lines(listed, in_full)
+        values = listed[0].lines(in_full)
+        if in_full:
+            return values
+        rest = f"-v prints all {len(listed[0].provenance())} values and their sources"
+        return [*table_lines(listed, in_full)[:-2], *values[1:], rest]
+
+    show_result(lines, record, as_json)
     if sketch is not None:
         hint(f"wrote {sketch}")
 

@@ -36,7 +36,9 @@ def new(
             "all thing:SIZE:DISTANCE. Metres (around: degrees); trailing numbers are optional.",
         ),
     ] = None,
-    scan_s: Annotated[float | None, Option(metavar="S", help="Time of one full scan [default: 10].")] = None,
+    scan_s: Annotated[
+        float | None, Option(metavar="S", help="Time of one full scan [default: lines at most 1 deg apart].")
+    ] = None,
     robot: Annotated[
         str | None,
         Option(metavar="BOX|FILE", help="Robot: box:LENGTH:WIDTH:HEIGHT, a mesh, or none."),
@@ -57,7 +59,8 @@ def new(
     """
     from scanwright.cli.results.of_commands import Created
     from scanwright.design.catalogue.catalogue import load_catalogue
-    from scanwright.pipeline.new_task import Answers, task_text, write_task_file
+    from scanwright.design.catalogue.lidar import Lidar
+    from scanwright.pipeline.new_task import Answers, task_text, usual_scan_s, write_task_file
 
     products = load_catalogue()
     asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
@@ -73,7 +76,7 @@ def new(
         servo=str(servo),
         height_m=float(height_m or 0.0),
         see=tuple(see or ()),
-        scan_s=10.0 if scan_s is None else scan_s,
+        scan_s=usual_scan_s(products.get(str(lidar), Lidar)) if scan_s is None else scan_s,
         robot=robot or "none",
         ahead_m=ahead_m,
     )
@@ -94,12 +97,13 @@ def _prompted(
     scan_s: float | None,
 ) -> tuple[str, str, float, str, list[str], float]:
     """Ask the questions that no option answers, each again until its answer is valid."""
+    from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.table import MARK, chosen, table_lines
-    from scanwright.pipeline.new_task import Answers, check_answers
+    from scanwright.pipeline.new_task import Answers, check_answers, usual_scan_s
 
     def product(kind: Any, question: str, usual: str, fits: Callable[[str], object]) -> str:
         of_kind = chosen(products, kind=kind)
-        show(table_lines(of_kind)[:-2])
+        show(table_lines(of_kind, in_full=False)[:-2])
         print(f"{MARK}: unverified number; -: unknown")
         return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
 
@@ -127,7 +131,8 @@ def _prompted(
         see = _until("  ", "ground ceiling", str.split, lambda regions: checked(see=regions))
     if scan_s is None:
         question = "6. How many seconds may one full scan take? Longer is denser"
-        scan_s = _until(question, "10", _number, lambda seconds: checked(scan_s=seconds))
+        usual = f"{usual_scan_s(products.get(lidar, Lidar)):g}"
+        scan_s = _until(question, usual, _number, lambda seconds: checked(scan_s=seconds))
     return lidar, servo, height_m, robot, see, scan_s
 
 

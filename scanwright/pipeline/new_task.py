@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tomllib
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from scanwright.design.task.shapes import LEAST_M, MOST_M
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines
 
+LINE_GAP_DEG = 1.0  # between neighbouring lines of a usual scan: two to four lines meet every neighbourhood of 2 deg
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
 
 ANGLES = r"""
@@ -98,7 +100,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         f'name = "{answers.name}"',
         f'sensor = "{lidar.name}"',
         f'servo = "{servo.name}"',
-        *_motion(answers, servo, slip_ring_for(lidar, servo, products)),
+        *_motion(answers, lidar, servo, slip_ring_for(lidar, servo, products)),
         ANGLES,
         "[angles]",
         "alpha_rot_deg = [-180, 180]",
@@ -111,6 +113,16 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         *_mask(answers, path.parent),
     ]
     return "\n".join(blocks) + "\n"
+
+
+def usual_scan_s(lidar: Lidar) -> float:
+    """Return a time of a full scan, a multiple of 5 s, with lines at most `LINE_GAP_DEG` apart."""
+    return 5.0 * math.ceil(360 / (lidar.scan_rate_hz * LINE_GAP_DEG) / 5)
+
+
+def _line_gap_deg(lidar: Lidar, scan_s: float) -> float:
+    """Return the angle between lines, in a turn of 360 deg or in 180 deg out and back."""
+    return 360 / (lidar.scan_rate_hz * scan_s)
 
 
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
@@ -164,7 +176,8 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
     raise TaskError(f"{lidar.name} on {servo.name}: these cannot work together: {why}")
 
 
-def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
+def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None) -> list[str]:
+    lines = f"its lines are {_line_gap_deg(lidar, answers.scan_s):.2g} deg apart; longer is denser"
     if ring is not None:
         how = "the shaft goes through it" if ring.bore_mm > 0 else "a belt turns the shaft next to it"
         return [
@@ -172,7 +185,7 @@ def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
             "",
             "[motion]",
             'mode = "spin"',
-            f"period_s = {answers.scan_s:g}    # one full turn is one full scan: longer is denser",
+            f"period_s = {answers.scan_s:g}    # one full turn is one full scan: {lines}",
         ]
     why = f"{servo.name} does not read its angle all around"
     if servo.position_feedback_deg == 360:
@@ -182,7 +195,7 @@ def _motion(answers: Answers, servo: Servo, ring: SlipRing | None) -> list[str]:
         f"[motion]  # {why}: it sweeps back and forth, and its cable hangs in a loop",
         'mode = "sweep"',
         "limits_deg = [-90, 90]",
-        f"period_s = {answers.scan_s:g}    # out and back is one full scan: longer is denser",
+        f"period_s = {answers.scan_s:g}    # out and back is one full scan: {lines}",
     ]
 
 

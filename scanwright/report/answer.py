@@ -10,34 +10,11 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
 from scanwright.design.evaluation.coverage import coverage
-from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.problem import Problem, problem_of
-from scanwright.design.objective.tolerance import sensitivity
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
-
-OFF_DEG = 1.0  # error of a printed and screwed mount: assumed, its fits and screw holes allow it
-
-
-@dataclass(frozen=True, slots=True)
-class ConeOnMap:
-    """A blind cone, its axis as in the density map: theta from up, phi from ahead to the left."""
-
-    half_angle_deg: float
-    theta_deg: float
-    phi_deg: float
-
-
-@dataclass(frozen=True, slots=True)
-class Hidden:
-    """Hidden beams, as counts and as the share of all beams over one turn of the axis."""
-
-    beams: int
-    always: int
-    sometimes: int
-    share: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,20 +24,16 @@ class BuildAnswer:
     Attributes:
         as_built: what it sees with its parts, and the reference mounts.
         ball_deg: within which a beam counts for a direction.
-        cones: about the axis, that no beam enters; with parts.
-        rises: without parts, by mounting angle: how much J rises if it alone is 1 deg off, the worse direction.
-        worst: the largest of `rises` as the share of beams per direction that it costs; None if J is no logarithm.
+        masked_fraction: share of the sphere that the robot hides.
+        lines: of one full scan.
+        beams: of one line.
     """
 
     as_built: AsBuilt
     ball_deg: float
-    cones: tuple[ConeOnMap, ...]
     masked_fraction: float
     lines: int
     beams: int
-    nodes: int
-    rises: dict[str, float]
-    worst: float | None
 
 
 def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None) -> BuildAnswer:
@@ -73,20 +46,12 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = 
     """
     built = task_as_built(loaded, angles)
     problem, setting = problem_of(built), mounting_rad(angles)
-    rises = sensitivity(problem, setting, np.radians(OFF_DEG))
-    seen = problem if shadow is None else problem.behind(shadow)
     return BuildAnswer(
         as_built=as_built(problem, built.task, setting, shadow, checked_score(built, problem, setting, shadow)),
         ball_deg=float(np.degrees(problem.ball_rad)),
-        cones=tuple(
-            _on_map(np.array(cone.axis_world), cone.half_angle_deg) for cone in gaps(seen, setting).blind_cones
-        ),
         masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
         beams=len(problem.bearings_rad),
-        nodes=problem.nodes,
-        rises=rises,
-        worst=float(-np.expm1(-max(0.0, *rises.values()))) if problem.objective.name == "log" else None,
     )
 
 
@@ -109,18 +74,3 @@ def problem_as_built(loaded: LoadedTask, angles: AngleSet) -> Problem:
 def mounting_rad(angles: AngleSet) -> Array:
     """Return (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
     return np.radians([getattr(angles.angles_deg, name) for name in NAMES])
-
-
-def hidden_by(shadow: SelfOcclusion) -> Hidden:
-    """Return the counts of a self-occlusion mask."""
-    share = shadow.hidden()
-    return Hidden(len(share), int((share == 1).sum()), int(((share > 0) & (share < 1)).sum()), shadow.share())
-
-
-def _on_map(axis: Array, half_angle_deg: float) -> ConeOnMap:
-    x, y, z = np.round(axis, 9) + 0.0  # straight up and straight back have one name each
-    return ConeOnMap(
-        half_angle_deg,
-        float(np.degrees(np.arccos(np.clip(z, -1, 1)))),
-        float(np.degrees(np.arctan2(y, x)).round(1) + 0.0),  # straight ahead is 0.0, never -0.0
-    )

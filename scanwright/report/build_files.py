@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 
 T = TypeVar("T")
@@ -56,11 +55,6 @@ def read_table(path: Path) -> list[dict[str, str]]:
     """Return the rows of a CSV file by the names of its columns."""
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-def read_columns(path: Path, columns: tuple[str, ...]) -> Array:
-    """Return columns of a table of numbers, shape (rows, columns)."""
-    return np.array([[float(row[column]) for column in columns] for row in read_table(path)]).reshape(-1, len(columns))
 
 
 def read_picture(path: Path) -> str:

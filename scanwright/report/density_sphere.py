@@ -1,4 +1,4 @@
-"""The maps of the report: densities and J over the axis directions, each one picture of all directions.
+"""The maps of the report: densities, each one picture of all directions.
 
 A map is unrolled: theta from up to down, phi from -180 to 180 deg, so that its middle is ahead.
 """
@@ -9,10 +9,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.colors import Normalize
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
-from scipy.spatial import cKDTree
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
@@ -27,7 +25,6 @@ from scanwright.report.colours import Bands, bands_to, ramp
 
 STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
 DENSEST = 0.995  # of the sphere is not denser than the highest edge or twice of it: the rest lies about the axis
-WORST = 0.9  # quantile of the axes: the worst ones would use most of the shades
 # the palette: shades of the map, then what is no shade
 SHADES = 250
 OUTLINE, HALO, MASKED, HATCH, NOTHING = range(SHADES, SHADES + 5)
@@ -45,14 +42,10 @@ class SphereMap:
 
     Attributes:
         title: what it shows.
-        low: of its scale, the dark end, in words; empty if it has the bands of the sphere.
-        high: the bright end, likewise.
         picture: PNG as a data address.
     """
 
     title: str
-    low: str
-    high: str
     picture: str
 
 
@@ -79,18 +72,14 @@ def density_sphere(
     problem: Problem,
     angles: AngleSet,
     mounts: Iterable[TunedMount],
-    axes: Array | None,
-    step_deg: float,
     shadow: SelfOcclusion | None = None,
 ) -> DensitySphere:
-    """Draw density of the scanner and of the reference mounts on one scale, J over the axes, and the axis.
+    """Draw density of the scanner and of the reference mounts on one scale, and the axis.
 
     Args:
         problem: the task, `problem_as_built`.
         angles: what was built.
         mounts: the reference mounts.
-        axes: alpha_rot, beta_rot [deg], lowest J of the axes searched, shape (n, 3); None if unknown.
-        step_deg: of the grid that was searched.
         shadow: beams that the parts of the scanner block; None if they are not known.
 
     Raises:
@@ -107,8 +96,6 @@ def density_sphere(
     area, order = np.sqrt(1 - directions[:, 2] ** 2), densities[own].argsort()
     bands = bands_to(densities[own][order][np.searchsorted(area[order].cumsum(), DENSEST * area.sum())])
     maps = _drawn(densities, bands, weight, masked)
-    if axes is not None and len(axes) > 1 and np.isfinite(axes[:, 2]).any():
-        maps.append(_over_axes(axes, step_deg, directions, shape))
     axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
     counts = weight.ravel() * area
     middle = counts @ directions / max(float(counts.sum()), 1e-12)
@@ -129,25 +116,9 @@ def _directions() -> tuple[Array, tuple[int, int]]:
 def _drawn(densities: dict[str, Array], bands: Bands, weight: Array, masked: NDArray[np.bool_]) -> list[SphereMap]:
     maps = {name: density.reshape(weight.shape) for name, density in densities.items()}
     return [
-        SphereMap(f"density of {name}", "", "", _png(_framed(_shades(density, bands, density < 1e-9), weight, masked)))
+        SphereMap(f"density of {name}", _png(_framed(_shades(density, bands, density < 1e-9), weight, masked)))
         for name, density in maps.items()
     ]
-
-
-def _over_axes(axes: Array, step_deg: float, directions: Array, shape: tuple[int, int]) -> SphereMap:
-    """Draw the lowest J about the nearest axis of the grid; nothing if none is near."""
-    known = axes[np.isfinite(axes[:, 2])]
-    known = known[np.argsort(known[:, 2], kind="stable")]
-    points = np.round(R_world_rot(*np.radians(known[:, :2].T))[:, :, 2], 9)
-    _, first = np.unique(points, axis=0, return_index=True)  # the lowest J of several names of one axis
-    distance, nearest = cKDTree(points[first]).query(directions)
-    J = known[first, 2][nearest].reshape(shape)
-    best, worst = float(known[0, 2]), float(np.quantile(known[:, 2], WORST))
-    scale = Normalize(-max(worst, best + 1e-9), -best, clip=True)
-    far = (distance > 0.75 * np.radians(step_deg)).reshape(shape)
-    return SphereMap(
-        "J over the direction of the axis", f"J {worst:.3f} or more", f"{best:.3f}", _png(_shades(-J, scale, far))
-    )
 
 
 def _shades(values: Array, scale: Callable[[Array], ArrayLike], nothing: NDArray[np.bool_]) -> Indices:

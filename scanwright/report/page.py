@@ -17,7 +17,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
 
 from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.angles import AngleSet, load_angles
-from scanwright.design.arrays import Array
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
 from scanwright.design.evaluation.metres import on_planes
@@ -26,22 +25,19 @@ from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
 from scanwright.design.task.task import LoadedTask, load_task
-from scanwright.report.answer import OFF_DEG, answer, hidden_by, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
-from scanwright.report.build_files import packed, read, read_columns, read_json, read_picture, read_text
+from scanwright.report.build_files import packed, read, read_json, read_picture, read_text
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
 from scanwright.report.colours import COLOUR_STOPS
 from scanwright.report.density_sphere import DensitySphere, density_sphere
 from scanwright.report.first_screen import cards, count, motion_in_words, title, to_do
-from scanwright.report.landscapes import AXIS, PLANE, landscape, other_mounts
 from scanwright.report.parts_list import price, read_parts
 from scanwright.report.room import cloud_scene, one_scan, room_about, room_scene
 from scanwright.report.scanner_scene import LARGEST_BYTES, load_glb, placed_bodies, robot_bodies, scanner_scene
 
 REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
-PLANES_CSV = ("alpha_laser_deg", "beta_laser_deg", "J", "alpha_rot_deg", "beta_rot_deg")
-AXES_CSV = ("alpha_rot_deg", "beta_rot_deg", "J")
 RAYS = 90_000  # of the cloud of one scan: it shares the 3 MB of a page with the scanner and the drawings
 SPREAD_PERCENT = 1, 99  # of the heights, to which the colours reach
 CEILING_M = 1.2  # above the scanner, from which the cloud is cut away: it would hide the room
@@ -61,21 +57,13 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
     angles = load_angles(folder / "angles.json")
     on_task, on_bodies = begin(_on_task, folder), begin(_on_bodies, folder)
     parts = read(folder / "bom.csv", read_parts)
-    planes = read(folder / "search.csv", _planes)
-    axes = read(folder / "axes.csv", _axes)
     findings = read(folder / "checks.json", read_checks)
     files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     facts = {
         "angles": angles,
         "motion": motion_in_words(angles.motion),
-        "off_deg": OFF_DEG,
         "parts": parts,
         "price": price,
-        "planes": planes,
-        "planes_picture": None if planes is None else landscape(planes[:, :3], PLANE, angles, "lowest J, any axis"),
-        "axes": axes,
-        "axes_picture": None if axes is None else landscape(axes, AXIS, angles, "lowest J, any scan plane"),
-        "any_J": planes is not None and bool(np.isfinite(planes[:, 2]).any()),
         "checks": None if findings is None else by_severity(findings),
         "todo": to_do(files, findings or (), parts),
         "share": percent,
@@ -86,7 +74,7 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
         "drawings": {path.stem: packed(read_picture(path)) for path in sorted((folder / "drawings").glob("*.svg"))},
         "sheets": [name for name in files if name.startswith("drawings/") and name.endswith(".pdf")],
         "left_out": read(folder / "left_out.json", lambda path: read_json(path)["left_out"]),
-        "manifest": read(folder / "manifest.json", _manifest),
+        "manifest": read(folder / "manifest.json", read_json),
         "task_text": read(folder / "task.toml", read_text),
         **on_task(),
         **on_bodies(),
@@ -126,15 +114,15 @@ def _on_task(folder: Path) -> dict[str, Any]:
     """Return what needs the task."""
     loaded = read(folder / "task.toml", load_task)
     if loaded is None:
-        return dict.fromkeys(("title", "objective", "ball_deg", "answer", "sphere", "cards", "mounts", "task_scene"))
-    angles, axes = load_angles(folder / "angles.json"), read(folder / "axes.csv", _axes)
+        return dict.fromkeys(("title", "objective", "ball_deg", "answer", "sphere", "cards", "task_scene"))
+    angles = load_angles(folder / "angles.json")
     problem, task = problem_as_built(loaded, angles), loaded.task
     setting = mounting_rad(angles)
-    planes, own_body = read(folder / "search.csv", _planes), read(folder / "own_body.npz", load_self_occlusion)
+    own_body = read(folder / "own_body.npz", load_self_occlusion)
     shadow = None if own_body is None else own_body[0]
     result = answer(loaded, angles, shadow)
     mounts = [mount.gain.mount for mount in result.as_built.mounts]
-    sphere = density_sphere(problem, angles, mounts, axes, task.angles.step_deg, shadow)
+    sphere = density_sphere(problem, angles, mounts, shadow)
     figures = on_planes(loaded, problem, setting, shadow)
     return {
         "title": title(loaded),
@@ -144,7 +132,6 @@ def _on_task(folder: Path) -> dict[str, Any]:
         "sphere": sphere,
         "task_scene": _task_scene(loaded, angles, problem, sphere, shadow),
         "cards": cards(angles, result, figures, read(folder / "bom.csv", read_parts)),
-        "mounts": None if planes is None else other_mounts(problem, task, setting, planes),
     }
 
 
@@ -161,7 +148,7 @@ def _task_scene(
     low, high = np.percentile(points[:, 2], SPREAD_PERCENT)
     return room_scene(room, centre_m, np.array(sphere.middle), sphere.below) | {
         "robot": robot_bodies(loaded.task, loaded.source.parent, centre_m),
-        "maps": [{"low": view.low, "high": view.high} for view in sphere.maps],
+        "maps": len(sphere.maps),
         "cloud": cloud_scene(points + centre_m, (points[:, 2] - low) / (high - low)),
         "shown": len(points),
         "cast": problem.lines.count * problem.lines.repeats * len(problem.bearings_rad),
@@ -176,19 +163,10 @@ def _on_bodies(folder: Path) -> dict[str, Any]:
     assembly, exploded = (read(folder / name, load_glb) for name in ("assembly.glb", "exploded.glb"))
     bodies = None if assembly is None else placed_bodies(assembly)
     return {
-        "hidden": None if own_body is None else hidden_by(own_body[0]),
         "scanner": _not_drawn(folder) or scanner_scene(assembly, exploded, angles, own_body),
         "still": None if bodies is None else still(bodies),
         "places": {} if bodies is None else _places(bodies, findings or (), {} if parts is None else parts.bought),
     }
-
-
-def _planes(path: Path) -> Array:
-    return read_columns(path, PLANES_CSV)
-
-
-def _axes(path: Path) -> Array:
-    return read_columns(path, AXES_CSV)
 
 
 def _environment() -> Environment:
@@ -200,12 +178,6 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-
-
-def _manifest(path: Path) -> dict[str, Any]:
-    """Return the manifest without the report's own digest, so that a report made again is the same."""
-    manifest: dict[str, Any] = read_json(path)
-    return manifest | {"files": {name: facts for name, facts in manifest["files"].items() if name != REPORT}}
 
 
 def _not_drawn(folder: Path) -> str:

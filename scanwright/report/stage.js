@@ -545,9 +545,6 @@ const inflated = async (text) => {
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, gl.RGB, gl.UNSIGNED_BYTE, image);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
-    const { low, high } = scene.maps[chooser.value];
-    [element("map-bands").hidden, element("map-scale").hidden] = [low !== "", low === ""];
-    [element("map-low").textContent, element("map-high").textContent] = [low, high];
     ready = true;
     canvas.dataset.map = chooser.value;
     redraw();

@@ -1,27 +1,87 @@
-// The setting of the page in its address: `#angles=...` follows the page, and a link that has one sets it once.
-// An element of class sw-setting holds the setting; the field named "angles [deg]" takes one.
+// The setting of the page: `#angles=...` in the address follows it, a link that has one sets it once, and dots on pads
+// (`.sw-pad`: two of the four angles, from `data-first` on) are dragged or moved by arrow keys. An element of class
+// sw-setting holds the angles, and the id of the field that takes them.
 (() => {
   let wanted = new URLSearchParams(location.hash.slice(1)).get("angles");
+  let shown = null; // angles of the page before the link
+  let tries = 0;
+  let held = null; // the pad on which a pointer is down,
+  let box = null; // and where it was then: lines above it may come and go
+  let angles = [];
+  let waits = false;
+
+  const send = () => {
+    waits = false;
+    const uuid = document.querySelector(".sw-setting").dataset.field;
+    window.__viserMutable.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value: angles.join(",") } });
+  };
+  // viser ignores what a page sends before the server knows its camera
+  const ask = () => {
+    if (!wanted) return;
+    angles = wanted.split(",");
+    send();
+    if (++tries < 20) setTimeout(ask, 250);
+    else wanted = null;
+  };
+  const place = (pad) => {
+    const [x, y] = angles.slice(pad.dataset.first);
+    const dot = pad.querySelector(".sw-dot");
+    dot.style.left = `${50 * (1 + x / pad.dataset.x)}%`;
+    dot.style.top = `${50 * (1 - y / pad.dataset.y)}%`;
+  };
+  const move = (pad, pair) => {
+    const bounds = [Number(pad.dataset.x), Number(pad.dataset.y)];
+    pair.forEach((angle, k) => (angles[Number(pad.dataset.first) + k] = Number(Math.max(-bounds[k], Math.min(bounds[k], angle)).toFixed(2))));
+    place(pad);
+    if (!waits) requestAnimationFrame(send);
+    waits = true;
+  };
+  const follow = ({ clientX, clientY }) => {
+    const { left, top, width, height } = box;
+    move(held, [((2 * (clientX - left)) / width - 1) * held.dataset.x, (1 - (2 * (clientY - top)) / height) * held.dataset.y]);
+  };
 
   const look = () => {
     const setting = document.querySelector(".sw-setting");
-    const input = document.querySelector('input[aria-label="angles [deg]"]');
-    if (!setting || !input) return;
+    if (!setting) return;
     if (wanted) {
-      const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
-      input.focus();
-      set.call(input, wanted); // React sees it as typed
-      input.dispatchEvent(new Event("input", { bubbles: true }));
+      shown ??= setting.dataset.angles;
+      if (setting.dataset.angles === shown) {
+        if (!tries) ask();
+        return;
+      }
       wanted = null;
-      setTimeout(() => input.blur(), 200); // once it is drawn: what is left is taken
-      return;
     }
+    if (held || waits) return; // what arrives is of an earlier place
+    angles = setting.dataset.angles.split(",").map(Number);
+    for (const pad of document.querySelectorAll(".sw-pad")) place(pad);
     const hash = `#angles=${setting.dataset.angles}`;
     if (location.hash !== hash) history.replaceState(null, "", location.pathname + location.search + hash);
   };
-  new MutationObserver(look).observe(document, { childList: true, subtree: true, attributeFilter: ["data-angles", "aria-label"] });
-  addEventListener("click", ({ target }) => {
-    const button = target instanceof Element && target.closest("button");
-    if (button && button.textContent.trim() === "Copy link") navigator.clipboard?.writeText(location.href);
-  }, true);
+  new MutationObserver(look).observe(document, { childList: true, subtree: true, attributeFilter: ["data-angles"] });
+
+  const on = (event, act) => addEventListener(event, (told) => told.target instanceof Element && act(told, told.target), true);
+  on("pointerdown", (told, target) => {
+    held = target.closest(".sw-pad");
+    if (!held) return;
+    box = held.getBoundingClientRect();
+    told.preventDefault(); // of the picture, which would be dragged itself
+    held.querySelector(".sw-dot").focus();
+    held.setPointerCapture(told.pointerId);
+    follow(told);
+  });
+  on("pointermove", (told) => held && follow(told));
+  for (const event of ["pointerup", "pointercancel"]) on(event, () => (held = null));
+  on("keydown", (told, target) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[told.key];
+    if (!step || !target.matches(".sw-dot")) return;
+    told.preventDefault();
+    told.stopImmediatePropagation(); // the view takes arrow keys too
+    const pad = target.closest(".sw-pad");
+    const first = Number(pad.dataset.first);
+    move(pad, step.map((part, k) => angles[first + k] + part * (told.shiftKey ? 0.1 : 1)));
+  });
+  on("click", (_, target) => {
+    if (target.closest("button")?.textContent.trim() === "Copy link") navigator.clipboard?.writeText(location.href);
+  });
 })();

@@ -29,12 +29,13 @@ from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.controls import NO_SCENE, TASK_SCENE, Controls, name_of_copy, put, scan_scenes
 from scanwright.studio.panel.facts import Facts, Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
+from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.panel.saving import Saving
 from scanwright.studio.searching import Searching
 from scanwright.studio.state import Canvas, Dab, Setting
 from scanwright.studio.view.coloured_sphere import highest_density
 from scanwright.studio.view.latest_only import LatestOnly
-from scanwright.studio.view.view_3d import SIDES, View3D
+from scanwright.studio.view.view_3d import LOOKS, View3D
 from scanwright.studio.view.workers import Order, Workers
 
 FIRST_S = 30.0  # at most, for the first colours
@@ -49,6 +50,7 @@ class Studio:
         self.judge = Judge.for_task(loaded)
         self.facts: Facts | None = None
         self._message_of: tuple[Canvas, Setting] | None = None
+        self._searched: dict[Canvas, Optimum] = {}
         self.view = View3D(server)
         names = shipped_tasks()
         own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
@@ -92,13 +94,13 @@ class Studio:
         if self.controls.note.content and self._message_of != (self._canvas, self.setting):
             self.controls.note.content = ""
 
-    def move(self, setting: Setting, of: Hashable = None) -> None:
-        """Move the sliders; `of` is what for, where that takes more than one move."""
+    def move(self, setting: Setting, of: Hashable = None, joined_s: float = math.inf) -> None:
+        """Move the sliders; moves `of` the same thing within `joined_s` of each other are one step of undo."""
         for slider, angle in zip(self.controls.angles, setting.angles_deg, strict=True):
             put(slider, angle)
         self._stood()
         self.judging.request(setting)
-        self._note(of, math.inf)
+        self._note(of, joined_s)
 
     def undo(self) -> None:
         """Take the last step back."""
@@ -155,11 +157,11 @@ class Studio:
             if event.client is not None:
                 self._stood()
 
-        def typed(event: viser.GuiEvent[Any]) -> None:
+        async def typed(event: viser.GuiEvent[Any]) -> None:
             if event.client is None:
                 return
             try:
-                self.move(Setting.read(c.typed.value))
+                self.move(Setting.read(c.typed.value), c.typed, JOINED_S)
             except TaskError as error:
                 c.typed_error.content = note_html(str(error), bad=True)
 
@@ -230,7 +232,7 @@ class Studio:
 
     def _tell(self, facts: Facts) -> None:
         self.facts = facts
-        self.controls.facts.content = panel_html.facts_html(facts)
+        self.controls.facts.content = panel_html.facts_html(facts, self.controls.typed._impl.uuid)
         self._server.flush()
 
     # The task and the paint on it
@@ -254,7 +256,13 @@ class Studio:
     def _use_optimum(self, optimum: Optimum) -> None:
         """Judge by the task whose period was found."""
         self.judge = replace(self.judge, loaded=optimum.loaded, problem=optimum.problem)
+        self._searched[self._canvas] = optimum
+        self._show_pads()
         self.kept.rejudge(self.judge)
+
+    def _show_pads(self) -> None:
+        """Show the landscapes of the task as it is painted now."""
+        self.controls.pads.content = pads_html(self._searched.get(self._canvas))
 
     def _offer_scenes(self) -> None:
         self.controls.scene.options = scan_scenes(self._canvas.base)
@@ -283,6 +291,7 @@ class Studio:
             self._bands,
             "beams per direction, without parts; grey: none; white edge: what matters; red: hidden by the robot",
         )
+        self._show_pads()
         self.view.outline(self.judge.problem)
         self.view.stand_in(self.judge.loaded.task)
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
@@ -298,11 +307,11 @@ class Studio:
         """Take the brush in hand, or put it away so that dragging turns the view again."""
         self.brush.arm(self._guarded)
         if self.controls.painting.value and not self.view.on_sphere:
-            put(self.controls.look, "sphere from inside")  # which is what the brush paints on
+            put(self.controls.look, "sphere")  # which is what the brush paints on
             self._look()
 
     def _look(self) -> None:
-        if self.controls.look.value in SIDES:
+        if self.controls.look.value in LOOKS:
             self.view.look(self.controls.look.value)
             self.brush.show()
             self.judging.request(self.setting)

@@ -8,6 +8,7 @@ from threading import Thread
 from scanwright.design.concurrency.processes import worker_processes
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.as_built import as_built
+from scanwright.design.objective.holes import percent
 from scanwright.design.search.optimum import Optimum, find_optimum
 from scanwright.pipeline.build import setting_built
 from scanwright.studio.panel.controls import Controls, put
@@ -60,9 +61,8 @@ class Searching:
             bare = Setting.within_bounds(optimum.search.best[0].angles_deg)
             self._move(bare, step)
             title = f"optimum of {optimum.search.covered:,} settings, {optimum.title}"
-            blind = optimum.hole_lines(tabled=False)
-            holes = "; ".join(dict.fromkeys((blind[0].partition(";")[0], blind[-1])))
-            self._show(f"{title}: {holes}; searching the equivalent mount whose parts block the fewest beams")
+            holes = optimum.hole_lines(tabled=False)[0].partition(";")[0]
+            self._show(f"{title}; {holes}; searching the equivalent mount whose parts block the fewest beams")
             with worker_processes() as begin:
                 chosen = begin(setting_built, optimum)()
             if (canvas, bare) == self._now():
@@ -75,7 +75,10 @@ class Searching:
                 chosen.family.score,
                 optimum.mounts,
             )
-            self._show("; ".join([title, *chosen.lines(), *seen.lines(), holes]))
+            gain, blocked = seen.mounts[0].gain, percent(seen.blocked or 0.0)
+            self._show(
+                f"{title}: with parts, which block {blocked} of the beams, {gain.value} {gain.mount.name}; {holes}"
+            )
         except ScanwrightError as error:
             self._show(str(error), bad=True)
         finally:

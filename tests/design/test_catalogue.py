@@ -1,5 +1,6 @@
 """The catalogue: every value has a source, and the numbers are those of the paper."""
 
+import textwrap
 import tomllib
 
 import numpy as np
@@ -246,6 +247,19 @@ def test_the_table_has_a_row_for_every_product_and_a_mark_for_every_doubt(shippe
     assert rows["UTM-30LX"].split()[:9] == ["UTM-30LX", "30", "15", "0.1", "270", "0.25", "40", "10", "370"]
     assert "price_usd" in shipped.named("VLP-16").unverified() and "8,000?" in rows["VLP-16"]
     assert table_lines([]) == ["no product of the catalogue is like that"]
+
+
+def test_a_short_table_fits_a_screen_and_leaves_no_product_out(shipped):
+    for kind in (None, *KINDS):
+        products = chosen(shipped, kind=kind)
+        lines = [row for line in table_lines(products, in_full=False) for row in line.splitlines()]
+        assert len(lines) <= 25 and max(map(len, lines)) <= 100
+        words = " ".join(" ".join(lines).split())
+        assert all(product.name in words for product in products)
+    for product in shipped:
+        rows = [row for line in product.lines(in_full=False) for row in textwrap.wrap(line, 100)]
+        assert len(rows) <= 22  # the table of its figures comes before them
+        assert all(f"{field} = " in " ".join(rows) for field in product.unverified())
 
 
 def test_a_filter_keeps_what_is_known_to_keep_it(shipped):

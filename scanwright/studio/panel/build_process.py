@@ -1,18 +1,19 @@
-"""`scanwright build` as a process of its own, and what it says as progress."""
+"""`scanwright build` as a separate process, and its progress."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 
-STEPS = 50  # lines that a build of ground_ahead says; others say a few more or less
+PERCENT = re.compile(r" \((\d+)%\)$")
 
 
 class BuildProcess:
-    """One build that runs; `told` gets the share done and the last line, `done` the exit code and the last line."""
+    """A running build; `progress` gets the share done and the last line, `done` the exit code and the last line."""
 
     def __init__(
         self, task_file: Path, out: Path, progress: Callable[[float, str], None], done: Callable[[int, str], None]
@@ -39,9 +40,11 @@ class BuildProcess:
 
     def _follow(self) -> None:
         assert self._process.stdout is not None
-        last = ""
-        for number, line in enumerate(self._process.stdout):
+        last, share = "", 0.0
+        for line in self._process.stdout:
             last = line.strip().removeprefix(".. ") or last
-            self._progress(min(number / STEPS, 0.98), last)
+            if percent := PERCENT.search(last):
+                share = int(percent[1]) / 100
+            self._progress(share, last)
         self._process.stdout.close()
         self._done(self._process.wait(), last)

@@ -9,8 +9,9 @@ import viser
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 from scanwright.serving.style import banner_html
+from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
-from scanwright.studio.view.view_3d import SIDES
+from scanwright.studio.view.view_3d import LOOKS
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
 UNDO, REDO = "Undo", "Redo"
@@ -33,13 +34,14 @@ class Controls:
         self.mode, self.facts = gui.add_html(banner_html("running", (), lost=LOST)), gui.add_html("")
         self.note, self.making = gui.add_html(""), gui.add_html("")
         self.undo = gui.add_button(UNDO, icon=viser.Icon.ARROW_BACK_UP, color=QUIET, disabled=True)
-        self.redo = gui.add_button(REDO, icon=viser.Icon.ARROW_FORWARD_UP, color=QUIET, visible=False)
+        self.redo = gui.add_button(REDO, icon=viser.Icon.ARROW_FORWARD_UP, color=QUIET, disabled=True)
         self.undo_key = gui.add_command(UNDO, hotkey="Z", modifier="cmd/ctrl", disabled=True)
         self.redo_key = gui.add_command(REDO, hotkey="Z", modifier="cmd/ctrl+shift", disabled=True)
         self.brush_key = gui.add_command("Brush", description="Take it in hand, or put it away", hotkey="B")
         tabs = gui.add_tab_group()
         with tabs.add_tab("Angles"):
             self.task = gui.add_dropdown("task", tasks, initial_value=tasks[0])
+            self.pads = gui.add_html(pads_html(None))
             self.angles = tuple(
                 gui.add_slider(name, -bound, bound, 0.01, angle)
                 for name, bound, angle in zip(NAMES, BOUNDS_DEG, setting.angles_deg, strict=True)
@@ -62,11 +64,10 @@ class Controls:
             self.painted = gui.add_html("")
         with tabs.add_tab("Compare"):
             self.table = gui.add_html("")
-            self.kept = gui.add_dropdown("setting", ("rolling", "pitching"), initial_value="rolling")
+            self.kept = gui.add_dropdown("setting", ("rolling",), initial_value="rolling")
             self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
         with tabs.add_tab("View"):
-            looks = tuple(SIDES)
-            self.look = gui.add_dropdown("density", looks, initial_value=looks[0])
+            self.look = gui.add_dropdown("density", LOOKS, initial_value=LOOKS[0])
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
             self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
@@ -97,7 +98,6 @@ class Controls:
         ):
             button.label = key.label = f"{name}: {words}" if words else name
             button.disabled = key.disabled = not words
-        self.redo.visible = bool(redoes)
 
 
 def put(control: Any, value: object) -> None:

@@ -1,11 +1,10 @@
-"""Settings side by side: those that were kept, and the standard alignments that all are compared with."""
+"""Table of the kept settings and of the reference mounts that all are compared with."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from threading import Lock
 
-from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.errors import TaskError
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.controls import Controls, put
@@ -52,19 +51,19 @@ class KeptSettings:
         """Take the one that is chosen out of the table.
 
         Raises:
-            TaskError: it is a standard alignment.
+            TaskError: it is a reference mount.
         """
         name = self._controls.kept.value
-        if name in STANDARD_DEG:
-            raise TaskError(f"compare: {name} stays: it is what others are compared with")
+        if name in self._judge.references():
+            raise TaskError(f"compare: {name} cannot be removed: others are compared with it")
         with self._table:
             self._facts.pop(name, None)
             self._show()
 
     @property
     def settings(self) -> tuple[tuple[str, Setting], ...]:
-        """Those that were kept, by name, without the standard alignments."""
-        return tuple((name, facts.setting) for name, facts in self._facts.items() if name not in STANDARD_DEG)
+        """Those that were kept, by name, without the reference mounts."""
+        return tuple((name, facts.setting) for name, facts in self._facts.items() if name in LETTERS)
 
     def take(self, settings: tuple[tuple[str, Setting], ...]) -> None:
         """Have these in place of those that were kept."""
@@ -78,8 +77,8 @@ class KeptSettings:
             self._judge_all(dict(self.settings))
 
     def _judge_all(self, kept: dict[str, Setting]) -> None:
-        settings = {name: Setting(angles_deg) for name, angles_deg in STANDARD_DEG.items()} | kept
-        self._facts = {name: self._judge.exact(setting) for name, setting in settings.items()}
+        settings = self._judge.references() | kept
+        self._facts = {name: self._judge.settled(self._judge.exact(setting)) for name, setting in settings.items()}
         self._show()
 
     def _show(self) -> None:

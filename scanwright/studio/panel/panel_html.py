@@ -15,8 +15,11 @@ CELL = "padding:1px 6px 1px 0;white-space:nowrap"
 NUMBER = f"{CELL};text-align:right;font-variant-numeric:tabular-nums"
 
 
-def facts_html(facts: Facts) -> str:
-    """Return the facts of the present setting, without parts; the address of the page follows the hidden element."""
+def facts_html(facts: Facts, field: str = "") -> str:
+    """Return the facts of the present setting, without parts.
+
+    The address of the page and the dots of the pads follow a hidden element, which names the `field` of the angles.
+    """
     state = "exact" if facts.exact else "dragging"
     best = min(facts.mounts, key=facts.mounts.__getitem__, default="")
     ratio = "" if math.isnan(facts.ratio) else f"<b>{facts.ratio:.2f} x</b> the beams of {escape(best)}"
@@ -28,11 +31,11 @@ def facts_html(facts: Facts) -> str:
         ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {error_words(facts.J, facts.J_error)}, {state}, without parts"),
         ("blind cone", f"{facts.blind_cone_deg:.2f} deg", "half angle"),
         ("widest gap", f"{facts.gap_deg:.3f} deg", f"{facts.gap_mm:.0f} mm at {WALL_M:g} m"),
-        ("shortest turn", _period(facts), f"{facts.density} per ball"),
+        ("shortest turn", _period(facts), f"for {facts.density} beam{'s' * (facts.density > 1)} within the ball"),
     ]
     angles = ",".join(f"{angle:g}" for angle in facts.setting.angles_deg)
     return (
-        f'<div class="sw-setting" hidden data-angles="{angles}"></div>'
+        f'<div class="sw-setting" hidden data-angles="{angles}" data-field="{field}"></div>'
         f'<div style="font-size:16px;margin:2px 12px">{ratio}</div>'
         f'<table style="font-size:12px;line-height:1.35;border-spacing:0;margin:0 12px 6px">'
         f"{asked}{''.join(_row(*row) for row in rows)}</table>"
@@ -72,4 +75,6 @@ def _on_plane(region: str, figures: PlaneFigures | None) -> str:
 
 
 def _period(facts: Facts) -> str:
+    if facts.period_s is None:
+        return "..."
     return "&ndash;" if math.isnan(facts.period_s) else f"{facts.period_s:.3f} s"

@@ -37,8 +37,6 @@ EVIL = "</script><script>alert(1)</script>"
 ROLLING = Angles(
     **dict(zip(("alpha_rot", "beta_rot", "alpha_laser", "beta_laser"), STANDARD_DEG["rolling"], strict=True))
 )
-ALPHA, BETA = (angle.ravel() for angle in np.meshgrid(np.arange(-180, 181, 15), np.arange(-90, 91, 15)))
-AXES = np.stack([ALPHA, BETA, -4 + ((ALPHA - 60) / 90) ** 2 + ((BETA - 30) / 60) ** 2], axis=1)
 ANGLES = AngleSet(
     task="ground_ahead",
     angles_deg=ROLLING,
@@ -106,11 +104,6 @@ def write_folder(folder):
     loaded = load_task(Path("ground_ahead"))
     (folder / "angles.json").write_text(ANGLES.to_json())
     writer.write_task(folder, loaded)
-    a, b = (angle.ravel() for angle in np.meshgrid(np.arange(-90, 91, 45), np.arange(-90, 91, 45)))
-    planes = np.stack([a, b, -5 + ((a - 45) ** 2 + (b + 90) ** 2) / 1e4, 0 * a, 90 + 0 * a], axis=1)
-    header = "alpha_laser_deg,beta_laser_deg,J,alpha_rot_deg,beta_rot_deg"
-    np.savetxt(folder / "search.csv", planes, "%.5g", ",", header=header, comments="")
-    np.savetxt(folder / "axes.csv", AXES, "%.5g", ",", header="alpha_rot_deg,beta_rot_deg,J", comments="")
     writer.write_left_out(folder, [LeftOut("masked directions", EVIL, 12345, "square degrees")])
     save_picture(Figure(figsize=(1, 1)), folder / "density.png")
     (folder / "own_body.npz").write_bytes(self_occlusion_bytes(*own_body()))
@@ -148,10 +141,10 @@ def drawn(folder, angles, hidden):
     return scanner_scene(assembly, exploded, angles, hidden)
 
 
-def sphere(loaded, axes):
+def sphere(loaded):
     problem = problem_as_built(loaded, ANGLES)
     mounts = reference_mounts(problem, loaded.task)
-    return density_sphere(problem, ANGLES, mounts, axes, loaded.task.angles.step_deg)
+    return density_sphere(problem, ANGLES, mounts)
 
 
 def scene_of(text):

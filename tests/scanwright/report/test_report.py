@@ -16,15 +16,12 @@ from report_folder import ANGLES, EVIL, Page, scene_of
 from scanwright.cad.checks.checks_json import checks_text
 from scanwright.design.findings import Finding
 from scanwright.design.objective.holes import percent
-from scanwright.design.objective.problem import NODES, problem_of
-from scanwright.design.objective.score import quick_J, score
 from scanwright.design.self_occlusion import AXIS_STEPS, load_self_occlusion
-from scanwright.design.task.task import Limits, load_task
+from scanwright.design.task.task import load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_manifest
 from scanwright.report import page as report_page
 from scanwright.report.answer import answer
 from scanwright.report.assembly_steps import steps_html
-from scanwright.report.landscapes import other_mounts
 from scanwright.report.page import report_html
 
 PAGE = Path(report_page.__file__).parent
@@ -79,15 +76,13 @@ def test_the_page_states_what_the_files_state(folder, page):
     assert f"J = {seen.own.J} +- {seen.own.J_error}, with parts" in more and seen.own.J > ANGLES.J + 0.002
     assert "5,400 to 5,500 USD" in result and "Sum of 4" in page.text["parts"]
     hidden = (100 * AXIS_STEPS + 100 * 180) / (1081 * AXIS_STEPS)
-    assert f"{hidden:.1%} of all beams" in more and "of 1081 beams 100 always, 100 at some angles" in more
+    assert f"{hidden:.1%} of all beams" in more
     # rolling against itself without parts, and 40 lines a second over 18 s
     assert next(mount.factor for mount in seen.mounts if mount.name == "rolling") < 0.998
     assert seen.mounts[0].factor == min(mount.factor for mount in seen.mounts)
     assert f"{seen.mounts[0].factor:.2f} x {seen.mounts[0].name}" in result
     assert f"{1 / seen.mounts[0].factor:.2f}" in page.text["compare"]
     assert f"and {percent(seen.own.blind_fraction)} of the sphere" in more
-    # the field of view of 270 deg leaves 90 deg open, straight behind the axis that points ahead
-    assert "No beam enters the cone of 45.0 deg half angle about theta 90.0, phi 180.0" in more
 
 
 def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
@@ -103,10 +98,6 @@ def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
     assert said.masked_fraction == pytest.approx((1 - np.cos(np.radians(25))) / 2, abs=1e-6)
     assert own.line_gap_deg == rolling.seen.line_gap_deg == pytest.approx(0.5)
     assert own == rolling.seen != pitching.seen
-    assert said.worst == pytest.approx(1 - np.exp(-max(said.rises.values())), abs=1e-12)
-    problem = problem_of(load_task(Path("ground_ahead")))
-    off = [quick_J(problem, np.radians([0, 90 + d, 0, -90]), NODES) for d in (-1, 0, 1)]
-    assert said.rises["beta_rot"] == pytest.approx(max(off) - off[1], abs=1e-12)
 
 
 def test_another_objective_than_a_logarithm_makes_no_claim_of_factors():
@@ -205,42 +196,8 @@ def test_one_of_a_thing_is_not_told_as_many(tmp_path):
     assert "1 part" in left_out and "1 parts" not in left_out and "2 parts" in left_out
 
 
-def test_the_table_of_mounts_names_the_lowest(page):
-    more = " ".join(page.text["more"].split())
-    assert re.search(r"\dmet\b", more).start() < more.index("blind to"), "those that meet the task come first"
-    assert "25 mounts of the lidar on the axis, 325 mounts of the axis on the robot" in more
-
-
-def test_a_lower_j_that_is_blind_is_told_to_be_blind_and_what_seeing_costs():
-    """The setting of the shipped task that J alone would take, beside the best one without a hole."""
-    loaded = load_task(Path("ground_ahead"))
-    problem, built = problem_of(loaded), np.radians([0.0, -55.61, -78.72, 79.75])
-    planes = np.array([[-80.0, 75.0, -6.1285, 0.0, -55.0], [-80.0, 80.0, -6.128, 0.0, -55.0], [0.0, 0.0, np.inf, 0, 0]])
-    found = other_mounts(problem, loaded.task, built, planes)
-    ((kept,), (broken,)) = found.within, found.broken
-    assert (kept.angles_deg, kept.breaks) == ((0, -55, -80, 80), "")
-    assert (broken.angles_deg, broken.breaks) == ((0, -55, -80, 75), "blind to 0.019% of the weight")
-    assert broken.J < kept.J == score(problem, np.radians(kept.angles_deg)).J
-    assert (
-        "(0, -55, -80, 75) with J = -6.1284 would be best, which is blind ahead and 35 deg down: 0.58 deg"
-        in found.alone
-    )
-    assert found.alone.endswith("Keeping the requirements of the task costs 0.086% of the beams per ball.")
-    allowed = loaded.task.model_copy(update={"angles": loaded.task.angles.model_copy(update={"holes": "allow"})})
-    assert (
-        len(other_mounts(problem, allowed, built, planes).within) == 2
-        and not other_mounts(problem, allowed, built, planes).alone
-    )
-    limited = allowed.model_copy(update={"limits": Limits(min_density=50)})
-    (other,) = other_mounts(problem, limited, built, planes).broken
-    assert (other.angles_deg, other.breaks) == (broken.angles_deg, "breaks the limits")
-
-
-def test_the_manifest_in_the_page_is_that_of_the_folder(folder, page, text):
-    manifest = read_manifest(folder)
-    files = dict(re.findall(r">([^<]+)</a></td><td [^>]+>[^<]+</td><td><code>([0-9a-f]{64})</code>", text))
-    assert files == {name: facts["sha256"] for name, facts in manifest["files"].items() if name != "report.html"}
-    for name, version in manifest["versions"].items():
+def test_the_page_has_the_versions_of_the_manifest(folder, page):
+    for name, version in read_manifest(folder)["versions"].items():
         assert re.search(rf"{re.escape(name)}\s*{re.escape(version)}", page.text["more"])
 
 

@@ -1,9 +1,12 @@
 """What the studio makes of a task, without a page: paint, files, facts, and work that follows a hand."""
 
+import io
 import math
 import os
+import re
 import threading
 import time
+from base64 import b64decode
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.evaluation.metres import on_planes
@@ -26,6 +30,7 @@ from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.facts import Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
+from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.state import MOST_DABS, Canvas, Dab, Setting, painted
 from scanwright.studio.task_file import save_task, task_text
 from scanwright.studio.view import workers
@@ -185,17 +190,16 @@ def test_edges_lie_on_the_cones_of_the_task(loaded):
 
 
 @given(azimuth=st.floats(-3, 3), height=st.floats(-0.9, 0.9), off=st.floats(0, 0.95))
-def test_a_ray_meets_the_near_wall_from_outside_and_the_far_one_from_inside(azimuth, height, off):
+def test_a_ray_meets_the_far_wall(azimuth, height, off):
     eye = 3 * RADIUS_M * np.array([math.cos(azimuth), math.sin(azimuth), height])
     aside = np.cross(eye, [0.0, 0.0, 1.0])
     ray = off * RADIUS_M * aside / np.linalg.norm(aside) - eye
-    near, far = (direction_hit(eye, ray, inside=inside) for inside in (False, True))
-    for hit in (near, far):
-        assert np.linalg.norm(hit) == pytest.approx(1)
-        np.testing.assert_allclose(np.cross(RADIUS_M * hit - eye, ray), 0, atol=1e-9)
-    assert near @ eye > far @ eye
-    assert direction_hit(eye, eye, inside=True) is None
-    assert direction_hit(eye, (0.0, 0.0, 0.0), inside=True) is None
+    far = direction_hit(eye, ray)
+    assert np.linalg.norm(far) == pytest.approx(1)
+    np.testing.assert_allclose(np.cross(RADIUS_M * far - eye, ray), 0, atol=1e-9)
+    assert (RADIUS_M * far - eye) @ ray > -eye @ ray  # beyond the middle
+    assert direction_hit(eye, eye) is None
+    assert direction_hit(eye, (0.0, 0.0, 0.0)) is None
 
 
 def test_of_many_wishes_the_last_is_done_and_then_the_rest():
@@ -348,7 +352,7 @@ def test_what_is_kept_while_the_others_are_judged_again_stays_and_is_judged_by_t
     judging, kept_one = threading.Event(), threading.Event()
 
     class Slow:
-        settled = staticmethod(after.settled)
+        settled, references = staticmethod(after.settled), staticmethod(after.references)
 
         def exact(self, setting):
             judging.set()
@@ -363,5 +367,22 @@ def test_what_is_kept_while_the_others_are_judged_again_stays_and_is_judged_by_t
     name = kept.keep(SETTING)
     kept_one.set()
     thread.join(20)
-    assert controls.kept.options == ("rolling", "pitching", name) and ">A<" in controls.table.content
+    assert controls.kept.options == (*after.references(), name) and ">A<" in controls.table.content
+    assert {"rolling", "pitching", "upright, one tilt"} < set(controls.kept.options) and len(controls.kept.options) == 5
     assert f"{after.exact(SETTING).ratio:.2f} x" in controls.table.content
+
+
+def test_a_landscape_is_brightest_at_the_best_pair_and_covers_the_range_of_the_task():
+    alpha, beta = np.meshgrid(np.arange(-40.0, 41, 10), np.arange(0.0, 91, 10))
+    J = -2 + ((alpha - 20) ** 2 + (beta - 60) ** 2) / 1000
+    J[0, 0] = np.inf  # no mount there
+    rows = np.column_stack([alpha.ravel(), beta.ravel(), J.ravel()])
+    search = SimpleNamespace(axes=rows, planes=rows[:1])
+    html = pads_html(SimpleNamespace(search=search, problem=SimpleNamespace(objective=SimpleNamespace(name="log"))))
+    (png,) = re.findall(r"base64,([^\"]+)", html)
+    assert "left:38.9%;top:0.0%;width:22.2%;height:50.0%" in html
+    shade = np.asarray(Image.open(io.BytesIO(b64decode(png)))).astype(int).sum(axis=2)
+    row, column = np.argwhere(shade == shade.max()).mean(axis=0) / shade.shape
+    assert abs(-40 + 80 * column - 20) < 2 and abs(90 - 90 * row - 60) < 2
+    assert shade[-1, 0] == shade.min()
+    assert pads_html(None).count("sw-dot") == 2 and "<img" not in pads_html(None)
