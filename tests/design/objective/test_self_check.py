@@ -16,6 +16,7 @@ from scanwright.design.objective.drawn_regions import drawn_in, layers_of
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
 from scanwright.design.objective.self_check import require_counted
+from scanwright.design.search import families
 from scanwright.design.search.search import search
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
@@ -119,8 +120,9 @@ def test_an_optimum_on_a_field_that_loses_weight_does_not_leave_the_search(monke
     loaded = a_task([{"shape": "map", "file": "w.npy"}], maps=[cells])
     monkeypatch.setattr(polar_rule, "edge_corners", lambda _: Corners(np.empty((0, 3)), np.empty((0, 0))))
     monkeypatch.setattr(polar_rule, "is_total", lambda *_: True)
+    monkeypatch.setattr(families, "FAMILIES", 1)
     problem = problem_of(loaded)
-    best = search(problem, loaded.task.angles.model_copy(update={"step_deg": 30.0})).best[0]
+    best = search(problem, loaded.task.angles.model_copy(update={"step_deg": 45.0})).best[0]
     with pytest.raises(NumericalError):
         require_counted(loaded, best.angles_rad, best.score)
 
