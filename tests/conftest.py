@@ -271,9 +271,6 @@ alpha_rot_deg = 0
 beta_rot_deg = 35
 alpha_laser_deg = -20
 beta_laser_deg = -70
-[density]
-ball_radius_deg = 3.0
-tolerance = 0.01
 [[weight]]
 shape = "all"
 """
