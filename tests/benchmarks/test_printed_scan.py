@@ -8,6 +8,7 @@ from virtual_scanner import VirtualScanner
 
 from benchmarks.scanwright.printed.blocks import NUMBER, blocks_of
 from scanwright.design.angles import AngleSet
+from scanwright.firmware_io.calibration import entropy
 from scanwright.firmware_io.scan import lidar_scans
 
 TUTORIAL = (Path(__file__).parents[2] / "docs/tutorial.md").read_text(encoding="utf-8")
@@ -35,6 +36,7 @@ def run(monkeypatch, tmp_path, command):
     """Run the command of a block of the page here; what it prints, and what the page shows."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(lidar_scans, "_CLOCK_LEAST_S", 0.3)
+    monkeypatch.setattr(entropy, "_SAMPLE", 4000)
     FOLDER.mkdir(parents=True)
     (FOLDER / "angles.json").write_text(SCANNER.to_json())
     VirtualScanner(SCANNER).install(monkeypatch)

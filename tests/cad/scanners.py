@@ -11,7 +11,7 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import NO_MODULES, scanner_of
 
 RING, CAPSULE = "SNU11-P0210", "SRC022A-6"
-GROUND_AHEAD, ROLLING, PITCHING, UPRIGHT = (0, -55, -80, 75), (0, 90, 0, -90), (-90, 0, 90, 0), (0, 0, 60, -30)
+GROUND_AHEAD, ROLLING, UPRIGHT = (0, -55, -80, 75), (0, 90, 0, -90), (0, 0, 60, -30)
 TILTED = (0, 35, -20, -70)
 """alpha_rot, beta_rot, alpha_laser and beta_laser in degrees."""
 

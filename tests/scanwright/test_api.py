@@ -118,16 +118,6 @@ def test_a_notebook_goes_from_a_table_to_arrays_without_a_file(tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
-def test_a_linkage_comes_as_a_shape_of_cadquery():
-    import cadquery as cq
-
-    parts = sw.make_parts(TASK, sw.optimise(TASK).angle_set())
-    linkage = parts.made["alignment_linkage"]
-    assert isinstance(linkage, cq.Solid)
-    assert linkage.isValid()
-    assert 20e3 < linkage.Volume() < 200e3  # mm3
-
-
 def test_a_recording_comes_as_arrays(tmp_path):
     from scanwright.firmware_io.recording.recording import recording_writer
     from scanwright.firmware_io.samples import Scan

@@ -7,12 +7,14 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scanners import PITCHING, scanner_at
+from scanners import scanner_at
 
 from scanwright.cad.assembly.shadow import PartsWorkshop, shadow_of, triangles_of
 from scanwright.cad.checks.beams import beam_checks
 from scanwright.design.search.with_parts import Refused, Workshop
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion, self_occlusion_bytes
+
+LYING = (0, 0, 90, 0)  # whose parts other tests use too
 
 
 def scanner_for(*setting_deg):
@@ -20,14 +22,14 @@ def scanner_for(*setting_deg):
 
 
 @pytest.fixture(scope="module")
-def pitching(parts_of):
-    scanner = scanner_for(*PITCHING)
+def lying(parts_of):
+    scanner = scanner_for(*LYING)
     assembly = parts_of(scanner)
     return scanner, assembly, shadow_of(scanner, triangles_of(assembly), assembly.turning())
 
 
 def rays(gamma):
-    """Middle rays of the pitching fan in the rotation frame: R_rot_laser = Rx(90 deg)."""
+    """Middle rays of the fan in the rotation frame: R_rot_laser = Rx(90 deg)."""
     bearing = np.radians(np.arange(-540, 541) * 0.25)
     fan = np.stack([np.cos(bearing), 0 * bearing, np.sin(bearing)], axis=1)
     c, s = np.cos(gamma), np.sin(gamma)
@@ -39,8 +41,8 @@ def other_caster(meshes):
     return trimesh.ray.ray_triangle.RayMeshIntersector(trimesh.util.concatenate(bodies))  # rtree and numpy, no embree
 
 
-def test_hidden_beams_are_those_of_another_caster_and_no_more_than_a_beam_is_wide(pitching):
-    _, assembly, shadow = pitching
+def test_hidden_beams_are_those_of_another_caster_and_no_more_than_a_beam_is_wide(lying):
+    _, assembly, shadow = lying
     meshes = assembly.meshes()
     assert shadow.stator.shape == (1081, AXIS_STEPS)
     some = np.arange(0, 1081, 9)
@@ -59,15 +61,15 @@ def test_hidden_beams_are_those_of_another_caster_and_no_more_than_a_beam_is_wid
         assert hit.any()
 
 
-def test_only_beams_that_look_down_meet_what_stands_still(pitching):
-    _, _, shadow = pitching
+def test_only_beams_that_look_down_meet_what_stands_still(lying):
+    _, _, shadow = lying
     down = rays(0.0)[:, 2] < -0.5
     assert not shadow.stator[~down].any() and shadow.stator[down].any()
     assert np.array_equal(shadow.hidden() == 1, shadow.beams | shadow.stator.all(axis=1))
 
 
-def test_a_part_in_the_way_is_seen_and_only_while_it_is_there(pitching):
-    scanner, assembly, before = pitching
+def test_a_part_in_the_way_is_seen_and_only_while_it_is_there(lying):
+    scanner, assembly, before = lying
     post = trimesh.creation.box((10, 10, 10))
     post.apply_translation([200, 0, 0])  # in the fan when gamma = 0, 2.9 deg wide from here
     more = triangles_of(assembly) | {"a_post": post.triangles / 1000}
@@ -79,10 +81,10 @@ def test_a_part_in_the_way_is_seen_and_only_while_it_is_there(pitching):
     assert np.array_equal(after.beams, before.beams)
 
 
-def test_the_bound_hides_nothing_that_the_parts_do_not(pitching):
-    scanner, _, shadow = pitching
+def test_the_bound_hides_nothing_that_the_parts_do_not(lying):
+    scanner, _, shadow = lying
     workshop: Workshop = PartsWorkshop(scanner)
-    bound = workshop.bound(np.radians(PITCHING))
+    bound = workshop.bound(np.radians(LYING))
     assert bound.stator is None and 100 < bound.beams.sum()
     assert (shadow.hidden()[bound.beams] == 1).all()
 
@@ -103,13 +105,13 @@ def test_the_bound_is_a_cone_about_the_axis(alpha, beta):
 
 
 def test_what_cannot_be_built_is_refused_with_the_reason():
-    workshop = PartsWorkshop(scanner_for(*PITCHING))
+    workshop = PartsWorkshop(scanner_for(*LYING))
     for answer in (workshop.bound(np.radians([0, 0, 120, 0])), workshop.shadow(np.radians([0, 0, 120, 0]))):
         assert isinstance(answer, Refused) and "upside down" in answer.reason
 
 
-def test_own_body_is_the_same_bytes_and_reads_back(pitching):
-    scanner, _, shadow = pitching
+def test_own_body_is_the_same_bytes_and_reads_back(lying):
+    scanner, _, shadow = lying
     bearings = scanner.lidar.bearings_rad()
     data = self_occlusion_bytes(shadow, bearings)
     assert data == self_occlusion_bytes(shadow, bearings)

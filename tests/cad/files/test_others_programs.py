@@ -49,8 +49,9 @@ def test_freecad_is_believed_because_it_sees_a_shell_that_is_open(made, tmp_path
 @pytest.mark.parametrize(
     "setting", samples(SETTINGS, ("lying",))
 )  # it has a mount too; the others: a minute of CalculiX each
-def test_the_stated_error_of_a_bend_covers_what_calculix_finds(made, parts_of, tmp_path, setting):
+def test_the_stated_error_of_a_bend_covers_what_calculix_finds(made, parts_of, tmp_path, setting, monkeypatch):
     needs("gmsh", "ccx")
+    monkeypatch.setattr(elements, "EDGE_MM", 8.0)
     scanner, assembly = made.scanner, made.result.assembly
     if SETTINGS[setting] is not None:
         angles, products = SETTINGS[setting]

@@ -192,7 +192,7 @@ DAILY = (  # every way to hold something, and every part that takes a screw, onc
     "a sub-plate in nuts",
     "small, without a ring",
     "printed throughout, inserts",
-    "as it ships",
+    "tilted, with a bearing",
     "a belt on a tripod, nuts M5",
 )
 

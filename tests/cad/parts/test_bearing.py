@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from quick_tests import samples
 from scanners import GROUND_AHEAD, ROLLING, digest_of, scanner_at
 
-from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies, rotor_weight
 from scanwright.cad.checks.loads.mechanics import mechanics_checks
 from scanwright.cad.geometry.mesh import checked_mesh
@@ -77,7 +76,7 @@ def test_the_horn_stays_within_its_rating(made):
     weight = rotor_weight(scanner, assembly.layout.stack, bodies)
     limit = scanner.servo.radial_load_n * 0.010
     assert weight.moment_nm > limit  # so it needs the bearing
-    assert _tilt_moment(scanner, assembly).severity == "ok"
+    assert _tilt_moment(assembly.layout, link_bodies(scanner, assembly)).severity == "ok"
     left_out = [
         entry.what for entry in assembly.layout.left_out if entry.unit == "parts" and entry.what not in ASKED_FOR
     ]
@@ -154,17 +153,16 @@ def test_an_upright_axis_is_left_without_and_says_so():
     assert drive_of(weak).stack.bearing.name == "61806-2RS"
 
 
-def test_none_of_the_catalogue_fits():
+def test_none_of_the_catalogue_fits(parts_of):
     scanner = replace(scanner_for(*ROLLING), bearings=())
-    assembly = make_parts(scanner)
-    assert "bearing_cage" not in assembly.made
-    check = _tilt_moment(scanner, assembly)
+    layout, with_bearing = laid_out(scanner), parts_of(scanner_for(*ROLLING))
+    assert drive_of(scanner).of(BearingCage) is None
+    check = _tilt_moment(layout, link_bodies(scanner, with_bearing))
     assert check.severity == "error" and "none of the catalogue fits" in check.hint
 
 
-def _tilt_moment(scanner, assembly):
-    checks = mechanics_checks(assembly.layout, link_bodies(scanner, assembly))
-    return next(check for check in checks if check.code == "tilt_moment")
+def _tilt_moment(layout, bodies):
+    return next(check for check in mechanics_checks(layout, bodies) if check.code == "tilt_moment")
 
 
 def test_a_case_without_ears_around_the_flange_is_refused():

@@ -59,7 +59,7 @@ def merged(vertices, faces):
     return trimesh.Trimesh(points, faces[keep], process=False)
 
 
-@pytest.fixture(scope="module", params=samples(SETTINGS, ("upright", "ground_ahead")))
+@pytest.fixture(scope="module", params=samples(SETTINGS, ("ground_ahead",)))
 def built(request, built_once):
     setting = SETTINGS[request.param]
     scanner = scanner_for(request.param)

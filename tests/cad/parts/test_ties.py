@@ -11,6 +11,7 @@ from scanwright.cad.layout.cables.leads import tied_mm
 from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS
+from scanwright.cad.parts.all_parts import laid_out
 
 TIE = (2.5, 1.1)  # width and thickness
 
@@ -92,7 +93,7 @@ def test_a_tie_that_went_in_under_the_bar_is_closed_and_no_other_asked_for(tied)
     assert ("Pull a cable tie through the two slots of the hub's tongue" in words) != waits
 
 
-def test_what_has_no_tongue_is_told(parts_of):
-    assembly = parts_of(scanner_at((0, 19, 84, 41), sensor="URG-04LX", slip_ring=CAPSULE))
-    (told,) = [entry for entry in assembly.layout.left_out if entry.what == HUB_TIE]
-    assert assembly.layout.linkage.hub_tie is None and "hollow shaft" in told.why
+def test_what_has_no_tongue_is_told():
+    layout = laid_out(scanner_at((0, 19, 84, 41), sensor="URG-04LX", slip_ring=CAPSULE))
+    (told,) = [entry for entry in layout.left_out if entry.what == HUB_TIE]
+    assert layout.linkage.hub_tie is None and "hollow shaft" in told.why

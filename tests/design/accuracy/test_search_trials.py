@@ -18,15 +18,15 @@ def rows_of(path):
 def test_what_is_spent_on_a_search_and_what_it_gains(tmp_path, monkeypatch):
     monkeypatch.setattr(families, "FAMILIES", 1)  # nobody looks at the ones behind
     monkeypatch.setattr(search_trials, "TASKS", 1)
-    monkeypatch.setattr(search_trials, "STEPS_DEG", (30.0, 15.0))
+    monkeypatch.setattr(search_trials, "STEPS_DEG", (45.0, 30.0))
     values = {"fineness": (1.0,), "margin": (0.0,), "rounds": (0, 2)}
     efforts = [(choice, field, label, values[field]) for choice, field, label, _ in search_trials.EFFORTS]
     monkeypatch.setattr(search_trials, "EFFORTS", efforts)
     loaded = load_task(Path("ground_ahead"))
-    coarse = loaded.task.angles.model_copy(update={"step_deg": 15.0})
+    coarse = loaded.task.angles.model_copy(update={"step_deg": 30.0})
     told = report_search(replace(loaded, task=loaded.task.model_copy(update={"angles": coarse})), tmp_path, no_progress)
     rows = rows_of(tmp_path / "search.csv")
-    assert {row["setting"] for row in rows if row["chosen"] == "true"} == {"15 deg", "1 times", "2 rounds"}
+    assert {row["setting"] for row in rows if row["chosen"] == "true"} == {"30 deg", "1 times", "2 rounds"}
     lost = {row["setting"]: float(row["error"]) for row in rows}
     assert min(lost.values()) >= search_trials.LEAST_REGRET
     assert lost["0 rounds"] > 10 * lost["2 rounds"], "an answer of the grid is not refined"

@@ -96,7 +96,7 @@ def test_no_setting_of_the_whole_grid_is_better_and_the_best_is_found(name):
 
 
 @pytest.mark.usefixtures("unrefined")
-@pytest.mark.parametrize("sensor", ["UTM-30LX", "URG-04LX", "LD19"])
+@pytest.mark.parametrize("sensor", ["UTM-30LX", "LD19"])
 def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor):
     """Every direction has a weight here and none like its mirror image, so nothing but symmetry makes J equal."""
     uneven = {"weight": [{"shape": "all", "value": 0.2}, LEFT["weight"][0]]}
@@ -108,8 +108,7 @@ def test_the_members_of_a_family_are_as_many_as_the_settings_of_its_J(sensor):
 
 
 @pytest.mark.usefixtures("unrefined")
-@pytest.mark.parametrize("ball_radius_deg", [0.25, 0.5, 1.0])
-@pytest.mark.parametrize("period_s", [2.0, 18.0])
+@pytest.mark.parametrize(("ball_radius_deg", "period_s"), [(0.25, 2.0), (0.25, 18.0), (1.0, 2.0)])
 def test_the_coarse_J_of_the_search_is_no_further_off_than_its_margin(ball_radius_deg, period_s):
     """`MARGIN` decides which scan planes are never looked at: small balls and fast turns included."""
     problem, ranges = case(AHEAD, {"step_deg": 30}, period_s=period_s, ball_radius_deg=ball_radius_deg)
@@ -167,11 +166,10 @@ def test_all_is_covered_with_fewer_evaluations():
 def test_the_number_of_threads_changes_no_digit(monkeypatch):
     monkeypatch.setattr(families, "FAMILIES", 3)
     problem, ranges = CASES["all four free, two seconds"]
-    one, *others = (found_with(cores, problem, ranges, monkeypatch) for cores in (1, 3, 7))
-    for other in others:
-        assert other.best == one.best and len(one.best) == 3
-        np.testing.assert_array_equal(other.planes, one.planes)
-        assert (other.covered, other.evaluated, other.left_out) == (one.covered, one.evaluated, one.left_out)
+    one, other = (found_with(cores, problem, ranges, monkeypatch) for cores in (1, 3))
+    assert other.best == one.best and len(one.best) == 3
+    np.testing.assert_array_equal(other.planes, one.planes)
+    assert (other.covered, other.evaluated, other.left_out) == (one.covered, one.evaluated, one.left_out)
 
 
 def found_with(cores, problem, ranges, monkeypatch):

@@ -28,6 +28,7 @@ from benchmarks.firmware_io.rooms import (
 from scanwright.design.angles import load_angles
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording
+from scanwright.firmware_io.calibration import entropy
 from scanwright.firmware_io.calibration.estimate import estimate
 from scanwright.firmware_io.calibration.model import PARAMETERS, gather
 from scanwright.firmware_io.recording.importer import import_bag
@@ -36,6 +37,12 @@ from scanwright.firmware_io.recording.recording import open_recording
 KEYS = [parameter.name for parameter in PARAMETERS]
 TRUTH = Truth(*np.radians([2.0, -1.0]), 0.01, -0.008, 0.005, *np.radians([0.2, -0.3, 0.1, 0.05]))
 QUICK = Setup(beams=180)
+
+
+@pytest.fixture(autouse=True)
+def few_points(monkeypatch):
+    """The entropy of fewer points: the pairs of them grow with the square."""
+    monkeypatch.setattr(entropy, "_SAMPLE", 4000)
 
 
 def errors(found, truth):

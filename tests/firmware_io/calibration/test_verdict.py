@@ -10,6 +10,7 @@ from benchmarks.firmware_io.calibration import designed, faulty, mount_of
 from benchmarks.firmware_io.calibration_errors import BEAMS, STEP_DEG, case
 from benchmarks.firmware_io.rooms import FURNISHED, NAMES, Setup, Truth, Unrest, simulate, write
 from scanwright.design.angles import STANDARD_DEG
+from scanwright.firmware_io.calibration import entropy
 from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 from scanwright.firmware_io.calibration.entropy import _areas, _between, witness
 from scanwright.firmware_io.calibration.estimate import estimate
@@ -29,6 +30,12 @@ TRUE = np.array([getattr(faulty(2), name) for name in NAMES])
 def calibrated(folder, scene_motion, setup=PITCHING):
     recording = write(folder / "r.mcap", simulate(FURNISHED, setup, faulty(2), 7, scene_motion))
     return calibrate_recordings([recording], designed(setup), folder / "a.json").record
+
+
+@pytest.fixture(autouse=True)
+def few_points(monkeypatch):
+    """The entropy of fewer points: the pairs of them grow with the square."""
+    monkeypatch.setattr(entropy, "_SAMPLE", 4000)
 
 
 @pytest.fixture(scope="module")
@@ -183,8 +190,9 @@ def test_a_wrong_answer_is_less_crisp(beams):
     assert not replace(seen, before=5.0, after=5.001, change_sd=1e-5).less_crisp  # sure, but nobody can see it
 
 
-def test_grids_that_fall_on_each_other_are_no_crispness(tmp_path):
+def test_grids_that_fall_on_each_other_are_no_crispness(tmp_path, monkeypatch):
     """A rolling scanner's two sides look in the same directions if it is as designed, which this one is not."""
+    monkeypatch.setattr(entropy, "_SAMPLE", 15_000)
     room, setup, truth = case(1086)
     recording = open_recording(write(tmp_path / "r.mcap", simulate(room, setup, truth)))
     beams = gather([recording], one_place=True)[0]

@@ -20,7 +20,6 @@ from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.lidar.scip import dialogue
 from scanwright.firmware_io.recording.repair.repair import repair
 from scanwright.firmware_io.scan import lidar_scans
-from scanwright.firmware_io.servo.servo import open_servo
 
 ROOT = Path(__file__).parents[3]
 
@@ -165,15 +164,6 @@ def test_a_scanner_is_not_emulated_twice_nor_where_nothing_is_to_be_seen(out, co
     code, _, complaints = command("emulate", out, "--at", 500, 0, 0)
     assert code == 2
     assert "no surface within 30 m" in complaints[0]
-
-
-SERVOS = [("MX-64R", "1.0"), ("XM430-W350", "2.0"), ("STS3215", "STS")]
-
-
-@pytest.mark.parametrize(("servo", "protocol"), SERVOS)
-def test_a_servo_is_emulated_as_it_comes_from_the_factory(servo, protocol):
-    with emulated_scanner(angle_set(servo=servo), room(None)) as emulators, open_servo(emulators.ports.servo) as opened:
-        assert (opened.model, opened.protocol) == (servo, protocol)
 
 
 @pytest.fixture

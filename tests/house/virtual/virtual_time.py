@@ -25,9 +25,8 @@ class VirtualTime:
     def __init__(self):
         self.now_ns = 10**12
         self.wall_minus_monotonic_ns = 10**18
-        self._turn = threading.Condition()
-        self._running = threading.get_ident()
         self._waiting = {}  # thread -> until when, and what ends its wait before
+        self._gates = {}  # thread -> a lock that opens when it is its turn: a condition would wake all of them
 
     def monotonic(self):
         return self.now_ns / 1e9
@@ -55,18 +54,24 @@ class VirtualTime:
     def wait(self, until_ns, ended=lambda: False):
         """Let the others run until then, or until something is so."""
         me = threading.get_ident()
-        with self._turn:
-            self._waiting[me] = until_ns, ended
-            self._next()
-            while self._running != me:
-                self._turn.wait()
+        self._waiting[me] = until_ns, ended
+        if not self._next(me):
+            self._gate(me).acquire()
 
-    def _next(self):
+    def _gate(self, thread):
+        shut = threading.Lock()
+        shut.acquire()
+        return self._gates.setdefault(thread, shut)
+
+    def _next(self, me=None):
+        """Go on to the thread that is due first; return whether that is the one that asks."""
         due_ns = {one: self.now_ns if ended() else until for one, (until, ended) in self._waiting.items()}
-        self._running = min(due_ns, key=due_ns.get)
-        self.now_ns = max(self.now_ns, due_ns[self._running])
-        del self._waiting[self._running]
-        self._turn.notify_all()
+        running = min(due_ns, key=due_ns.get)
+        self.now_ns = max(self.now_ns, due_ns[running])
+        del self._waiting[running]
+        if running != me:
+            self._gate(running).release()
+        return running == me
 
     def put_in_place_of_time(self, monkeypatch, *packages):
         """In all modules of packages that have been imported."""
@@ -139,20 +144,15 @@ class _Thread(threading.Thread):
 
     def start(self):
         super().start()
-        with self._clock._turn:
-            self._clock._waiting[self.ident] = self._clock.now_ns, lambda: False
+        self._clock._waiting[self.ident] = self._clock.now_ns, lambda: False
 
     def run(self):
-        clock, me = self._clock, threading.get_ident()
-        with clock._turn:
-            while clock._running != me:
-                clock._turn.wait()
+        self._clock._gate(threading.get_ident()).acquire()
         try:
             super().run()
         finally:
-            with clock._turn:
-                self._over = True
-                clock._next()
+            self._over = True
+            self._clock._next()
 
     def join(self, timeout=None):
         self._clock.wait(self._clock.now_ns + 10**15, lambda: self._over)

@@ -219,6 +219,7 @@ def test_ctrl_c_waits_until_all_files_are_moved(tmp_path, monkeypatch):
 
 REBUILD = """
 import sys
+import without_posix
 from scanwright.cad.assembly.assembly import alone
 from scanwright.cad.files.step import step_text
 from scanwright.cad.solids import box
@@ -236,7 +237,7 @@ def test_another_process_builds_the_same_bytes_and_finds_the_one_file_that_was_t
     assert max(FILES - {"manifest.json"}) == "wiring.svg"
     (tmp_path / "rebuild.py").write_text(REBUILD)
     words = [sys.executable, tmp_path / "rebuild.py", "build", "--check", tilted]
-    environment = os.environ | {"PYTHONHASHSEED": "4242", "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"PYTHONHASHSEED": "4242", "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests' / 'house'}"}
     done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=BOUND_S)
     drawing.write_bytes(kept)
     assert done.returncode == 1, done.stderr

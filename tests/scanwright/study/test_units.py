@@ -24,7 +24,7 @@ from scanwright.study.table import write_answer
 from scanwright.study.units import Crew, Unit, do, finished
 from scanwright.study.workers import crew_of
 
-UNITS, SECONDS = 12, 0.1
+UNITS, SECONDS = 8, 0.1
 
 
 def unit(name, function, *arguments):
@@ -34,9 +34,9 @@ def unit(name, function, *arguments):
 @pytest.mark.parametrize("over_dask", [False, True])
 def test_killed_processes_change_nothing_and_are_told_in_one_line(tmp_path, over_dask):
     # the scheduler and its worker are started by Dask's own commands and talk over TCP
-    kills = [("worker", 0.05), ("scheduler" if over_dask else "client", 0.05)]
+    kills = [("worker", 0.05), ("scheduler", 0.05)] if over_dask else [("client", 0.05)]
     starts, twice = disturbed(kills, UNITS, SECONDS, tmp_path, workers=int(over_dask))
-    assert starts == len(kills) and twice <= len(kills)  # at most what was at work when it was killed
+    assert starts == 2 and twice <= len(kills)  # at most what was at work when it was killed
     told = (tmp_path / "client.log").read_text()
     if over_dask:  # of all clients, and nothing of Dask's
         assert told.count("\n") == 1
