@@ -136,9 +136,9 @@ def test_wires_of_the_ring_pass_the_bearing(made):
     azimuth = sum(assembly.layout.linkage.cross_azimuths) / 2
     out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     radius = stack.bearing.bore_mm / 2 - 2.5
-    start = radius * out + [0, 0, stack.ring_top + 1]
+    start = radius * out + [0, 0, stack.leads_low + 1]
     for mesh in (mesh for name, mesh in meshes.items() if not name.startswith(ROTOR_LEAD)):
-        # straight up from the ring's end face, then out above the cage
+        # straight up from the end of the ring's collar, then out above the cage
         up = mesh.ray.intersects_location([start], [[0, 0, 1.0]])[0]
         assert not (up[:, 2] < stack.shoulder + 6).any()
         aside = mesh.ray.intersects_location([[*(radius * out)[:2], stack.shoulder + 4]], [out])[0]
