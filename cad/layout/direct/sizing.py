@@ -74,10 +74,13 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         bearing=None,
         sub_plate=None,
     )
-    needs_bearing = _needs_bearing(scanner, alone)
-    if needs_bearing and ring is not None:
-        ears_of(scanner, alone)  # raises what no other ring mends before what one mends
-    bearing = bearing_for(scanner, alone) if needs_bearing else None
+    bearing = None
+    if _needs_bearing(scanner, alone):
+        try:
+            bearing = bearing_for(scanner, alone)
+        except BuildError:
+            ears_of(scanner, alone)  # first what no other ring can correct
+            raise
     return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
 
 

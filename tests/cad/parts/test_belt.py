@@ -35,7 +35,6 @@ from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.outlines import polygon
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.cad.parts.bearing_tower import bearing_tower
-from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import prism, upright
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.holes import Hole
@@ -458,12 +457,6 @@ def test_what_else_cannot_be_built_is_refused():
 def test_a_capsule_that_contradicts_itself_is_refused(change, words):
     with pytest.raises(ValueError, match=words):
         with_ring(**change)
-
-
-def test_a_ring_with_a_bore_keeps_its_digest():
-    ring = load_catalogue().get("SNU11-P0210", SlipRing)
-    assert "flange" not in ring.model_dump() and "rotor" not in ring.model_dump()
-    assert SCREWS[load_catalogue().get(CAPSULE, SlipRing).flange.screw].nominal == 5.0
 
 
 def test_nuts_of_the_standard_go_into_the_tower_and_hold():

@@ -44,7 +44,7 @@ def test_every_servo_and_ring_that_is_named_can_be_laid_out_and_is_strong_enough
     assert 1 <= len(named) <= 3 and len(set(named)) == len(named)
     for servo, ring in (pair.split(" and ") for pair in named):
         placement_of(loaded.scanner(angles.model_copy(update={"servo": servo, "slip_ring": ring})))
-        assert loaded.products.get(servo, Servo).continuous_torque_nm > 1.0  # 4.5 kg
+        assert loaded.products.get(servo, Servo).continuous_torque_nm > 0.2  # upright: friction of the ring and spin-up
 
 
 def test_a_lidar_that_nothing_holds_is_said_to_be_so(tmp_path):
