@@ -35,6 +35,7 @@ def optimise(
         from scanwright.design.evaluation.landscape_picture import landscape_picture
 
         picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
+    from scanwright.design.evaluation.coverage import hidden_lines
     from scanwright.design.evaluation.metres import on_planes
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
@@ -49,6 +50,7 @@ def optimise(
             [
                 *optimum.lines(verbosity() is Verbosity.VERBOSE),
                 *scan,
+                *hidden_lines(optimum.asked),
                 *(f"warning: {warning}" for warning in optimum.asked.warnings()),
             ]
         )

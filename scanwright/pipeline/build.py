@@ -64,6 +64,7 @@ class Made:
         as_built: what it sees, without the beams that its parts block.
         findings: what a person should know before the parts are made.
         planes: what one full scan leaves on ground, ceiling and walls of the task.
+        hidden: which shares of the regions the masks hide, in words.
     """
 
     optimum: Optimum
@@ -71,6 +72,7 @@ class Made:
     as_built: AsBuilt
     findings: tuple[Finding, ...]
     planes: tuple[PlaneFigures, ...]
+    hidden: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,7 @@ class Build:
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
+            *self.made.hidden,
             *(f"warning: {warning}" for warning in self.warnings),
             *finding_lines(self.made.findings, self.checks, in_full),
         ]
@@ -294,6 +297,7 @@ def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     """Run all stages in order."""
     from scanwright.design.evaluation.as_built import as_built
+    from scanwright.design.evaluation.coverage import hidden_lines
     from scanwright.design.evaluation.metres import on_planes
     from scanwright.design.search.optimum import find_optimum
 
@@ -332,4 +336,4 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         records.write_report(work, begin)
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
-    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes)
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, tuple(hidden_lines(loaded)))

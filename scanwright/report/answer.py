@@ -9,7 +9,7 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
-from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.coverage import coverage, hidden_lines
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.tolerance import sensitivity
 from scanwright.design.search.with_parts import checked_score
@@ -28,6 +28,7 @@ class BuildAnswer:
         as_built: what it sees with its parts, and the reference mounts.
         ball_deg: within which a beam counts for a direction.
         rises: without parts, by mounting angle: how much J rises if it alone is 1 deg off, the worse direction.
+        hidden: which shares of the regions the masks hide, in words.
         worst: the largest of `rises` as the share of beams per direction that it costs; None if J is no logarithm.
     """
 
@@ -38,6 +39,7 @@ class BuildAnswer:
     beams: int
     rises: dict[str, float]
     worst: float | None
+    hidden: tuple[str, ...] = ()
 
 
 def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None) -> BuildAnswer:
@@ -59,6 +61,7 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = 
         beams=len(problem.bearings_rad),
         rises=rises,
         worst=float(-np.expm1(-max(0.0, *rises.values()))) if problem.objective.name == "log" else None,
+        hidden=tuple(hidden_lines(loaded)),
     )
 
 

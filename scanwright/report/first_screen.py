@@ -124,7 +124,9 @@ def _sees(answer: BuildAnswer, planes: Sequence[PlaneFigures]) -> Card:
     lines = f"Scan lines at most {own.line_gap_deg:.2f} deg apart, {rounded(gap_mm)} mm at {GAP_M:g} m."
     unseen = own.blind_weight > NO_BLIND_WEIGHT
     headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
-    text = [f"{_capital(figures.words())}." for figures in planes]
+    if answer.hidden:
+        headline += ", except behind the robot"
+    text = [f"{_capital(words)}." for words in (*answer.hidden, *(figures.words() for figures in planes))]
     if own.blind:
         text.append(f"{_capital(', '.join(words.partition(':')[0] for words in own.blind))}.")
     elif not planes:
