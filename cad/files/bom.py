@@ -25,7 +25,7 @@ from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
-from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of
+from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of, uart_adapter
 from scanwright.design.scanner import Scanner
 
 JOINTS = "joints of the layout"
@@ -192,10 +192,14 @@ def _wiring(scanner: Scanner) -> Iterator[BomItem]:
         if ring is not None:
             note = "on the rotor, on leads of the slip ring"
             yield BomItem("wiring", connector.words, source=WIRING_TEXT, note=note, estimate="plug and socket")
-    if ring is not None:
+    if adapter := uart_adapter(lidar):
+        note = "joins the lidar's data to the computer; not RS-232, not 5 V"
+        yield BomItem("wiring", adapter, source=WIRING_TEXT, note=note, estimate="UART adapter")
+    elif ring is not None:
         yield BomItem(
             "wiring", f"{plug_of(lidar)} plug with bare leads", source=WIRING_TEXT, estimate="plug and socket"
         )
+    if ring is not None:
         part, source = "crimps and heat shrink for the leads of the slip ring", f"circuits: {ring.circuits}"
         yield BomItem("wiring", part, source=source, estimate="crimps")
 

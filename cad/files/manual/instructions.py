@@ -18,7 +18,7 @@ from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import measure_first
 from scanwright.design.catalogue.product_base import Product
-from scanwright.design.electrics.wiring import network_of
+from scanwright.design.electrics.wiring import network_of, uart_adapter
 from scanwright.design.scanner import Scanner
 
 NUTS = (
@@ -33,9 +33,9 @@ LOCKED = (
 LOOK = "Look, then wire"
 HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
 LAST = "Turn the linkage by hand through its range: nothing touches, no cable pulls tight. "
-TO_COMPUTER = "Then join the leads of the ring's stator to USB and power."
-THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
-IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to USB and power."
+TO_COMPUTER = "Then join the leads of the ring's stator to {port} and power."
+THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to {port} and power."
+IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to {port} and power."
 
 
 def instructions_text(
@@ -104,11 +104,11 @@ def instructions_text(
 
 def _joined(assembly: Assembly) -> str:
     """Return what to connect when all parts are together: leads with a path are connected in their own step."""
-    if assembly.layout.scanner.slip_ring is None:
-        return IN_A_LOOP
-    leads = assembly.layout.leads
+    scanner, leads = assembly.layout.scanner, assembly.layout.leads
     laid = leads and all(lead.path is not None for lead in leads)
-    return TO_COMPUTER if laid else THROUGH_RING
+    words = IN_A_LOOP if scanner.slip_ring is None else TO_COMPUTER if laid else THROUGH_RING
+    adapter = uart_adapter(scanner.lidar)
+    return words.format(port=f"the {adapter}" if adapter else "its port of the computer")
 
 
 def _misfits(products: Sequence[Product]) -> Iterator[str]:
