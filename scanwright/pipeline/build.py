@@ -65,6 +65,7 @@ class Made:
         findings: what a person should know before the parts are made.
         planes: what one full scan leaves on ground, ceiling and walls of the task.
         hidden: which shares of the regions the masks hide, in words.
+        to_make: how many parts to print and to have machined, and the time to print.
     """
 
     optimum: Optimum
@@ -73,6 +74,7 @@ class Made:
     findings: tuple[Finding, ...]
     planes: tuple[PlaneFigures, ...]
     hidden: tuple[str, ...]
+    to_make: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +109,7 @@ class Build:
         optimum = self.made.optimum
         return [
             f"wrote {len(self.files)} files to {self.folder}",
+            f"parts to make: {self.made.to_make}",
             *(optimum.table() if in_full else [*optimum.hole_lines(tabled=False), *optimum.preferred_lines()]),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
@@ -308,6 +311,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
+        from scanwright.report.parts_list import read_parts
 
         made = begin(_chosen_and_made, optimum, requested.sha256(), {}, progress)
         begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
@@ -334,6 +338,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         write_manifest(work, requested, [asdict(part) for part in parts.parts])
         progress("writing report.html")
         records.write_report(work, begin)
+        to_make = read_parts(work / "bom.csv").to_make
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
-    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, tuple(hidden_lines(loaded)))
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, tuple(hidden_lines(loaded)), to_make)

@@ -85,7 +85,7 @@ def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList 
         text = "It shows which clearance your printer needs. Write the result into the printer's catalogue file."
         todo.append(ToDo("Print the fit coupon", text, ("print/fit_coupon.3mf",)))
     if parts is not None:
-        text = "Lidar, servo and slip ring first: they decide the delivery date."
+        text = f"{_capital(' and '.join(parts.bought.values()) or 'devices')} first: they decide the delivery date."
         todo.append(ToDo("Order devices, screws and wiring", text, ("#parts", "bom.csv")))
     machined = parts.group("turned") if parts is not None else None
     if machined is not None:
@@ -94,6 +94,8 @@ def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList 
         todo.append(ToDo(f"Have {count(len(sheets), 'part')} machined", text, sheets))
     if plates := tuple(sorted(name for name in files if name.startswith("print/plate_") and name.endswith(".3mf"))):
         text = "The files set layers and lines in PrusaSlicer; set them yourself in other slicers."
+        if parts is not None and parts.printing:
+            text = f"{_capital(parts.printing)}. {text}"
         todo.append(ToDo(f"Print {count(len(plates), 'plate')}", text, plates))
     if "assembly.md" in files:
         text = "Follow the pictures: each step ends with a check."

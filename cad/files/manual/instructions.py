@@ -6,14 +6,14 @@ import re
 from collections.abc import Iterator, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.print_settings import print_words
+from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
 from scanwright.cad.assembly.scenes import StepScene, scenes_of
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.joints import DECK_MM, Joint
-from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TEST_PLATE
+from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
 from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import measure_first
@@ -66,6 +66,7 @@ def instructions_text(
         "lists what you need.",
         "",
         *_misfits(products_of(scanner, assembly.layout.drive)),
+        *_to_measure(assembly),
         "Try the hole patterns before you print parts: print `template.pdf` at 100 %, measure its scale of 100 mm, and "
         f"lay each page on its device. Then print `print/{TEST_PLATE}.3mf` and screw it to lidar and servo.",
         "",
@@ -73,7 +74,7 @@ def instructions_text(
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
         f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
         "",
-        *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
+        *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts, assembly)),
         f"Lengths of screws with nuts assume {CASE_EAR_MM:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
         "mm; all others follow from the parts.",
         "",
@@ -118,10 +119,16 @@ def _misfits(products: Sequence[Product]) -> Iterator[str]:
             yield from (f"**Caution: {reasons[0]}**", "", *(f"- {reason.strip()}" for reason in reasons[1:]), "")
 
 
-def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:
+def _plate(number: int, parts: Sequence[str], assembly: Assembly) -> tuple[str, ...]:
     """Return the lines of one print plate."""
-    name = f"print/plate_{number}"
-    return f"Plate {number}, `{name}.3mf`: {', '.join(parts)}.", "", f"![Plate {number} on the bed]({name}.png)", ""
+    name, mass_g = f"print/plate_{number}", sum(1000 * assembly.inertial(part).mass_kg for part in parts)
+    hours = print_hours(mass_g, assembly.layout.scanner.printer)
+    return (
+        f"Plate {number}, `{name}.3mf`: {', '.join(parts)}; {hours_in_words(hours)}.",
+        "",
+        f"![Plate {number} on the bed]({name}.png)",
+        "",
+    )
 
 
 def picture_name(number: int) -> str:
@@ -143,16 +150,7 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         inserts = f", through {nuts} in its bore"
-    first = _measure_first(assembly.layout.scanner, joint)
-    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}.{first and f' {first}'}"
-
-
-def _measure_first(scanner: Scanner, joint: Joint) -> str:
-    """What is to be measured before the screws of a joint are bought or driven; empty if it is verified."""
-    if joint.onto in (SERVO_HORN, SERVO_OUTPUT):
-        return measure_first(scanner.servo, *HORN_FIELDS)
-    devices: dict[str, Product] = {LIDAR_BODY: scanner.lidar, SERVO_CASE: scanner.servo}
-    return measure_first(devices[joint.onto], "holes") if joint.onto in devices else ""
+    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}."
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:
@@ -194,14 +192,12 @@ def _words(assembly: Assembly, scene: StepScene) -> str:
     for joint, mark in scene.joints:
         screws = f"**{screws_in_words(assembly, joint)}**"
         text = text.replace(mark, f"{screws} {mark}", 1) if mark else f"{text} {screws}"
-    text += "".join(f" {sentence}" for sentence in _fits_to_measure(assembly, scene))
     return " ".join(re.sub(r"\{.*?\}", "", text).split())
 
 
-def _fits_to_measure(assembly: Assembly, scene: StepScene) -> Iterator[str]:
-    """Yield what to measure before the new parts of a step fit their devices; the screws state theirs themselves."""
-    parts = [assembly.parts[name] for name in (scene.thing, *scene.step.brings) if name in assembly.made]
+def _to_measure(assembly: Assembly) -> Iterator[str]:
+    """Yield what to measure before any part is printed: values that no source verifies."""
     for product in products_of(assembly.layout.scanner, assembly.layout.drive):
-        fields = {field for part in parts for field in part.values_of(product)} - {"holes", *HORN_FIELDS}
-        if sentence := measure_first(product, *fields):
-            yield sentence
+        fields = {field for name in assembly.made for field in assembly.parts[name].values_of(product)}
+        if sentence := measure_first(product, *fields, "holes", *HORN_FIELDS):
+            yield from (sentence, "")
