@@ -176,11 +176,15 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
     if failed := [finding for finding in findings if finding.severity == "error"]:
         text = "Change the task until no check fails: each check states what to change."
         todo.append(ToDo(f"Fix {count(len(failed), 'failed check')}", text, ("#checks", "task.toml")))
-    how = "Copy the device's catalogue file, change the values, name the copy in task.toml, and build again."
+    how = (
+        "Copy the device's file next to your own task file: `scanwright catalogue NAME -v` prints its path. Change the "
+        'values, write catalogue = ["COPY.toml"] at the top of your task file (not of the task.toml in this folder, '
+        "which the next build replaces), and build again."
+    )
     if wrong := [each for each in findings if each.code == "known_error" and each.severity == "warning"]:
         text = f"Parts made with these values do not fit the real devices. {how}"
-        todo.append(ToDo(f"Correct {count(len(wrong), 'wrong value')}", text, ("#checks", "task.toml")))
+        todo.append(ToDo(f"Correct {count(len(wrong), 'wrong value')}", text, ("#checks",)))
     if unverified := tuple(each for each in findings if each.code == "unverified"):
         text = f"These values are not from a drawing. A wrong one makes a part that does not fit. {how}"
-        todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("task.toml",), unverified))
+        todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("#checks",), unverified))
     return todo

@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
+from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, file_of, load_catalogue, load_product
 from scanwright.design.catalogue.holes import HolePattern, mounting_holes
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
@@ -443,3 +443,9 @@ def test_start_and_inrush_currents_are_those_of_the_makers(shipped):
         "STL27L": (0.29, 0.54, None),
         "LD19": (0.18, 0.3, None),
     }
+
+
+def test_the_file_of_every_product_is_found():
+    for product in load_catalogue():
+        assert load_product(file_of(product.name)).name == product.name
+    assert file_of("no such product") is None
