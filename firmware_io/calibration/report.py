@@ -204,4 +204,4 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         yield f"warning: {note}"
     by_name = {one["name"]: one for one in record["parameters"]}
     if "lag_s" in by_name:
-        yield f"the angles are late: assemble with lag_s = {by_name['lag_s']['value'] / 1e3:.6f}"
+        yield f"the angles are late: lag_s = {by_name['lag_s']['value'] / 1e3:.6f} corrects them"
