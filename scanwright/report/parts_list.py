@@ -64,8 +64,7 @@ class PartsList:
     @property
     def to_make(self) -> str:
         """Return how many parts to print and to have machined, and the time to print."""
-        words = f"{self.made('printed')} to print, {self.printing or 'time unknown'}"
-        return f"{words}, {self.made('turned', 'sawn')} to have machined"
+        return f"{self.made('printed')}, {self.printing or 'to print'}; {self.made('turned', 'sawn')} to have machined"
 
     def made(self, *kinds: str) -> str:
         """Return how many parts are made in a way, in words."""
