@@ -67,7 +67,7 @@ class Product(Record):
         return {**values, "provenance": sources}
 
     def lines(self, in_full: bool = True) -> list[str]:
-        """Return every value with its source; unless `in_full`, only the unverified and the wrong values, without it."""
+        """Return every value with its source; unless `in_full`, the unverified and the wrong values without sources."""
         values = {field: json.dumps(to_jsonable_python(getattr(self, field))) for field in self._provenance}
         if in_full:
             lines = [

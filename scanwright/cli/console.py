@@ -268,7 +268,7 @@ class ConsoleProgress:
         words = TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, overflow="ellipsis"))
         console = Console(stderr=True)
         bar = Progress(BarColumn(_BAR_CHARACTERS), TaskProgressColumn(), TextColumn(left), words, console=console)
-        bar.add_task(step, total=1.0, completed=self._fraction)
+        bar.update(bar.add_task(step, total=1.0), completed=self._fraction)
         with console.capture() as capture:
             console.print(bar.get_renderable(), end="", width=console.width - 1)
         return capture.get().rstrip("\n")

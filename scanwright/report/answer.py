@@ -11,13 +11,10 @@ from scanwright.design.arrays import Array
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
 from scanwright.design.evaluation.coverage import coverage, hidden_lines
 from scanwright.design.objective.problem import Problem, problem_of
-from scanwright.design.objective.tolerance import sensitivity
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
-
-OFF_DEG = 1.0  # error of a printed and screwed mount: assumed, its fits and screw holes allow it
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +24,10 @@ class BuildAnswer:
     Attributes:
         as_built: what it sees with its parts, and the reference mounts.
         ball_deg: within which a beam counts for a direction.
-        rises: without parts, by mounting angle: how much J rises if it alone is 1 deg off, the worse direction.
         hidden: which shares of the regions the masks hide, in words.
-        worst: the largest of `rises` as the share of beams per direction that it costs; None if J is no logarithm.
+        masked_fraction: share of the sphere that the robot hides.
+        lines: of one full scan.
+        beams: of one line.
     """
 
     as_built: AsBuilt
@@ -37,8 +35,6 @@ class BuildAnswer:
     masked_fraction: float
     lines: int
     beams: int
-    rises: dict[str, float]
-    worst: float | None
     hidden: tuple[str, ...] = ()
 
 
@@ -52,15 +48,12 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = 
     """
     built = task_as_built(loaded, angles)
     problem, setting = problem_of(built), mounting_rad(angles)
-    rises = sensitivity(problem, setting, np.radians(OFF_DEG))
     return BuildAnswer(
         as_built=as_built(problem, built.task, setting, shadow, checked_score(built, problem, setting, shadow)),
         ball_deg=float(np.degrees(problem.ball_rad)),
         masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
         beams=len(problem.bearings_rad),
-        rises=rises,
-        worst=float(-np.expm1(-max(0.0, *rises.values()))) if problem.objective.name == "log" else None,
         hidden=tuple(hidden_lines(loaded)),
     )
 

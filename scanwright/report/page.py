@@ -25,7 +25,7 @@ from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
 from scanwright.design.task.task import LoadedTask, load_task
-from scanwright.report.answer import OFF_DEG, answer, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, mounting_rad, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import packed, read, read_json, read_picture, read_text
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
@@ -62,7 +62,6 @@ def report_html(folder: Path, begin: Begin = in_turn) -> str:
     facts = {
         "angles": angles,
         "motion": motion_in_words(angles.motion),
-        "off_deg": OFF_DEG,
         "parts": parts,
         "price": price,
         "checks": None if findings is None else by_severity(findings),

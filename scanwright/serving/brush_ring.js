@@ -1,6 +1,6 @@
 // The brush of a page, where one is in hand: a ring under the pointer that is the edge of what a touch paints, and a line
-// that says which mode this is. An element of class sw-brush in the panel tells both: what is painted, how wide, and on
-// which side of a sphere about the origin. The camera is the one that viser keeps for its own tests in a browser.
+// that says which mode this is. An element of class sw-brush in the panel has both: what is painted, and how wide, on the
+// far wall of a sphere about the origin. The camera is the one that viser keeps for its own tests in a browser.
 (() => {
   const CORNERS = 72;
   const NAMESPACE = "http://www.w3.org/2000/svg";
@@ -23,13 +23,12 @@
   const unit = (a) => a.map((x) => x / Math.sqrt(dot(a, a)));
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  // Where the pointer's ray meets the sphere, as a unit vector; null where it passes by.
-  const hit = (eye, along, radius, inside) => {
+  // Where the pointer's ray meets the far wall, as a unit vector; null if it passes by.
+  const hit = (eye, along, radius) => {
     const middle = -dot(eye, along);
     const square = radius ** 2 - dot(eye, eye) + middle ** 2;
     if (square < 0) return null;
-    let distance = middle + Math.sqrt(square) * (inside ? 1 : -1);
-    if (distance <= 0) distance = middle + Math.sqrt(square);
+    const distance = middle + Math.sqrt(square);
     return distance > 0 ? unit(eye.map((x, k) => x + distance * along[k])) : null;
   };
 
@@ -45,7 +44,7 @@
     const seen = local(vector.set(across, up, 0.5).unproject(camera));
     const radius = Number(brush.dataset.sphereM);
     const along = unit(seen.map((x, k) => x - eye[k]));
-    const middle = hit(eye, along, radius, brush.dataset.inside === "1");
+    const middle = hit(eye, along, radius);
     if (!middle) return null;
     const half = (Number(brush.dataset.radiusDeg) * Math.PI) / 180;
     const side = unit(cross(middle, Math.abs(middle[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]));

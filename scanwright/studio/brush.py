@@ -61,7 +61,7 @@ class PaintBrush:
             TaskError: there is too much paint.
         """
         c = self._controls
-        hit = direction_hit(ray_origin, ray_direction, inside=self._view.inside)
+        hit = direction_hit(ray_origin, ray_direction)
         if hit is None or not c.painting.value or c.brush.value not in BRUSHES:
             return
         x, y, z = (float(value) for value in hit)
@@ -77,7 +77,7 @@ class PaintBrush:
         words = f"Painting: {c.brush.value}, {self.radius_deg:g} deg. B puts the brush away"
         c.mode.content = (
             f'<div class="sw-brush" hidden data-brush="{escape(str(c.brush.value))}" data-sphere-m="{RADIUS_M}" '
-            f'data-radius-deg="{self.radius_deg:g}" data-inside="{int(self._view.inside)}">{escape(words)}</div>'
+            f'data-radius-deg="{self.radius_deg:g}">{escape(words)}</div>'
             if c.painting.value
             else ""
         )

@@ -35,7 +35,7 @@ from scanwright.studio.searching import Searching
 from scanwright.studio.state import Canvas, Dab, Setting
 from scanwright.studio.view.coloured_sphere import highest_density
 from scanwright.studio.view.latest_only import LatestOnly
-from scanwright.studio.view.view_3d import SIDES, View3D
+from scanwright.studio.view.view_3d import LOOKS, View3D
 from scanwright.studio.view.workers import Order, Workers
 
 FIRST_S = 30.0  # at most, for the first colours
@@ -307,11 +307,11 @@ class Studio:
         """Take the brush in hand, or put it away so that dragging turns the view again."""
         self.brush.arm(self._guarded)
         if self.controls.painting.value and not self.view.on_sphere:
-            put(self.controls.look, "sphere from inside")  # which is what the brush paints on
+            put(self.controls.look, "sphere")  # which is what the brush paints on
             self._look()
 
     def _look(self) -> None:
-        if self.controls.look.value in SIDES:
+        if self.controls.look.value in LOOKS:
             self.view.look(self.controls.look.value)
             self.brush.show()
             self.judging.request(self.setting)

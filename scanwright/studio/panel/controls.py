@@ -11,7 +11,7 @@ from scanwright.design.task.task import LoadedTask
 from scanwright.serving.style import banner_html
 from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
-from scanwright.studio.view.view_3d import SIDES
+from scanwright.studio.view.view_3d import LOOKS
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
 UNDO, REDO = "Undo", "Redo"
@@ -67,8 +67,7 @@ class Controls:
             self.kept = gui.add_dropdown("setting", ("rolling",), initial_value="rolling")
             self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
         with tabs.add_tab("View"):
-            looks = tuple(SIDES)
-            self.look = gui.add_dropdown("density", looks, initial_value=looks[0])
+            self.look = gui.add_dropdown("density", LOOKS, initial_value=LOOKS[0])
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
             self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
         with tabs.add_tab("Save"):

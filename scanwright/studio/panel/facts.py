@@ -23,7 +23,6 @@ from scanwright.design.task.task import Limits, LoadedTask
 from scanwright.studio.state import Setting
 
 DRAG_NODES = 2187  # 3^7, fewer than `NODES`, to follow the hand; the panel shows the larger error
-DRAG_PERIOD_NODES = 243  # 3^5: the search for a period computes J many times
 WALL_M = 10.0  # range at which gaps are given in millimetres
 
 
@@ -38,7 +37,7 @@ class Facts:
         blind_cone_deg: half angle of the wider one about the axis.
         gap_deg: widest distance between neighbouring scan lines.
         blind_weight: share of the weight that is never seen.
-        period_s: shortest turn that brings `density` beams everywhere; NaN where none does or the servo does not spin.
+        period_s: shortest turn with `density` beams everywhere; NaN if none has or the servo sweeps, None if unknown.
         density: beams per ball that the period is for.
         mounts: J of the reference mounts for the same task, the best one first.
         least: fewest beams per ball where it counts.
@@ -54,7 +53,7 @@ class Facts:
     blind_cone_deg: float
     gap_deg: float
     blind_weight: float
-    period_s: float
+    period_s: float | None
     density: int
     mounts: dict[str, float]
     planes: tuple[tuple[str, PlaneFigures | None], ...]
@@ -121,19 +120,18 @@ class Judge:
         return self._facts(setting, score_on(self.problem, setting.angles_rad, DRAG_NODES), exact=False)
 
     def exact(self, setting: Setting) -> Facts:
-        """When it rests; the period is still the quick one."""
+        """When it rests."""
         return self._facts(setting, score(self.problem, setting.angles_rad), exact=True)
 
     def settled(self, facts: Facts) -> Facts:
-        """The same with the period looked for as closely as everywhere else, and what planes get, in metres."""
-        period_s = facts.period_s if math.isnan(facts.period_s) else self._period_s(facts.setting, NODES)
+        """Add the shortest period, whose search computes J many times, and what planes get in metres."""
+        turns = self.loaded.task.motion.mode in ("spin", "shortest")
+        period_s = self._period_s(facts.setting) if facts.blind_weight == 0 and turns else math.nan
         planes = on_planes(self.loaded, self.problem, facts.setting.angles_rad)
         return replace(facts, period_s=period_s, planes=tuple((figures.region, figures) for figures in planes))
 
     def _facts(self, setting: Setting, result: Score, *, exact: bool) -> Facts:
         plane = setting.angles_rad[None, 2:]
-        turns = self.loaded.task.motion.mode in ("spin", "shortest")
-        within_reach = result.blind_weight == 0 and turns
         return Facts(
             setting=setting,
             J=result.J,
@@ -142,7 +140,7 @@ class Judge:
             blind_cone_deg=float(blind_cones_deg(self.problem, plane)[0]),
             gap_deg=float(line_gaps_deg(self.problem, plane)[0]),
             blind_weight=result.blind_weight,
-            period_s=self._period_s(setting, DRAG_PERIOD_NODES) if within_reach else math.nan,
+            period_s=None,
             density=self._least,
             mounts={mount.name: mount.score.J for mount in self.mounts},
             planes=tuple((region.words(), None) for region in planes_of(self.loaded)),
@@ -155,9 +153,9 @@ class Judge:
     def _least(self) -> int:
         return math.ceil(self.loaded.task.limits.min_density or 1)
 
-    def _period_s(self, setting: Setting, nodes: int) -> float:
+    def _period_s(self, setting: Setting) -> float:
         rate_hz = self.loaded.lidar.scan_rate_hz
         try:
-            return shortest_period_s(self.problem, setting.angles_rad, rate_hz, self._least, nodes)
+            return shortest_period_s(self.problem, setting.angles_rad, rate_hz, self._least, NODES)
         except TaskError:  # part of the region is out of reach at any speed
             return math.nan

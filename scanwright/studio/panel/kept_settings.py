@@ -78,7 +78,7 @@ class KeptSettings:
 
     def _judge_all(self, kept: dict[str, Setting]) -> None:
         settings = self._judge.references() | kept
-        self._facts = {name: self._judge.exact(setting) for name, setting in settings.items()}
+        self._facts = {name: self._judge.settled(self._judge.exact(setting)) for name, setting in settings.items()}
         self._show()
 
     def _show(self) -> None:

@@ -75,4 +75,6 @@ def _on_plane(region: str, figures: PlaneFigures | None) -> str:
 
 
 def _period(facts: Facts) -> str:
+    if facts.period_s is None:
+        return "..."
     return "&ndash;" if math.isnan(facts.period_s) else f"{facts.period_s:.3f} s"

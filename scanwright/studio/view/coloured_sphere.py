@@ -79,11 +79,8 @@ def _segments(table: Array, theta: Array, phi: Array) -> Array:
     return np.concatenate(hit)
 
 
-def direction_hit(origin_m: Array, direction: Array, *, inside: bool) -> Array | None:
-    """Where on the sphere a ray from the camera meets it, as a unit vector; None where it passes by.
-
-    `inside`: the far wall, seen from within, and not the near one.
-    """
+def direction_hit(origin_m: Array, direction: Array) -> Array | None:
+    """Return where a ray from the camera meets the far wall of the sphere, as a unit vector; None if it passes by."""
     origin, along = np.asarray(origin_m, float), np.asarray(direction, float)
     length = float(np.linalg.norm(along))
     if not (np.isfinite(origin).all() and np.isfinite(length)) or length == 0:
@@ -93,8 +90,6 @@ def direction_hit(origin_m: Array, direction: Array, *, inside: bool) -> Array |
     square = RADIUS_M**2 - float(origin @ origin) + middle**2
     if square < 0:
         return None
-    distance = middle + np.sqrt(square) * (1 if inside else -1)
-    if distance <= 0:
-        distance = middle + np.sqrt(square)
+    distance = middle + np.sqrt(square)
     point = origin + distance * along
     return None if distance <= 0 else point / RADIUS_M

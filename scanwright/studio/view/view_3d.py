@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import viser
@@ -20,16 +20,11 @@ from scanwright.studio.state import Setting
 from scanwright.studio.view.coloured_sphere import RADIUS_M, edges, hexagons
 from scanwright.studio.view.scanner_bodies import BodyMesh
 
-Look = Literal["in its room", "sphere from inside", "sphere from outside", "hidden"]
-SIDES: dict[Look, Literal["front", "back"]] = {
-    "in its room": "front",  # of the tiles, which look inwards: the nearer walls are not seen
-    "sphere from inside": "back",
-    "sphere from outside": "front",
-    "hidden": "back",
-}
+Look = Literal["in its room", "sphere", "hidden"]
+LOOKS: tuple[Look, ...] = get_args(Look)
 SPHERE_EYE_M = (-0.75, 0.95, 0.65)  # behind, left and above: ahead points away from the viewer
 MARK = 1.12  # of the radius: words are drawn there
-LIFT = 0.012  # of the radius: edges are drawn this far from the tiles, on the side that is looked at
+LIFT = 0.012  # of the radius: edges are drawn this far before the tiles
 WEIGHT_EDGE, MASK_EDGE, FAN = (255, 255, 255), (224, 49, 49), (43, 138, 62)
 POINT_M = 0.012  # as in the page of a scan, `live.cloud_view`
 GHOST = 0.25  # opacity of parts that belong to an earlier setting
@@ -63,24 +58,17 @@ class View3D:
             self.tiles.wxyz,
             self.tiles.directions * RADIUS_M,
             batched_colors=_blank(self.tiles.directions),
-            side=SIDES[self._looked],
+            side="back",  # of the tiles, which look outwards: the nearer ones are not seen
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
             visible=self.on_sphere,
         )
 
-    @property
-    def inside(self) -> bool:
-        """Whether the far wall is seen, from within."""
-        return self._looked != "sphere from outside"
-
     def look(self, looked: Look) -> None:
-        """Show the far half of the sphere with the scanner before it, the near half, the room instead, or nothing."""
+        """Show the far half of the sphere with the scanner before it, the room instead, or nothing."""
         in_room = (self._looked == "in its room") != (looked == "in its room")
         self._looked = looked
-        if self.on_sphere:
-            self.sphere.side = SIDES[looked]
         self.sphere.visible = self.on_sphere
         if self._room is not None:
             self._room.visible = looked == "in its room"
@@ -118,7 +106,7 @@ class View3D:
     @property
     def on_sphere(self) -> bool:
         """Whether the sphere is shown."""
-        return self._looked in ("sphere from inside", "sphere from outside")
+        return self._looked == "sphere"
 
     def colour(self, problem: Problem, setting: Setting, bands: Bands) -> None:
         """Colour the tiles by the density of a setting, and show its axis and fan."""
@@ -126,7 +114,7 @@ class View3D:
             painted, directions, normals = self._room, self.room.directions, self.room.normals
         else:
             painted, directions = self.sphere, self.tiles.directions
-            normals = -directions if self.inside else directions
+            normals = -directions
         density = mean_density_at(problem, setting.angles_rad, directions)
         painted.batched_colors = unlit(density_colours(density, bands), normals)
         R = R_world_rot(*setting.angles_rad[:2])
@@ -165,7 +153,7 @@ class View3D:
         """Where directions are drawn: just before the walls of the room or the tiles of the sphere, shape (..., 3)."""
         if self._looked == "in its room" and self._placeholder is not None:
             return (1 - LIFT) * self._placeholder.walls_along(directions)
-        return RADIUS_M * (1 - LIFT if self.inside else 1 + LIFT) * directions
+        return RADIUS_M * (1 - LIFT) * directions
 
     def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:
         """Put up the half of the scanner that turns, or the one that stands, in place of what stood there."""

@@ -16,8 +16,6 @@ from report_folder import ANGLES, EVIL, Page, scene_of
 from scanwright.cad.checks.checks_json import checks_text
 from scanwright.design.findings import Finding
 from scanwright.design.objective.holes import percent
-from scanwright.design.objective.problem import NODES, problem_of
-from scanwright.design.objective.score import quick_J
 from scanwright.design.self_occlusion import AXIS_STEPS, load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.manifest import is_current, read_manifest, write_manifest
@@ -100,10 +98,6 @@ def test_what_a_setting_sees_agrees_with_other_ways_to_know_it():
     assert said.masked_fraction == pytest.approx((1 - np.cos(np.radians(25))) / 2, abs=1e-6)
     assert own.line_gap_deg == rolling.seen.line_gap_deg == pytest.approx(0.5)
     assert own == rolling.seen != pitching.seen
-    assert said.worst == pytest.approx(1 - np.exp(-max(said.rises.values())), abs=1e-12)
-    problem = problem_of(load_task(Path("ground_ahead")))
-    off = [quick_J(problem, np.radians([0, 90 + d, 0, -90]), NODES) for d in (-1, 0, 1)]
-    assert said.rises["beta_rot"] == pytest.approx(max(off) - off[1], abs=1e-12)
 
 
 def test_another_objective_than_a_logarithm_makes_no_claim_of_factors():

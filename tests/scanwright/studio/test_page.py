@@ -117,7 +117,7 @@ def directions(camera, pixels, width, height):
     middle = np.array([width, height]) / 2
     rays = np.column_stack([(pixels - middle) / focal, np.ones(len(pixels))])
     rays = rays @ viser.transforms.SO3(camera.wxyz).as_matrix().T
-    return np.array([coloured_sphere.direction_hit(camera.position, ray, inside=True) for ray in rays])
+    return np.array([coloured_sphere.direction_hit(camera.position, ray) for ray in rays])
 
 
 def contrast(*colours):
