@@ -21,6 +21,7 @@ SOLID = {
     "bottom_solid_layers": "1",
     "solid_infill_below_area": "0",
 }
+PRINTED_CM3_H = 20.0  # as `benchmarks.cad.slicer` measures it for these parts
 LINES = ("", "external_perimeter_", "perimeter_", "infill_", "solid_infill_")
 
 
@@ -37,3 +38,13 @@ def print_words(printer: Printer) -> str:
     if printer.layer_mm is None or printer.line_mm is None:
         return "solid"
     return f"solid (100 % fill), in layers of {printer.layer_mm:g} mm and lines {printer.line_mm:g} mm wide"
+
+
+def print_hours(mass_g: float, printer: Printer) -> float:
+    """Return the estimated time to print parts of a mass."""
+    return mass_g / printer.density_g_cm3 / PRINTED_CM3_H
+
+
+def hours_in_words(hours: float) -> str:
+    """Return a time to print as text, to half an hour below 5 h."""
+    return f"about {max(round(2 * hours) / 2, 0.5) if hours < 5 else round(hours):g} h"

@@ -4,7 +4,7 @@ An island is a layer that starts in the air, which a slicer must support: an out
 of the layer below.
 
 Walls are measured from points on the surface along the normal to the other side, and counted if the other side is
-parallel: every sharp corner is a wedge that thins to nothing, and prints. A thin spot is a warning; thin walls on more
+parallel: every sharp corner is a wedge that thins to nothing, and prints. A thin spot is a note; thin walls on more
 than THIN_SHARE of the surface are an error. The message names the thinnest spot.
 """
 
@@ -97,7 +97,7 @@ def _walls(name: str, mesh: TriMesh, printer: Printer, holes: list[Round]) -> Fi
     hole = min(holes, key=lambda hole: _distance(hole, walls.at), default=None)
     near = f", near a hole of {hole.diameter:.4g} mm" if hole and _distance(hole, walls.at) < NEAR_HOLE_MM else ""
     message = f"{check.message}; the thinnest, {walls.thinnest_mm:.2f} mm, {spot(walls.at)}{near}"
-    return replace(check, severity="warning" if check.severity == "ok" else check.severity, message=message)
+    return replace(check, severity="note" if check.severity == "ok" else check.severity, message=message)
 
 
 def _distance(hole: Round, point: Array) -> float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.cable_instructions import tied_at
-from scanwright.cad.assembly.print_settings import print_words
+from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
 from scanwright.cad.layout.drive import DriveLayout, products_of
@@ -25,7 +25,7 @@ from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
-from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of
+from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of, uart_adapter
 from scanwright.design.scanner import Scanner
 
 JOINTS = "joints of the layout"
@@ -85,6 +85,7 @@ def items_of(
     joints: Sequence[Joint],
     masses_g: dict[str, float],
     config_hash: str,
+    plates: Sequence[Sequence[str]] = (),
 ) -> list[BomItem]:
     """Return all rows; the total last.
 
@@ -94,6 +95,7 @@ def items_of(
         joints: of the layout.
         masses_g: of the made parts.
         config_hash: of what shapes the parts.
+        plates: parts that are printed together.
     """
     items = []
     for name in assembly.made:
@@ -104,7 +106,7 @@ def items_of(
         note, estimate = f"{how}; drawing drawings/{name}.pdf", name if name in EACH_USD else part.process
         mass_g = round(masses_g[name], 1)
         items.append(BomItem(part.process, name, number, mass_g=mass_g, note=note, estimate=estimate))
-    items.append(_filament(scanner, items))
+    items.append(_filament(scanner, items, plates))
     items += _products(scanner, assembly.layout.drive)
     items += _screws(joints)
     items += _wiring(scanner)
@@ -192,10 +194,14 @@ def _wiring(scanner: Scanner) -> Iterator[BomItem]:
         if ring is not None:
             note = "on the rotor, on leads of the slip ring"
             yield BomItem("wiring", connector.words, source=WIRING_TEXT, note=note, estimate="plug and socket")
-    if ring is not None:
+    if adapter := uart_adapter(lidar):
+        note = "joins the lidar's data to the computer; not RS-232, not 5 V"
+        yield BomItem("wiring", adapter, source=WIRING_TEXT, note=note, estimate="UART adapter")
+    elif ring is not None:
         yield BomItem(
             "wiring", f"{plug_of(lidar)} plug with bare leads", source=WIRING_TEXT, estimate="plug and socket"
         )
+    if ring is not None:
         part, source = "crimps and heat shrink for the leads of the slip ring", f"circuits: {ring.circuits}"
         yield BomItem("wiring", part, source=source, estimate="crimps")
 
@@ -227,8 +233,14 @@ def _unknown_wiring(product: Product) -> BomItem:
     )
 
 
-def _filament(scanner: Scanner, items: list[BomItem]) -> BomItem:
+def _filament(scanner: Scanner, items: list[BomItem], plates: Sequence[Sequence[str]]) -> BomItem:
+    hours = {item.part: print_hours(item.mass_g or 0.0, scanner.printer) for item in items if item.kind == "printed"}
     grams = WASTE * sum(item.mass_g or 0.0 for item in items if item.kind == "printed")
+    each = (
+        f"plate {n} {hours_in_words(sum(hours[part] for part in plate))}" for n, plate in enumerate(plates, start=1)
+    )
+    of_plates = f" ({', '.join(each)})" if len(plates) > 1 else ""
+    time = f"{hours_in_words(sum(hours.values()))} to print{of_plates}"
     low, high = (round(grams / 1000 * usd, 2) for usd in FILAMENT_USD_PER_KG)
     return BomItem(
         kind="material",
@@ -237,7 +249,7 @@ def _filament(scanner: Scanner, items: list[BomItem]) -> BomItem:
         high_usd=high,
         mass_g=round(grams, 1),
         source=ESTIMATED,
-        note=f"{scanner.printer.maker}; a kg for {FILAMENT_USD_PER_KG[0]:g} to {FILAMENT_USD_PER_KG[1]:g} USD",
+        note=f"{time}; {scanner.printer.maker}; a kg for {FILAMENT_USD_PER_KG[0]:g} to {FILAMENT_USD_PER_KG[1]:g} USD",
     )
 
 

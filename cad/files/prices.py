@@ -31,6 +31,7 @@ EACH_USD: dict[str, tuple[float, float]] = {
     "switch": (3.0, 10.0),
     "wire": (5.0, 15.0),
     "adapter": (25.0, 60.0),
+    "UART adapter": (3.0, 15.0),
     "servo cable": (3.0, 10.0),
     "power cable": (3.0, 15.0),
     "cables and power": (10.0, 60.0),

@@ -118,9 +118,9 @@ def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int
 
 
 def _warnings(network: Network, width: float) -> list[str]:
-    """Return the lines of broken rules and cautions, as wide as the sheet."""
+    """Return the lines of broken rules, as wide as the sheet, and where the cautions are: once in a folder."""
     broken = [f"DO NOT BUILD THIS: {sentence(fault)}." for fault in check_network(network)]
-    cautions = [f"CAUTION: {caution}" for caution in network.cautions]
+    cautions = [f"CAUTION: read the {len(network.cautions)} cautions of wiring.md before you join a wire."]
     return [
         line
         for text in (*broken, *cautions)

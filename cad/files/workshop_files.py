@@ -73,9 +73,10 @@ def export_scanner(
     progress("writing assembly.glb and exploded.glb")
     files |= scene_files(scanner, assembly, made.meshes, digest)
     progress("writing bom.csv, wiring.svg and assembly.md with its pictures")
-    items = items_of(scanner, assembly, joints, masses, digest)
+    named = [list(plate) for plate in plates]
+    items = items_of(scanner, assembly, joints, masses, digest, named)
     files["bom.csv"] = bom_text(items).encode("utf-8")
-    files |= step_files(scanner, assembly, made.meshes, joints, [list(plate) for plate in plates], digest)
+    files |= step_files(scanner, assembly, made.meshes, joints, named, digest)
     files |= wiring_files(scanner, digest)
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)

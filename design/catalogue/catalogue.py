@@ -146,11 +146,20 @@ def load_product(path: Path) -> Product:
     return product
 
 
+def file_of(name: str) -> Path | None:
+    """Return the file of a product of the shipped catalogue or of an installed package, to copy and change."""
+    found = (path for path in reversed(_files()) if read_toml(path, "the catalogue file")["name"] == name)
+    return next(found, None)
+
+
 @cache
 def _shipped() -> dict[str, Product]:
-    folders = [SHIPPED, *_installed()]
-    products = [load_product(path) for folder in folders for path in sorted(folder.glob("*.toml"))]
-    return {product.name: product for product in products}
+    return {product.name: product for product in map(load_product, _files())}
+
+
+def _files() -> list[Path]:
+    """Return all product files; of two with one name the last one counts."""
+    return [path for folder in (SHIPPED, *_installed()) for path in sorted(folder.glob("*.toml"))]
 
 
 def _installed() -> list[Path]:

@@ -58,6 +58,7 @@ def cautions_of(scanner: Scanner, loads: list[ElectricLoad], wires: list[Wire]) 
     yield from _revisions(scanner.lidar)
     if any(wire.note == MEASURE for wire in wires):
         yield f'A swapped + and - can destroy {scanner.lidar.name}. Find each lead marked "{MEASURE}" like this: {HOW}.'
+    yield from _levels(scanner.lidar)
     yield from _ties(scanner.lidar)
     yield f"Find V and GND of {scanner.servo.name} by the pins of its plug, not by colour."
 
@@ -88,6 +89,14 @@ def _revisions(lidar: Lidar) -> Iterator[str]:
     if any(len(of_net) > 1 for of_net in colours.values()):
         named = " and ".join(f"{', '.join(of_net)} for {net}" for net, of_net in colours.items())
         yield f"Cables of {lidar.name} differ by revision: its maker has used {named}. Do not trust a colour."
+
+
+def _levels(lidar: Lidar) -> Iterator[str]:
+    if lidar.link == "serial" and lidar.signal_v:
+        yield (
+            f"The data line of {lidar.name} has {lidar.signal_v:g} V. Use a USB adapter with UART levels of "
+            f"{lidar.signal_v:g} V, and leave its 5 V pin open: 5 V logic or an RS-232 port can destroy the lidar."
+        )
 
 
 def _ties(lidar: Lidar) -> Iterator[str]:

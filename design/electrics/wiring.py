@@ -74,7 +74,12 @@ def network_of(scanner: Scanner) -> Network:
 
 def plug_of(lidar: Lidar) -> str:
     """Return what a lidar's data go into at the computer."""
-    return "data port" if lidar.link is None else PLUG[lidar.link]
+    return "USB lidar" if uart_adapter(lidar) else "data port" if lidar.link is None else PLUG[lidar.link]
+
+
+def uart_adapter(lidar: Lidar) -> str:
+    """Return the adapter between a serial line of logic levels and the computer; empty for RS-232 and other links."""
+    return f"USB to {lidar.signal_v:g} V UART adapter" if lidar.link == "serial" and lidar.signal_v else ""
 
 
 def _data(lidar: Lidar) -> tuple[str, ...]:
@@ -164,11 +169,13 @@ def _boxes(
     power = () if lidar.link == "usb-powered" else ("+", "-")
     shielded = not circuits or any(circuit.net == "shield" for circuit in circuits)
     pins = (*power, *data, *(_shield(lidar) if shielded else ()))
-    level = () if lidar.signal_v is None else (f"levels of {lidar.signal_v:g} V, not RS-232",)
     ends = (*(CROSSED.get(net, net) for net in data), "shield")
     bare = bool(circuits) or lidar.link in (None, "serial")
-    words = BARE_PLUG if bare else OWN_CABLE
-    boxes.append(Box("plug", f"{plug} of the computer", (words, *level), (plug,), ends, 5, ("shield",)))
+    words, adapter = BARE_PLUG if bare else OWN_CABLE, uart_adapter(lidar)
+    if adapter:
+        boxes.append(Box("plug", adapter, ("not RS-232",), ("USB",), ends, 5, ("shield",)))
+    else:
+        boxes.append(Box("plug", f"{plug} of the computer", (words,), (plug,), ends, 5, ("shield",)))
     if circuits:
         ring = scanner.slip_ring
         assert ring is not None
@@ -247,9 +254,10 @@ def _wires(
             if target == "ring" and pin != end:
                 wires += _on_rotor(lidar, ("ring", pin), end, net, load.peak_a, circuits)
     plug = plug_of(lidar)
+    end = "USB" if uart_adapter(lidar) else plug
     wires += [
         Wire(("computer", "USB servo"), ("adapter", "USB"), "USB", 0.0, 0.0, note=OWN_CABLE),
-        Wire(("computer", plug), ("plug", plug), plug, 0.0, 0.0, note=OWN_CABLE),
+        Wire(("computer", plug), ("plug", end), end, 0.0, 0.0, note=OWN_CABLE),
     ]
     signals = SIGNALS[servo.bus or "ttl"]
     joined = {**{pin: pin for pin in signals}, "GND": "GND data"}

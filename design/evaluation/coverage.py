@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -14,14 +14,41 @@ from scanwright.design.density.spin import mean_count
 from scanwright.design.density.sweep import mean_count_swept
 from scanwright.design.density.visible import free_lines, mean_count_free
 from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.scene.surface import Surface
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import spiral
+from scanwright.design.sphere.regions import field_of
+from scanwright.design.sphere.total_weight import total_weight
+from scanwright.design.task.shapes import OnPlane, Region
+from scanwright.design.task.task import LoadedTask
 
 CIRCLES = 10_000
 TABLE = 3601  # polar angles
 UNSEEN = 1e-9  # mean beams in a ball: rounding
+HIDDEN = 0.005  # share of a region behind the masks that is not reported
+
+
+def hidden_lines(loaded: LoadedTask) -> list[str]:
+    """Return one line with the share of each region that the masks hide, or none if all shares are below `HIDDEN`."""
+    shares = {
+        region.words() if isinstance(region, OnPlane) else f"weight.{i} ({region.shape})": hidden_share(loaded, region)
+        for i, region in enumerate(loaded.task.weight)
+        if region.value > 0 and loaded.task.mask
+    }
+    hidden = [f"{percent(share)} of {words}" for words, share in shares.items() if share > HIDDEN]
+    return [f"the robot hides {'; '.join(hidden)}"] if hidden else []
+
+
+def hidden_share(loaded: LoadedTask, region: Region) -> float:
+    """Return the share of the weight of one region of the task that the masks hide."""
+    unmasked = replace(loaded, task=loaded.task.model_copy(update={"mask": ()}))
+    seen, whole = (
+        total_weight(field_of(each, lambda other: float(other is region), background=0.0))
+        for each in (loaded, unmasked)
+    )
+    return 1 - seen / whole if whole > 0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)

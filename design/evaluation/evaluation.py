@@ -14,7 +14,7 @@ from scanwright.design.arrays import Setting
 from scanwright.design.density.beams import scan_at
 from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
-from scanwright.design.evaluation.coverage import Coverage, coverage, on_surfaces
+from scanwright.design.evaluation.coverage import Coverage, coverage, hidden_lines, on_surfaces
 from scanwright.design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
 from scanwright.design.evaluation.metres import PlaneFigures, on_planes
 from scanwright.design.evaluation.poles import Pole, PoleChances, pole_chances, require_in_range
@@ -80,6 +80,7 @@ class Evaluation:
         hit: the chance to hit a pole, if the task has one.
         surfaces: points per square metre, if the task has a scene.
         planes: what a full scan leaves on ground, ceiling and walls of the task.
+        hidden: which shares of the regions the masks hide, in words.
         as_built: the same setting with the parts of its build, if there is one; all else is without parts.
     """
 
@@ -97,6 +98,7 @@ class Evaluation:
     hit: PoleChances | None
     surfaces: dict[str, float] | None
     planes: tuple[PlaneFigures, ...]
+    hidden: tuple[str, ...]
     as_built: AsBuilt | None
 
     def beam_directions(self) -> Float[ndarray, "n 3"]:
@@ -182,6 +184,7 @@ class Evaluation:
                 f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest"
             )
         lines += [f"in metres      {plane.words()}" for plane in self.planes]
+        lines += [f"masks          {words}" for words in self.hidden]
         if self.interlaced_s is not None:
             lines.append(
                 f"interlaced     with {self.interlaced_s:g} s a turn: the next turn's lines fall between these"
@@ -241,6 +244,7 @@ def evaluate(
         hit=None if pole is None else pole_chances(problem, angles_rad, pole),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
         planes=on_planes(loaded, problem, angles_rad),
+        hidden=tuple(hidden_lines(loaded)),
         as_built=built,
     )
 

@@ -210,4 +210,4 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         yield f"error: {fault}"
     for one in record["parameters"]:
         if one["name"] == "lag_s" and abs(one["value"]) > _SURE * one["sd"]:
-            yield f"the angles are late: `{one['applied_by']} {one['value'] / 1e3:.6f}` corrects it"
+            yield f"the angles are late: lag_s = {one['value'] / 1e3:.6f} corrects them"

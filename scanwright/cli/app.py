@@ -79,6 +79,12 @@ def run() -> None:
         for line in (*str(error).splitlines(), *notes_of(error)):
             print_error(line)
         sys.exit(exit_code(error))
+    except typer.Abort as error:  # of a question: Ctrl-C, or Ctrl-D and the end of a file
+        ended = isinstance(error.__context__, EOFError)
+        print()  # ends the line of the question
+        if ended:
+            print_error("no answer: the input ended")
+        sys.exit(2 if ended else 130)
     except BrokenPipeError:  # whoever read the results has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, Verbosity, show_result, verbosity
+from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
@@ -118,7 +118,7 @@ def calibrate(
     from scanwright import api
 
     result = api.calibrate(recordings, angles, out, one_place=one_place, progress=ConsoleProgress())
-    show_result(lambda: result.lines(verbosity() is Verbosity.VERBOSE), result.record, as_json)
+    show_result(lambda: map(as_typed, result.lines(verbosity() is Verbosity.VERBOSE)), result.record, as_json)
     raise typer.Exit(1 if result.faulty else 0)
 
 

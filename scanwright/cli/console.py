@@ -54,6 +54,7 @@ _NUMBER = re.compile(r"[\d.,]+")
 _FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
 _SETTING = re.compile(r'\b(\w+) = (true|"?([\w.+-]+)"?)')
 _options: dict[str, str] = {}
+_elsewhere: dict[str, str] = {}
 
 
 def set_verbosity(value: Verbosity) -> None:
@@ -145,17 +146,23 @@ def _print_aside(kind: str, line: str) -> None:
     """Print a line on standard error, after all that went to standard output; its fields are spelt as options."""
     _end_bar()
     sys.stdout.flush()
-    if line.lstrip().startswith("hint: "):
-        line = _SETTING.sub(_as_typed, line)
+    if kind == "warning" or line.lstrip().startswith("hint: "):
+        what, colon, remedy = line.rpartition(": ")
+        line = what + colon + as_typed(remedy)
     text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
     if kind:  # never wrapped: one line of input that is wrong is one line, and its path can be copied
         text = styled(f"{kind}:", kind, sys.stderr) + f" {text}"
     print(text, file=sys.stderr, flush=True)
 
 
+def as_typed(remedy: str) -> str:
+    """Spell each `name = value` of a remedy as an option, with its command if the running one does not have it."""
+    return _SETTING.sub(_as_typed, remedy)
+
+
 def _as_typed(setting: re.Match[str]) -> str:
     """Spell `name = value` as the option that sets it."""
-    option = _options.get(setting[1])
+    option = _options.get(setting[1]) or _elsewhere.get(setting[1])
     return setting[0] if option is None else option if setting[2] == "true" else f"{option} {setting[3]}"
 
 
@@ -168,6 +175,12 @@ def name_options(options: dict[str, str]) -> None:
     """Set the options of the running command: field of an error -> option, such as `min_range_m` -> `--min-range-m`."""
     _options.clear()
     _options.update(options)
+
+
+def name_elsewhere(command: str, options: dict[str, str]) -> None:
+    """Add the options of a command that other commands name; the first command of a field keeps it."""
+    for field, option in options.items():
+        _elsewhere.setdefault(field, f"{command} {option}")
 
 
 def show_json(record: Any) -> None:

@@ -35,6 +35,7 @@ def optimise(
         from scanwright.design.evaluation.landscape_picture import landscape_picture
 
         picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
+    from scanwright.design.evaluation.coverage import hidden_lines
     from scanwright.design.evaluation.metres import on_planes
 
     planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
@@ -49,6 +50,7 @@ def optimise(
             [
                 *optimum.lines(verbosity() is Verbosity.VERBOSE),
                 *scan,
+                *hidden_lines(optimum.asked),
                 *(f"warning: {warning}" for warning in optimum.asked.warnings()),
             ]
         )
@@ -194,7 +196,7 @@ def catalogue(
     if sketch is not None and name is None:
         raise typer.BadParameter("draws one product, with its NAME before the option", param_hint="--sketch")
     from scanwright.cli.results.of_commands import Products
-    from scanwright.design.catalogue.catalogue import load_catalogue
+    from scanwright.design.catalogue.catalogue import file_of, load_catalogue
     from scanwright.design.catalogue.table import chosen, table_lines
 
     products = load_catalogue()
@@ -223,7 +225,7 @@ def catalogue(
             return table_lines(listed, in_full)
         values = listed[0].lines(in_full)
         if in_full:
-            return values
+            return [*values, f"file: {file_of(name)}"]
         rest = f"-v prints all {len(listed[0].provenance())} values and their sources"
         return [*table_lines(listed, in_full)[:-2], *values[1:], rest]
 

@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.models import OptionInfo
 
-from scanwright.cli.console import Verbosity, name_options, set_verbosity, styled
+from scanwright.cli.console import Verbosity, name_elsewhere, name_options, set_verbosity, styled
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -35,6 +35,8 @@ class Commands(typer.Typer):
         register = super().command(name, cls=_Command, epilog=epilog, rich_help_panel=self.title, **options)
 
         def registered(function: F) -> F:
+            if self.title == "Clouds":  # what warnings of a recording advise
+                name_elsewhere(name or function.__name__, _options_of(inspect.signature(function, eval_str=True)))
             register(_with_verbosity(function, self.first))
             return function
 
@@ -74,7 +76,7 @@ def first_sentence(command: Any) -> str:
 def _with_verbosity(function: Callable[..., Any], first: Callable[[], None]) -> Callable[..., Any]:
     """Return the function with options for its verbosity, which it does not see; it runs after `first`."""
     signature = inspect.signature(function, eval_str=True)
-    options = {name: option for name, each in signature.parameters.items() if (option := _option(name, each))}
+    options = _options_of(signature)
 
     @wraps(function)
     def run(*args: Any, quiet: bool = False, verbose: bool = False, **kwargs: Any) -> Any:
@@ -90,6 +92,11 @@ def _with_verbosity(function: Callable[..., Any], first: Callable[[], None]) -> 
     ]
     vars(run)["__signature__"] = signature.replace(parameters=[*signature.parameters.values(), *added])
     return run
+
+
+def _options_of(signature: inspect.Signature) -> dict[str, str]:
+    """Return the options of a command by parameter."""
+    return {name: option for name, each in signature.parameters.items() if (option := _option(name, each))}
 
 
 def _option(name: str, parameter: inspect.Parameter) -> str:

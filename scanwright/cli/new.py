@@ -32,8 +32,9 @@ def new(
         list[str] | None,
         Option(
             metavar="REGION",
-            help="Region to see, repeatable: ground:FROM:TO:WIDTH ceiling:HEIGHT wall:DISTANCE:WIDTH around:UP:DOWN "
-            "all thing:SIZE:DISTANCE. Metres (around: degrees); trailing numbers are optional.",
+            help="Region to see, repeatable: ground:FROM:TO:WIDTH ceiling:HEIGHT "
+            "wall:DISTANCE:WIDTH:HEADING:TOP around:UP:DOWN all thing:SIZE:DISTANCE. Metres; around and "
+            "HEADING: degrees; trailing numbers are optional.",
         ),
     ] = None,
     scan_s: Annotated[
@@ -126,7 +127,7 @@ def _prompted(
     if not see:
         print("5. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
-        print("   wall:3:4         3 m ahead, 4 m wide                around:30:30  all around, 30 deg up and down")
+        print("   wall:3:4:90:2.5  3 m to the left, 4 wide, 2.5 high  around:30:30  all around, 30 deg up and down")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")
         see = _until("  ", "ground ceiling", str.split, lambda regions: checked(see=regions))
     if scan_s is None:

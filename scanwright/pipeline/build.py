@@ -66,6 +66,8 @@ class Made:
         as_built: what it sees, without the beams that its parts block.
         findings: what a person should know before the parts are made.
         planes: what one full scan leaves on ground, ceiling and walls of the task.
+        hidden: which shares of the regions the masks hide, in words.
+        to_make: how many parts to print and to have machined, and the time to print.
     """
 
     optimum: Optimum
@@ -73,6 +75,8 @@ class Made:
     as_built: AsBuilt
     findings: tuple[Finding, ...]
     planes: tuple[PlaneFigures, ...]
+    hidden: tuple[str, ...]
+    to_make: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,10 +109,12 @@ class Build:
         optimum = self.made.optimum
         return [
             f"wrote {len(self.files)} files to {self.folder}",
+            f"parts to make: {self.made.to_make}",
             *(optimum.table() if in_full else [*optimum.hole_lines(tabled=False), *optimum.preferred_lines()]),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
             *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
+            *self.made.hidden,
             *(f"warning: {warning}" for warning in self.warnings),
             *finding_lines(self.made.findings, self.checks, in_full),
         ]
@@ -300,6 +306,7 @@ def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     """Run all stages in order."""
     from scanwright.design.evaluation.as_built import as_built
+    from scanwright.design.evaluation.coverage import hidden_lines
     from scanwright.design.evaluation.metres import on_planes
     from scanwright.design.search.optimum import find_optimum
 
@@ -309,6 +316,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
+        from scanwright.report.parts_list import read_parts
 
         made = begin(_chosen_and_made, optimum, requested.sha256(), {}, progress)
         begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
@@ -335,6 +343,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         write_manifest(work, requested, [asdict(part) for part in parts.parts])
         _at(progress, "report")("writing report.html")
         records.write_report(work, begin)
+        to_make = read_parts(work / "bom.csv").to_make
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
-    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes)
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, tuple(hidden_lines(loaded)), to_make)

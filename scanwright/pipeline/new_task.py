@@ -21,7 +21,7 @@ from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
 from scanwright.design.task.shapes import LEAST_M, MOST_M
 from scanwright.design.task.task import load_task
-from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines
+from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines, require_positive
 
 LINE_GAP_DEG = 1.0  # between neighbouring lines of a usual scan: two to four lines meet every neighbourhood of 2 deg
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
@@ -209,7 +209,7 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
             "# unit_m = 0.001",
             f"# sensor_m = [0, 0, {answers.height_m:g}]",
         ]
-    if not answers.robot.startswith("box"):
+    if answers.robot.split(":")[0] != "box":
         return [
             "[[mask]]  # directions that the robot hides do not count",
             'shape = "mesh"',
@@ -217,12 +217,12 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
             "unit_m = 1            # of the file: 0.001 if it is in mm",
             f"sensor_m = [{ahead:g}, 0, {answers.height_m:g}]  # the scanner in the mesh",
         ]
+    how = "box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh"
     try:
-        length, width, height = (float(each) for each in answers.robot.split(":")[1:])
+        length, width, height = sizes = [float(each) for each in answers.robot.split(":")[1:]]
     except ValueError as error:
-        raise TaskError(
-            f"robot = '{answers.robot}': must be box:LENGTH:WIDTH:HEIGHT in metres, or the file of a mesh"
-        ) from error
+        raise TaskError(f"robot = '{answers.robot}': must be {how}") from error
+    require_positive("robot", answers.robot, how, sizes)
     over = answers.height_m - height
     if not (over > 0 and abs(ahead) <= length / 2):
         raise TaskError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Sequence
 
@@ -19,12 +20,13 @@ _REGION: TypeAdapter[Region] = TypeAdapter(Region)
 SEEN: dict[str, tuple[str, Numbers]] = {
     "ground": ("ground:FROM:TO:WIDTH, in metres ahead", (0.5, 5.0, 4.0)),
     "ceiling": ("ceiling:HEIGHT over the ground", (2.5,)),
-    "wall": ("wall:DISTANCE:WIDTH ahead", (3.0, 4.0)),
+    "wall": ("wall:DISTANCE:WIDTH:HEADING:TOP, heading 0 is ahead, 90 to the left", (3.0, 4.0, 0.0, 2.5)),
     "around": ("around:UP:DOWN, in degrees from level", (30.0, 30.0)),
     "all": ("all, every direction", ()),
     "thing": ("thing:SIZE:DISTANCE, what it must not miss anywhere in the rest", (0.1, 3.0)),
 }
 """Word of a region -> how to write it, and the defaults of its numbers."""
+_SIGNED = {"FROM", "TO", "HEADING"}  # these numbers can be negative
 
 
 def parse_region(text: str) -> tuple[str, Numbers]:
@@ -43,7 +45,23 @@ def parse_region(text: str) -> tuple[str, Numbers]:
         raise TaskError(f"see = '{text}': needs numbers after the colons: {how}") from error
     if len(numbers) > len(usual) or not all(math.isfinite(each) for each in numbers):
         raise TaskError(f"see = '{text}': needs at most {len(usual)} finite numbers: {how}")
+    require_positive("see", text, how, numbers)
     return word, (*numbers, *usual[len(numbers) :])
+
+
+def require_positive(option: str, text: str, how: str, numbers: Sequence[float]) -> None:
+    """Reject negative numbers, except those in `_SIGNED`; `how` begins like "around:UP:DOWN,".
+
+    Raises:
+        TaskError: a number is negative; the message contains the text with positive numbers.
+    """
+    word, *names = re.split(r"[:, ]", how)
+    wrong = [name for name, number in zip(names, numbers, strict=False) if number < 0 and name not in _SIGNED]
+    if wrong:
+        mended = [
+            f"{number if name in _SIGNED else abs(number):g}" for name, number in zip(names, numbers, strict=False)
+        ]
+        raise TaskError(f"{option} = '{text}': {wrong[0]} is positive: {':'.join([word, *mended])} ({how})")
 
 
 def known_regions() -> str:
@@ -110,8 +128,8 @@ distance_m = {0:g}
 width_m = {1:g}
 height_m = {height_m:g}        # of the scanner over the ground
 bottom_m = 0          # of the wall, over the ground
-top_m = 2.5
-heading_deg = 0       # 0 is ahead, 90 to the left""",
+top_m = {3:g}
+heading_deg = {2:g}       # 0 is ahead, 90 to the left""",
     "around": """shape = "band"
 theta_deg = [{0:g}, {1:g}]  # 0 is up, 90 level, 180 down""",
     "all": 'shape = "all"',

@@ -9,7 +9,7 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
-from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.coverage import coverage, hidden_lines
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -24,6 +24,7 @@ class BuildAnswer:
     Attributes:
         as_built: what it sees with its parts, and the reference mounts.
         ball_deg: within which a beam counts for a direction.
+        hidden: which shares of the regions the masks hide, in words.
         masked_fraction: share of the sphere that the robot hides.
         lines: of one full scan.
         beams: of one line.
@@ -34,6 +35,7 @@ class BuildAnswer:
     masked_fraction: float
     lines: int
     beams: int
+    hidden: tuple[str, ...] = ()
 
 
 def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None) -> BuildAnswer:
@@ -52,6 +54,7 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = 
         masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
         beams=len(problem.bearings_rad),
+        hidden=tuple(hidden_lines(loaded)),
     )
 
 

@@ -135,8 +135,8 @@ def _framed(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> Indice
     if len(np.unique(weight)) > MOST_LEVELS:  # a map of many: its outline
         weight = weight > 0
     edge = (weight != np.roll(weight, 1, axis=1)) | (weight != np.vstack([weight[:1], weight[:-1]]))
-    out[_wider(_wider(edge)) & ~masked] = HALO
-    out[_wider(edge) & ~masked] = OUTLINE
+    out[_wider(edge) & ~masked] = HALO
+    out[edge & ~masked] = OUTLINE
     return out
 
 

@@ -85,7 +85,7 @@ def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList 
         text = "It shows which clearance your printer needs. Write the result into the printer's catalogue file."
         todo.append(ToDo("Print the fit coupon", text, ("print/fit_coupon.3mf",)))
     if parts is not None:
-        text = "Lidar, servo and slip ring first: they decide the delivery date."
+        text = f"{_capital(' and '.join(parts.bought.values()) or 'devices')} first: they decide the delivery date."
         todo.append(ToDo("Order devices, screws and wiring", text, ("#parts", "bom.csv")))
     machined = parts.group("turned") if parts is not None else None
     if machined is not None:
@@ -94,6 +94,8 @@ def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList 
         todo.append(ToDo(f"Have {count(len(sheets), 'part')} machined", text, sheets))
     if plates := tuple(sorted(name for name in files if name.startswith("print/plate_") and name.endswith(".3mf"))):
         text = "The files set layers and lines in PrusaSlicer; set them yourself in other slicers."
+        if parts is not None and parts.printing:
+            text = f"{_capital(parts.printing)}. {text}"
         todo.append(ToDo(f"Print {count(len(plates), 'plate')}", text, plates))
     if "assembly.md" in files:
         text = "Follow the pictures: each step ends with a check."
@@ -124,7 +126,9 @@ def _sees(answer: BuildAnswer, planes: Sequence[PlaneFigures]) -> Card:
     lines = f"Scan lines at most {own.line_gap_deg:.2f} deg apart, {rounded(gap_mm)} mm at {GAP_M:g} m."
     unseen = own.blind_weight > NO_BLIND_WEIGHT
     headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
-    text = [f"{_capital(figures.words())}." for figures in planes]
+    if answer.hidden:
+        headline += ", except behind the robot"
+    text = [f"{_capital(words)}." for words in (*answer.hidden, *(figures.words() for figures in planes))]
     if own.blind:
         text.append(f"{_capital(', '.join(words.partition(':')[0] for words in own.blind))}.")
     elif not planes:
@@ -172,8 +176,12 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
     if failed := [finding for finding in findings if finding.severity == "error"]:
         text = "Change the task until no check fails: each check states what to change."
         todo.append(ToDo(f"Fix {count(len(failed), 'failed check')}", text, ("#checks", "task.toml")))
-    how = "Copy the device's catalogue file, change the values, name the copy in task.toml, and build again."
+    how = (
+        "Copy the device's file next to your own task file: `scanwright catalogue NAME -v` prints its path. Change the "
+        'values, write catalogue = ["COPY.toml"] at the top of your task file (not of the task.toml in this folder, '
+        "which the next build replaces), and build again."
+    )
     if unverified := tuple(each for each in findings if each.code == "unverified"):
         text = f"These values are not from a drawing. A wrong one makes a part that does not fit. {how}"
-        todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("task.toml",), unverified))
+        todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("#checks",), unverified))
     return todo

@@ -11,11 +11,11 @@ from scanwright.report.build_files import read_table
 Row = dict[str, str]
 GROUPS = {
     "Devices": ("bought",),
-    "Parts to print": ("printed", "material"),
+    "Parts to print": ("printed",),
     "Parts to have machined": ("turned", "sawn"),
-    "Screws, nuts, inserts": ("screw", "nut", "insert"),
+    "Screws, nuts, washers, inserts": ("screw", "nut", "washer", "insert"),
     "Wiring": ("wiring",),
-    "Consumables": ("consumable",),
+    "Consumables": ("material", "consumable"),
     "Tools": ("tool",),
 }
 OTHERS = "Others"
@@ -55,6 +55,16 @@ class PartsList:
     def bought(self) -> dict[str, str]:
         """Return the kind of each device by its number."""
         return {row["number"]: row["part"] for row in self._rows("bought")}
+
+    @property
+    def printing(self) -> str:
+        """Return the time to print all parts; empty if the file does not state it."""
+        return next((row["note"].partition(";")[0] for row in self._rows("material") if " h" in row["note"]), "")
+
+    @property
+    def to_make(self) -> str:
+        """Return how many parts to print and to have machined, and the time to print."""
+        return f"{self.made('printed')}, {self.printing or 'to print'}; {self.made('turned', 'sawn')} to have machined"
 
     def made(self, *kinds: str) -> str:
         """Return how many parts are made in a way, in words."""

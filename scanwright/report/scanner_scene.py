@@ -73,6 +73,8 @@ def scanner_scene(
     T_world_rot, T_world_laser = _pose(assembly, "rot"), _pose(assembly, "laser")
     reach = FAN_REACH * _fit(together)["radius"]
     grid = _grid(np.concatenate(together))
+    side_m = grid["square"] * (grid["squares"] + 0.5)  # to the tip of the arrow ahead
+    together.append(np.array([[side_m, 0.0, grid["z"]]]))
     if own_body is not None:  # the fan comes round everywhere within its reach of the axis
         together.append(T_world_laser[:3, 3] + reach * np.concatenate([np.eye(3), -np.eye(3)]))
     return {

@@ -284,7 +284,7 @@ const inflated = async (text) => {
   const aim = () => {
     const camera = cameras[view];
     const { centre, radius } = fits[view]();
-    const distance = radius / Math.sin(FIELD_OF_VIEW / 2) / camera.zoom;
+    const distance = radius / (1 - Math.abs(BELOW_TABS)) / Math.sin(FIELD_OF_VIEW / 2) / camera.zoom;
     const eye = awayFrom(camera).map((part, k) => centre[k] + distance * part);
     const projection = perspective(canvas.width / canvas.height, distance / 50, distance + 10 * radius);
     const both = product(projection, looking(camera, eye));
@@ -346,6 +346,9 @@ const inflated = async (text) => {
     ahead.hidden = !tip || (view === "scanner" && value("apart", 0) > 0);
     if (!ahead.hidden) [ahead.style.left, ahead.style.top] = onPicture(both, tip).map((share) => `${(100 * share).toFixed(2)}%`);
     const shown = view === "scanner" && !picked && !spinning;
+    const axisMark = element("axis-mark");
+    axisMark.hidden = !shown;
+    if (shown) [axisMark.style.left, axisMark.style.top] = onPicture(both, product(scene.axis, scaled([0, 0, scene.reach], [1, 1, 1])).slice(12, 15)).map((share) => `${(100 * share).toFixed(2)}%`);
     const placed = labels.map(({ body, mark, lead }) => {
       const place = placeOf(body, turn);
       const at = [0, 1, 2].map((k) => (place[k] + place[4 + k] + place[8 + k]) / 2 + place[12 + k]); // of its box

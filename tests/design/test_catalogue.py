@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, load_catalogue, load_product
+from scanwright.design.catalogue.catalogue import KINDS, SHIPPED, file_of, load_catalogue, load_product
 from scanwright.design.catalogue.holes import HolePattern, mounting_holes
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
@@ -416,3 +416,8 @@ def test_start_and_inrush_currents_are_those_of_the_makers(shipped):
         "STL27L": (0.29, 0.54, None),
         "LD19": (0.18, 0.3, None),
     }
+
+
+@pytest.mark.parametrize("name", ["LD19", "XL430-W250"])
+def test_the_file_of_a_product_is_found(name):
+    assert load_product(file_of(name)).name == name

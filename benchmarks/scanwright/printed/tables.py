@@ -16,6 +16,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from scanwright.cad.assembly.print_settings import print_hours
+from scanwright.design.catalogue.products import Printer
 from scanwright.design.task.task import load_task
 
 ROOT = Path(__file__).parents[3]
@@ -26,8 +28,6 @@ NEW = {
     "--ahead-m 0.25"
 }
 HAND_TOOLS = ("hexagon keys", "multimeter", "torque screwdriver")  # what every build needs: not worth a column
-PLASTIC_G_CM3 = 1.24
-PRINTED_CM3_H = 20.0  # as `benchmarks.cad.slicer` measures it for these parts
 RANGE_M = 5.0
 
 
@@ -97,13 +97,14 @@ def _hardware_row(folder: Path) -> list[str]:
     (total,) = (row for row in rows if row["kind"] == "total")
     checks = json.loads((folder / "checks.json").read_text(encoding="utf-8"))["checks"]
     (turning,) = (check["value"] for check in checks if check["kind"] == "deflection_turning")
+    printer = loaded.products.get(loaded.task.printer, Printer)
     beyond = loaded.lidar.range_max_mm < 1000 * RANGE_M
     devices = [bought.get(kind, "none") for kind in ("lidar", "servo", "slip ring")]
     return [
         f"`{folder.name}`",
         ", ".join(devices),
         f"{loaded.task.motion.mode}, {loaded.task.motion.duration_s:g} s",
-        f"{len(printed)} parts, {mass_g:.0f} g, {mass_g / PLASTIC_G_CM3 / PRINTED_CM3_H:.0f} h",
+        f"{len(printed)} parts, {mass_g:.0f} g, {print_hours(mass_g, printer):.0f} h",
         ", ".join(made) or "none",
         ", ".join(tools) or "none",
         f"{total['low_usd']} to {total['high_usd']}",

@@ -6,19 +6,18 @@ import re
 from collections.abc import Iterator, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.print_settings import print_words
+from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
 from scanwright.cad.assembly.scenes import StepScene, scenes_of
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.joints import DECK_MM, Joint
-from scanwright.cad.layout.names import FIT_COUPON, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TEST_PLATE
+from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
 from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import measure_first
-from scanwright.design.catalogue.product_base import Product
-from scanwright.design.electrics.wiring import network_of
+from scanwright.design.electrics.wiring import network_of, uart_adapter
 from scanwright.design.scanner import Scanner
 
 NUTS = (
@@ -33,9 +32,9 @@ LOCKED = (
 LOOK = "Look, then wire"
 HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
 LAST = "Turn the linkage by hand through its range: nothing touches, no cable pulls tight. "
-TO_COMPUTER = "Then join the leads of the ring's stator to USB and power."
-THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to USB and power."
-IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to USB and power."
+TO_COMPUTER = "Then join the leads of the ring's stator to {port} and power."
+THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, those of the stator to {port} and power."
+IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to {port} and power."
 
 
 def instructions_text(
@@ -65,6 +64,7 @@ def instructions_text(
         "upright, or the lidar's axis if the step is on the bench. `exploded.glb` shows the scanner in 3D; `bom.csv` "
         "lists what you need.",
         "",
+        *_to_measure(assembly),
         "Try the hole patterns before you print parts: print `template.pdf` at 100 %, measure its scale of 100 mm, and "
         f"lay each page on its device. Then print `print/{TEST_PLATE}.3mf` and screw it to lidar and servo.",
         "",
@@ -72,7 +72,7 @@ def instructions_text(
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
         f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
         "",
-        *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts)),
+        *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts, assembly)),
         f"Lengths of screws with nuts assume {CASE_EAR_MM:g} mm of servo case before the nut and a deck of {DECK_MM:g} "
         "mm; all others follow from the parts.",
         "",
@@ -103,17 +103,23 @@ def instructions_text(
 
 def _joined(assembly: Assembly) -> str:
     """Return what to connect when all parts are together: leads with a path are connected in their own step."""
-    if assembly.layout.scanner.slip_ring is None:
-        return IN_A_LOOP
-    leads = assembly.layout.leads
+    scanner, leads = assembly.layout.scanner, assembly.layout.leads
     laid = leads and all(lead.path is not None for lead in leads)
-    return TO_COMPUTER if laid else THROUGH_RING
+    words = IN_A_LOOP if scanner.slip_ring is None else TO_COMPUTER if laid else THROUGH_RING
+    adapter = uart_adapter(scanner.lidar)
+    return words.format(port=f"the {adapter}" if adapter else "its port of the computer")
 
 
-def _plate(number: int, parts: Sequence[str]) -> tuple[str, ...]:
+def _plate(number: int, parts: Sequence[str], assembly: Assembly) -> tuple[str, ...]:
     """Return the lines of one print plate."""
-    name = f"print/plate_{number}"
-    return f"Plate {number}, `{name}.3mf`: {', '.join(parts)}.", "", f"![Plate {number} on the bed]({name}.png)", ""
+    name, mass_g = f"print/plate_{number}", sum(1000 * assembly.inertial(part).mass_kg for part in parts)
+    hours = print_hours(mass_g, assembly.layout.scanner.printer)
+    return (
+        f"Plate {number}, `{name}.3mf`: {', '.join(parts)}; {hours_in_words(hours)}.",
+        "",
+        f"![Plate {number} on the bed]({name}.png)",
+        "",
+    )
 
 
 def picture_name(number: int) -> str:
@@ -135,16 +141,7 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         inserts = f", through {nuts} in its bore"
-    first = _measure_first(assembly.layout.scanner, joint)
-    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}.{first and f' {first}'}"
-
-
-def _measure_first(scanner: Scanner, joint: Joint) -> str:
-    """What is to be measured before the screws of a joint are bought or driven; empty if it is verified."""
-    if joint.onto in (SERVO_HORN, SERVO_OUTPUT):
-        return measure_first(scanner.servo, *HORN_FIELDS)
-    devices: dict[str, Product] = {LIDAR_BODY: scanner.lidar, SERVO_CASE: scanner.servo}
-    return measure_first(devices[joint.onto], "holes") if joint.onto in devices else ""
+    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}."
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:
@@ -186,14 +183,12 @@ def _words(assembly: Assembly, scene: StepScene) -> str:
     for joint, mark in scene.joints:
         screws = f"**{screws_in_words(assembly, joint)}**"
         text = text.replace(mark, f"{screws} {mark}", 1) if mark else f"{text} {screws}"
-    text += "".join(f" {sentence}" for sentence in _fits_to_measure(assembly, scene))
     return " ".join(re.sub(r"\{.*?\}", "", text).split())
 
 
-def _fits_to_measure(assembly: Assembly, scene: StepScene) -> Iterator[str]:
-    """Yield what to measure before the new parts of a step fit their devices; the screws state theirs themselves."""
-    parts = [assembly.parts[name] for name in (scene.thing, *scene.step.brings) if name in assembly.made]
+def _to_measure(assembly: Assembly) -> Iterator[str]:
+    """Yield what to measure before any part is printed: values that no source verifies."""
     for product in products_of(assembly.layout.scanner, assembly.layout.drive):
-        fields = {field for part in parts for field in part.values_of(product)} - {"holes", *HORN_FIELDS}
-        if sentence := measure_first(product, *fields):
-            yield sentence
+        fields = {field for name in assembly.made for field in assembly.parts[name].values_of(product)}
+        if sentence := measure_first(product, *fields, "holes", *HORN_FIELDS):
+            yield from (sentence, "")

@@ -3,7 +3,6 @@
 import csv
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -11,9 +10,10 @@ from hypothesis import strategies as st
 from scanners import CAPSULE, RING, ROLLING, TILTED, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.print_settings import hours_in_words, print_hours
 from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.files.bom import _wiring, bom_text, items_of
-from scanwright.cad.files.manual.instructions import instructions_text, screws_in_words
+from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
@@ -242,14 +242,33 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert (seat.part, seat.count) == ("sub_plate", 4)
 
 
-def test_screws_into_holes_that_are_not_verified_say_how_to_measure_them():
-    scanner = scanner_at((0, 0, 25, -20), slip_ring=None)
-    lidar = scanner.lidar.model_copy()
+def test_what_is_not_verified_is_measured_before_anything_is_printed(made):
+    assembly, lidar = made.result.assembly, made.scanner.lidar.model_copy()
     lidar._provenance = lidar.provenance() | {"holes": Provenance(source="assumed", verified=False)}
-    layout = laid_out(replace(scanner, lidar=lidar))
-    words = [screws_in_words(SimpleNamespace(layout=layout, parts={}), joint) for joint in layout.joints]
-    first = [line for line in words if "Measure first" in line]
-    assert len(first) == 1 and f"no source verifies holes of {lidar.name}: press paper" in first[0]
+    layout = replace(assembly.layout, scanner=replace(made.scanner, lidar=lidar))
+    changed = replace(assembly, layout=layout)
+    text = instructions_text(layout.scanner, changed, scenes_of(changed, layout.joints), [], "0123456789ab")
+    first = re.search(rf"Measure first, no source verifies [^:]*holes[^:]* of {lidar.name}: press paper", text)
+    assert first and first.end() < text.index("Try the hole patterns before you print")
+    assert "Measure first" not in text[text.index("## 1.") :]
+
+
+def test_the_time_to_print_is_that_of_the_plates(rows, made):
+    masses = {row["part"]: float(row["mass_g"]) for row in rows if row["kind"] == "printed"}
+    hours = print_hours(sum(masses.values()), made.scanner.printer)
+    assert hours == pytest.approx(sum(masses.values()) / 1.24 / 20)
+    (plastic,) = (row for row in rows if row["kind"] == "material")
+    assert plastic["note"].startswith(f"{hours_in_words(hours)} to print")
+    assert [hours_in_words(h) for h in (0.01, 0.6, 4.8, 11.4)] == [
+        "about 0.5 h",
+        "about 0.5 h",
+        "about 5 h",
+        "about 11 h",
+    ]
+    text = (made.folder / "assembly.md").read_text(encoding="utf-8")
+    plates = re.findall(r"^Plate \d+, `print/plate_\d+.3mf`: (.*); about (.*) h\.$", text, re.M)
+    assert sorted(part for names, _ in plates for part in names.split(", ")) == sorted(masses)
+    assert sum(float(h) for _, h in plates) == pytest.approx(hours, abs=0.5 * len(plates) + 0.5)
 
 
 def test_a_profile_with_inserts_gets_their_seats_and_lists_them(parts_of):

@@ -95,7 +95,7 @@ def test_a_pin_to_tie_is_a_wire_of_drawing_and_words(name):
     files = {file: data.decode() for file, data in wiring_files(scanner, "0" * 12).items()}
     lidar = scanner.lidar.name
     assert f"- {lidar} PWM to {lidar} GND: GND, join these two" in files["wiring.md"]
-    assert "GND, join these two" in files["wiring.svg"] and "Join pin PWM" in files["wiring.svg"]
+    assert "GND, join these two" in files["wiring.svg"] and "Join pin PWM" in files["wiring.md"]
     picture = ElementTree.fromstring(files["wiring.svg"])
     right = float(picture.get("width"))
     assert max(extent(text)[2] for text in picture.findall(f"{SVG}text")) < right

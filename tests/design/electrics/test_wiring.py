@@ -133,6 +133,19 @@ def test_a_pin_that_must_be_tied_is_a_wire_and_a_one_way_line_has_no_rx(lidar, r
     assert sent.start == ("plug", "RX")  # what the lidar sends the computer receives
 
 
+@pytest.mark.parametrize("lidar", names(Lidar))
+def test_a_uart_gets_an_adapter_of_its_level_and_a_caution_and_no_other_link_does(lidar):
+    device, made = CATALOGUE.get(lidar, Lidar), network(lidar, ring=None)
+    plug = next(box for box in made.boxes if box.name == "plug")
+    cautions = [caution for caution in made.cautions if "UART" in caution]
+    if device.link == "serial" and device.signal_v is not None:
+        assert plug.title == f"USB to {device.signal_v:g} V UART adapter" and len(cautions) == 1
+        assert f"{device.signal_v:g} V" in cautions[0]
+    else:
+        assert "UART" not in plug.title and not cautions
+    assert check_network(made) == []
+
+
 def test_the_default_scanner_by_hand():
     """12 V: 1 A of lidar, 4.1 of a stalled servo, 15 W at 5 V through a converter of 85 %."""
     made = network()

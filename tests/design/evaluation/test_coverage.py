@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.coverage import coverage, hidden_lines, hidden_share
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.ball_search import scan_tree
 from scanwright.design.objective.named_objectives import log
@@ -107,3 +107,27 @@ def test_rolling_is_blind_behind_and_pitching_nowhere():
     rolling, pitching = (coverage(problem(), np.radians(s)) for s in ([0, 90, 0, -90], [-90, 0, 90, 0]))
     assert rolling.blind_fraction == pytest.approx(cap(radians(43)), abs=1e-6)
     assert pitching.blind_fraction == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_share_that_masks_hide_of_each_region_is_that_of_a_count(seed):
+    """Rays through points of each region against the rectangle of the robot's top, in solid angle, without a field."""
+    rng = np.random.default_rng(seed)
+    height_m, width_m, tall_m = 0.45, rng.uniform(0.2, 0.5), rng.uniform(0.4, 0.9)
+    walls = [
+        {"shape": "wall", "distance_m": 1, "width_m": 2, "top_m": tall_m, "height_m": height_m, "heading_deg": side}
+        for side in (90, -90)
+    ]
+    ground = {"shape": "ground", "from_m": 0.5, "to_m": 3, "width_m": 2, "height_m": height_m}
+    top = {"shape": "ground", "height_m": 0.05, "from_m": -0.55, "to_m": 0.05, "width_m": width_m}
+    task = {"name": "t", "sensor": "UTM-30LX", "servo": "MX-64R", "motion": {"period_s": 18.0}, "mask": [top]}
+    loaded = LoadedTask(Task.model_validate(task | {"weight": [ground, *walls]}), Path(), load_catalogue(), ())
+    x, z = rng.uniform(-1, 1, 200_000), rng.uniform(-height_m, tall_m - height_m, 200_000)
+    on_robot = (x * 0.05 / -z >= -0.55) & (x * 0.05 / -z <= 0.05) & (0.05 / -z <= width_m / 2) & (z < 0)
+    expected = np.average(on_robot, weights=(x**2 + 1 + z**2) ** -1.5)
+    shares = [hidden_share(loaded, region) for region in loaded.task.weight]
+    assert shares == pytest.approx([0, expected, expected], abs=0.004) and expected > 0.02
+    (line,) = hidden_lines(loaded)
+    assert line.startswith("the robot hides ") and "to the left; " in line and line.endswith("to the right")
+    bare = LoadedTask(loaded.task.model_copy(update={"mask": ()}), Path(), loaded.products, ())
+    assert hidden_lines(bare) == []

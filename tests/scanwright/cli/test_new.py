@@ -101,12 +101,25 @@ def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
         (["--see", "ceiling:0.2"], "ceiling_m = 0.2 is not above --height-m = 0.4"),
         (["--see", "thing:0:3"], "size and distance must be above 0"),
         (["--see", "thing:0.001:100"], "error: --see = 'thing:0.001:100': appears 0.00057 deg wide, minimum 0.02"),
-        (["--see", "wall:0:0"], "error: --see = 'wall:0:0': distance_m = 0: Input should be greater than or equal"),
+        (
+            ["--see", "wall:0:0"],
+            "error: --see = 'wall:0:0:0:2.5': distance_m = 0: Input should be greater than or equal",
+        ),
         (["--height-m", "-1"], "error: --height-m = -1: must be between 0.001 and 10000 m"),
         (["--height-m", "-1", "--see", "all"], "--height-m = -1: must be"),
         (["--lidar", "UST10"], "did you mean 'UST-10LX'?"),
         (["--robot", "box:1"], "box:LENGTH:WIDTH:HEIGHT"),
         (["--robot", "box:1:1:0.5"], "is not above it"),
+        (["--robot", "box:1:1:-0.5"], "--robot = 'box:1:1:-0.5': HEIGHT is positive: box:1:1:0.5"),
+        (["--robot", "box:-1:1:0.5"], "LENGTH is positive: box:1:1:0.5"),
+        (["--robot", "box.stl"], "box.stl: no such file"),
+        (["--see", "around:60:-45"], "--see = 'around:60:-45': DOWN is positive: around:60:45"),
+        (["--see", "around:-5"], "UP is positive: around:5"),
+        (["--see", "around:0:-45"], "DOWN is positive: around:0:45"),
+        (["--see", "wall:-2:1:-90"], "DISTANCE is positive: wall:2:1:-90"),
+        (["--see", "ground:-2:-1:-4"], "WIDTH is positive: ground:-2:-1:4"),
+        (["--see", "ceiling:-2"], "HEIGHT is positive: ceiling:2"),
+        (["--see", "thing:-0.1:3"], "SIZE is positive: thing:0.1:3"),
         (["--robot", "none.stl"], "none.stl: no such file"),
         (["--scan-s", "0.1"], "take 2 s at least"),
         (["--scan-s", "-1"], "motion.period_s = -1"),
@@ -140,6 +153,44 @@ QUESTIONS = [
     ("How many seconds", "0.1"),
     ("rpm at most", ""),
 ]
+
+
+def test_walls_to_the_sides_have_a_heading_and_a_top(command, here):
+    walls = [word for side in (90, -90) for word in ("--see", f"wall:1:2:{side}:0.5")]
+    assert command("new", "sides", *DOG, *walls)[0] == 0
+    regions = [region for region in load_task(here / "sides.toml").task.weight if region.shape == "wall"]
+    assert [(r.distance_m, r.width_m, r.heading_deg, r.top_m) for r in regions] == [(1, 2, 90, 0.5), (1, 2, -90, 0.5)]
+
+
+@pytest.mark.parametrize(("key", "code"), [(b"\x04", 2), (b"\x03", 130)])
+def test_the_end_of_the_input_at_a_question_is_one_line(here, key, code):
+    screen, keyboard = pty.openpty()
+    words = [sys.executable, "-m", "scanwright", "new", "ended", "--lidar", "LD19", "--servo", "MX-28"]
+    take = "import fcntl, os, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
+    program = subprocess.Popen(
+        [sys.executable, "-c", f"{take}os.execv({words[0]!r}, {words!r})"],
+        stdin=keyboard,
+        stdout=keyboard,
+        stderr=keyboard,
+    )
+    os.close(keyboard)
+    said = b""
+    try:
+        while not said.endswith(b" > "):
+            assert select.select([screen], [], [], PATIENCE_S)[0], said
+            said += os.read(screen, 4096)
+        os.write(screen, key)
+        while b"Traceback" not in said and select.select([screen], [], [], PATIENCE_S)[0]:
+            try:
+                said += os.read(screen, 4096)
+            except OSError:  # the program closed the terminal
+                break
+        assert program.wait(PATIENCE_S) == code
+    finally:
+        program.kill()
+        os.close(screen)
+    assert b"Traceback" not in said and (b"no answer: the input ended" in said) == (code == 2)
+    assert not list(here.iterdir())
 
 
 def test_on_a_terminal_what_no_flag_answers_is_asked(here):

@@ -236,3 +236,20 @@ def test_the_first_sentence_of_a_docstring():
 
 def test_version(command):
     assert re.fullmatch(r"scanwright \d+\.\d+\.\d+\S*\n", command("--version")[1])
+
+
+@pytest.mark.parametrize(
+    ("options", "field", "typed"),
+    [
+        ({"drop_outliers": "--drop-outliers"}, "drop_outliers = true drops them", "--drop-outliers drops them"),
+        ({}, "drop_outliers = true drops them", "import --drop-outliers drops them"),
+        ({}, 'time_increment = "auto" uses 0.0002 s', "import --time-increment auto uses 0.0002 s"),
+        ({}, "lag_s = 0.012 corrects them", "assemble --lag-s 0.012 corrects them"),
+        ({}, "stall_a = 2 is no option", "stall_a = 2 is no option"),
+    ],
+)
+def test_a_warning_names_options_and_the_command_that_has_them(monkeypatch, capsys, options, field, typed):
+    monkeypatch.setattr(console, "_options", options)
+    console.warn([f"3 angles lie off, min_range_m = 2: {field}"])
+    assert capsys.readouterr().err == f"warning: 3 angles lie off, min_range_m = 2: {typed}\n"
+    assert console.as_typed(field) == typed

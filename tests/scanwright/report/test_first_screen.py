@@ -100,7 +100,7 @@ def test_parts_are_grouped_in_order_and_nothing_is_lost(parts, built):
         ("Devices", "5,000 USD"),
         ("Parts to print", "0 USD"),
         ("Parts to have machined", "30 to 90 USD"),
-        ("Screws, nuts, inserts", "1 to 2 USD"),
+        ("Screws, nuts, washers, inserts", "1 to 2 USD"),
         ("Tools", "15 to 60 USD"),
         ("Others", "0 USD"),
     ]
