@@ -120,7 +120,7 @@ ENTRIES = (
     Entry(
         "forest_plot",
         "A forest plot: stems around a tripod",
-        "--lidar UST-20LX --servo XM430-W350 --height-m 1.4 --see around:75:40 --scan-s 30",
+        "--lidar UTM-30LX --servo MX-64R --height-m 1.4 --see around:75:40 --scan-s 30",
         worlds.forest,
         1.4,
         lambda p: p[:, 2] < 9,
