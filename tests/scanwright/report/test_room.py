@@ -36,7 +36,7 @@ def test_a_task_that_looks_up_only_is_seen_from_below(theta_deg, below, pitch_de
     loaded = task(weight=[{"shape": "band", "theta_deg": theta_deg}])
     flat = Angles(alpha_rot=0, beta_rot=0, alpha_laser=90, beta_laser=0)
     angles = AngleSet(task="t", angles_deg=flat, sensor="UTM-30LX", servo="MX-64R")
-    sphere = density_sphere(problem_of(loaded), angles, (), None, 5.0)
+    sphere = density_sphere(problem_of(loaded), angles, (), None)
     assert sphere.below == pytest.approx(below, abs=0.01)
     centre_m = np.array([0.1, 0.2, 0.3])
     scene = room_scene(room_about(loaded.task), centre_m, np.array(sphere.middle), sphere.below)
