@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from scanwright.cad.checks.checks_json import read_checks
 from scanwright.cad.files.part_files import PartReport, PartsResult, build_parts, write_files
 from scanwright.cad.kernel import require_kernel
+from scanwright.design.angles import AngleSet
 from scanwright.design.concurrency.processes import Begin, Packed, worker_processes
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding, errors_in, sentence
@@ -68,6 +69,7 @@ class Made:
         planes: what one full scan leaves on ground, ceiling and walls of the task.
         hidden: which shares of the regions the masks hide, in words.
         to_make: how many parts to print and to have machined, and the time to print.
+        mounted: where the optical centre is with respect to the deck.
     """
 
     optimum: Optimum
@@ -77,6 +79,7 @@ class Made:
     planes: tuple[PlaneFigures, ...]
     hidden: tuple[str, ...]
     to_make: str
+    mounted: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +113,7 @@ class Build:
         return [
             f"wrote {len(self.files)} files to {self.folder}",
             f"parts to make: {self.made.to_make}",
+            f"optical centre: {self.made.mounted}",
             *(optimum.table() if in_full else [*optimum.hole_lines(tabled=False), *optimum.preferred_lines()]),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
@@ -346,4 +350,13 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         to_make = read_parts(work / "bom.csv").to_make
     planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
-    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, tuple(hidden_lines(loaded)), to_make)
+    hidden, mounted = tuple(hidden_lines(loaded)), _mounted(angles)
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, hidden, to_make, mounted)
+
+
+def _mounted(angles: AngleSet) -> str:
+    """Return where the optical centre is, in words."""
+    x_mm, _, z_mm = angles.t_world_rot_mm
+    height = "above the deck" if z_mm > 0 else "below the deck that the scanner hangs from"
+    along = f", {abs(x_mm):.0f} mm {'ahead of' if x_mm > 0 else 'behind'} its holes" if abs(x_mm) >= 0.5 else ""
+    return f"{abs(z_mm):.0f} mm {height}{along}"

@@ -99,7 +99,11 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     if best.same:
         return [f"the optimum is itself a simple mount: {best.mount.name}"]
     assert best.factor is not None
-    how = f"better ({1 / best.factor:.2f} times the beams)" if better else f"as good within {AS_GOOD - 1:.0%}"
+    how = (
+        f"better ({1 / best.factor:.2f} times the beams, if its parts block none)"
+        if better
+        else f"as good within {AS_GOOD - 1:.0%}"
+    )
     rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""
     return [f"{best.mount.name} {angles_words(best.mount.angles_deg)} is {how}{rest}"]
 
