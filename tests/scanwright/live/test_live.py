@@ -435,7 +435,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
     saved.locator("#canvas").press("ArrowLeft")
     assert "20,000 of 20,000 points" in saved.inner_text("main") and browser.barriers(saved) == []
     shot = np.asarray(Image.open(io.BytesIO(saved.locator("#canvas").screenshot())).convert("RGB"), int)
-    assert (np.abs(shot - COLOUR_STOPS[0]).max(axis=2) < 9).mean() > 0.03  # a floor has one height
+    assert (np.abs(shot - COLOUR_STOPS[0]).max(axis=2) < 9).mean() > 0.02  # a floor has one height
     browser.complaints[:] = [said for said in browser.complaints if not any(word in said for word in HARMLESS)]
 
 
