@@ -411,7 +411,7 @@ def test_in_a_browser_a_distance_is_measured_and_the_cloud_saved(browser, tmp_pa
         assert browser.barriers(page) == []
         page.get_by_label("measure").check()
         until(lambda: view.ruler.on.value)
-        for number, across in enumerate((150, 350), 1):  # the panel covers the right
+        for number, across in enumerate((350, 550), 1):
             for _ in range(10):  # a page that does not know yet that it takes clicks misses one
                 if len(view.ruler.ends) >= number:
                     break
