@@ -423,7 +423,7 @@ def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     assert gathered[1] == "note: shaft: of metal: have it turned"
     assert gathered[2].startswith("warning: unverified values shape parts (UTM: 2")
     assert len(gathered) == 3
-    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[2:] == [
+    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[3:] == [
         "note: shaft: of metal: have it turned",
         "note: UTM: a = 1 is not verified",
         "note: UTM: b = 2 is not verified",
