@@ -136,7 +136,7 @@ class Directions:
         return rows / total
 
     def _weights_nearby(self, field: Field) -> Array:
-        """The same of a region that lies between the directions: each of its own goes to the nearest one."""
+        """The same for a region between the directions: each of its own directions counts at the nearest one."""
         from scipy.spatial import cKDTree  # a heavy import that few tasks need
 
         samples = weighted_samples(field, IN_REGION)

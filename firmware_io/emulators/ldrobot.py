@@ -130,5 +130,5 @@ def ldrobot_emulator(
     if lidar.name not in BAUDS:
         raise DeviceError(f"no LDROBOT emulator of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
     machine = LdrobotMachine(lidar, ranging, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
-    # a line that nobody listens to keeps next to nothing
+    # a line without a reader keeps next to nothing
     return LidarLine(lidar.name, machine, head=6, backlog=_BACKLOG, network=False, seed=seed)

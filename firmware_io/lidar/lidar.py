@@ -69,7 +69,7 @@ class LidarDriver(Protocol):
     ) -> None: ...
 
     def condition(self) -> tuple[str, ...]:
-        """What it tells of its own age and state, in words, one thing each; asked before `start` only."""
+        """Return what it reports of its age and state, one line each; call before `start` only."""
         ...
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:

@@ -77,7 +77,7 @@ def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUni
 
 
 def _refuse_collision(unit: ServoUnit, wanted: dict[Register, int]) -> None:
-    """See that nobody else has the new number at the new speed, and that the adapter can have it."""
+    """Check that no servo has the new number at the new speed, and that the adapter supports that speed."""
     bus, table, before = unit.bus, unit.table, unit.bus.baud
     new_id, new_baud = wanted[table.id], table.bauds[wanted[table.baud]]
     if not bus.set_baud(new_baud):

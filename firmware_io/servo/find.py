@@ -91,7 +91,7 @@ def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
 
 
 def listen_first(bus: ServoBus) -> None:
-    """Hear whether somebody speaks unasked, before anything is sent."""
+    """Check whether a device sends unasked, before anything is sent to it."""
     if noise := bus.listen(_LISTEN_S):
         raise DeviceError(
             f"{bus.port}: {len(noise)} bytes came before any request: another program drives this bus, or no "

@@ -1,4 +1,4 @@
-"""Make a servo ready to be driven: torque off, faults cleared. It never writes unasked what outlasts the power.
+"""Make a servo ready to be driven: torque off, faults cleared. It never writes permanent registers without consent.
 
 A device that is gone, silent or refuses raises DeviceError.
 """

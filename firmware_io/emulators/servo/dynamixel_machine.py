@@ -1,4 +1,4 @@
-"""A servo without its bus: control table, instructions, motion and protection, at whatever time it is told.
+"""A servo without its bus: control table, instructions, motion and protection, at a time that the caller gives.
 
 Not published by the maker and therefore assumed: how long a restart takes, when the overload protection trips, and
 that an AX-12A reads 0 or 1023 in its dead sector, the end that is nearer.

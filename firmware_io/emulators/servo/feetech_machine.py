@@ -1,4 +1,4 @@
-"""A Feetech STS3215 without its bus: memory table, instructions, motion and protection, at whatever time it is told.
+"""A Feetech STS3215 without its bus: memory table, instructions, motion and protection, at a given time.
 
 Not published by the maker and therefore assumed: how long a restart takes, that a damaged request is not answered, that
 values beyond their bounds are not taken, and that an overload, which leaves the torque of register 34, ends when the

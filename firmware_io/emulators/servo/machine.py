@@ -40,7 +40,7 @@ class Request:
 
 
 class ServoMachine(ABC):
-    """A servo with power and without its bus, at whatever time it is told.
+    """A servo with power and without its bus, at a time that the caller gives.
 
     Attributes:
         table: what the driver knows of the model.

@@ -267,7 +267,7 @@ class SickMachine:
 def sick_emulator(
     lidar: Lidar, ranging: Ranging, seed: int = 0, *, jitter_s: float = 0.0, **state: Any
 ) -> LidarLine[SickMachine]:
-    """The emulator of a sensor of the catalogue, with some state of its own; scans arrive up to `jitter_s` late."""
+    """The emulator of a sensor of the catalogue, in a given state; scans arrive up to `jitter_s` late."""
     machine = SickMachine(lidar, ranging, time.monotonic_ns(), **state)
     return LidarLine(lidar.name, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
 
