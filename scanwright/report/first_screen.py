@@ -177,7 +177,7 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
         text = "Change the task until no check fails: each check states what to change."
         todo.append(ToDo(f"Fix {count(len(failed), 'failed check')}", text, ("#checks", "task.toml")))
     how = (
-        "Copy the device's file next to your own task file: `scanwright catalogue NAME -v` prints its path. Change the "
+        "Copy the device's file next to your own task file: scanwright catalogue NAME -v prints its path. Change the "
         'values, write catalogue = ["COPY.toml"] at the top of your task file (not of the task.toml in this folder, '
         "which the next build replaces), and build again."
     )
