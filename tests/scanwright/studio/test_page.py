@@ -267,7 +267,8 @@ def test_a_link_opens_its_setting_and_what_is_wrong_is_said_at_its_field(studio,
     field.blur()
     until(lambda: studio.setting == Setting((0, 45, 0, -60)) and not studio.controls.typed_error.content)
 
-    # pads: arrow keys, and a drag that is one step
+    # pads: arrow keys, and a drag that is one step; a key moves what the page shows
+    page.wait_for_function("location.hash === '#angles=0,45,0,-60'")
     page.get_by_label("Where the axis points").press("ArrowRight")
     until(lambda: studio.setting == Setting((1, 45, 0, -60)))
     page.wait_for_function("location.hash === '#angles=1,45,0,-60'")
