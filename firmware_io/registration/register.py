@@ -14,13 +14,23 @@ from numpy import ndarray
 from scanwright.design.arrays import Floats, Pose
 from scanwright.design.progress import Progress
 from scanwright.firmware_io.registration.graph import Edge, Graph, solve_graph
-from scanwright.firmware_io.registration.pairwise import Pair, align, near_share, refused
+from scanwright.firmware_io.registration.pairwise import (
+    MAX_CONTRADICTION,
+    MIN_OVERLAP,
+    Pair,
+    align,
+    judge_pair,
+    near_share,
+    refused,
+)
 from scanwright.firmware_io.registration.sensor_view import SensorView
 from scanwright.firmware_io.registration.start import find_start
 
 _LOG = logging.getLogger(__name__)
 _WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
 _ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach
+_CONFLICT = 1.5  # times what a pair may have: at true poses of a coarse scan chance reaches 1.1 times
+_START_OFF_M, _START_OFF_SHARE = 2.0, 0.3  # of the way between two starts: more than wheels and compass are off by
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,18 +41,21 @@ class Registration:
         T_world: pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined.
         covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (n, 6, 6).
         pairs: every pair that was tried, the believed ones first.
+        conflicts: pairs that the poses lay on each other although one of the two scanners looked through the other's
+            points, if some cloud has more of them than of believed pairs; else empty.
         scale: by how much the stated sigmas of the pairs had to grow for them to agree, at least 1.
     """
 
     T_world: Float64[ndarray, "n 4 4"]
     covariance: Float64[ndarray, "n 6 6"]
     pairs: tuple[Pair, ...]
+    conflicts: tuple[Pair, ...]
     scale: float
 
     @property
     def complete(self) -> bool:
-        """Whether every cloud found its place."""
-        return bool(np.isfinite(self.T_world).all())
+        """Whether every cloud found its place, and no two places contradict each other."""
+        return bool(np.isfinite(self.T_world).all()) and not self.conflicts
 
 
 def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Progress) -> Registration:
@@ -72,7 +85,27 @@ def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Prog
         poses = dict(zip(order, graph.T_world, strict=True))
         covariance[order], scale = graph.covariance, graph.scale
     T_world = np.array([poses.get(k, np.full((4, 4), np.nan)) for k in range(len(views))])
-    return Registration(T_world, covariance, tuple(sorted(pairs.values(), key=lambda pair: bool(pair.why_not))), scale)
+    tried = tuple(sorted(pairs.values(), key=lambda pair: bool(pair.why_not)))
+    return Registration(T_world, covariance, tried, _conflicts(views, poses, pairs), scale)
+
+
+def _conflicts(
+    views: Sequence[SensorView], poses: dict[int, Floats], pairs: dict[tuple[int, int], Pair]
+) -> tuple[Pair, ...]:
+    """Places that look alike join to a chain in which every link is good; what gives it away is who sees through whom.
+
+    People and doors move, so one pair proves nothing: the pairs of a cloud vote.
+    """
+    conflicts, votes = [], np.zeros(len(views), int)
+    for i, j in combinations(sorted(poses), 2):
+        if (i, j) in pairs and not pairs[i, j].why_not:
+            votes[[i, j]] += 1
+        elif _in_reach(views, poses, i, j):
+            pair = judge_pair(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j])
+            if pair.overlap >= MIN_OVERLAP and pair.contradiction > _CONFLICT * MAX_CONTRADICTION:
+                conflicts.append(pair)
+                votes[[i, j]] -= 1
+    return tuple(conflicts) if votes.min(initial=0) < 0 else ()
 
 
 def _chain(
@@ -110,12 +143,21 @@ def _next_joined(
 
 
 def _pair(a: SensorView, b: SensorView, starts: Sequence[Floats]) -> Pair:
-    """From the given poses if they lead anywhere, else from none."""
-    if starts:
-        pair = align(a, b, np.linalg.inv(starts[0]) @ starts[1])
-        if not pair.why_not:
-            return pair
-    return find_start(a, b)
+    """From the given poses if they lead anywhere, else from none; never far from what the given poses say."""
+    if not starts:
+        return find_start(a, b)
+    T_a_b = np.linalg.inv(starts[0]) @ starts[1]
+    near = _near_start(align(a, b, T_a_b), T_a_b)
+    return near if not near.why_not else _near_start(find_start(a, b), T_a_b)
+
+
+def _near_start(pair: Pair, T_a_b: Pose) -> Pair:
+    """The pair, refused if it is far from its start: another room, or another door of a corridor, may fit as well."""
+    way_m = float(np.linalg.norm(T_a_b[:3, 3]))
+    off_m = float(np.linalg.norm(pair.T_a_b[:3, 3] - T_a_b[:3, 3]))
+    if pair.why_not or way_m == 0 or off_m <= _START_OFF_M + _START_OFF_SHARE * way_m:
+        return pair  # clouds at the same start have none: the files of many programs hold (0, 0, 0)
+    return refused(pair, f"it lies {off_m:.1f} m from the start that was given")
 
 
 def _in_reach(views: Sequence[SensorView], poses: dict[int, Floats], i: int, j: int) -> bool:

@@ -59,7 +59,15 @@ class RegisteredFiles:
         positions = list(zip(self.names, self.registration.T_world, self.registration.covariance, strict=True))
         if not self.registration.complete:
             lost = [name for name, T, _ in positions if np.isnan(T[0, 0])]
-            return [*lines, f"no place was found for {', '.join(lost)}: nothing is written"]
+            if lost:
+                return [*lines, f"no place was found for {', '.join(lost)}: nothing is written"]
+            for pair in self.registration.conflicts:
+                through = f"{pair.contradiction:.0%} of the points hang where the other scanner looked through"
+                lines.append(
+                    f"{pair.a} - {pair.b}: would lie on each other ({pair.overlap:.0%} overlap), but {through}"
+                )
+            remedy = "places look alike here: give initial poses, or clouds from places in between"
+            return [*lines, f"the poses contradict each other: nothing is written; {remedy}"]
         for name, T, covariance in positions:
             x, y, z = T[:3, 3]
             sigma_mm = 1e3 * np.sqrt(covariance[3:, 3:].trace())
