@@ -29,7 +29,7 @@ from scanwright.cad.checks.loads.deflection import LEAST_ERROR
 from scanwright.cad.checks.loads.mount import carried
 from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
-from scanwright.cad.parts.base_mount import FOOT_RADIUS
+from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.statics.mount_sag import mount_sag
 from scanwright.cad.statics.sag import POISSON, linkage_sag

@@ -31,7 +31,7 @@ from scanwright.cad.layout.direct.cage import BearingCage, stiffness_n_per_m
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, ALUMINIUM_PA, HORN_TILTS_RAD, trusted_moment_nm
 from scanwright.cad.layout.names import BASE_MOUNT
-from scanwright.cad.parts.base_mount import FOOT_RADIUS
+from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.design.angles import load_angles
 from scanwright.design.arrays import Array, Mask

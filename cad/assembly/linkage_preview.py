@@ -1,7 +1,7 @@
 """The alignment linkage for the eye: put together from the very shapes of the part, but as meshes.
 
 Booleans of meshes take milliseconds where those of the kernel take a second. What comes is the part to within the
-chords of its meshes, unchecked: what is printed is made by `cad.parts.alignment_linkage`, and may be refused there.
+chords of its meshes, unchecked: `cad.parts.linkage.alignment_linkage` makes what is printed, and may refuse it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
-from scanwright.cad.parts.alignment_linkage import shapes_of
+from scanwright.cad.parts.linkage.alignment_linkage import shapes_of
 
 CHORD_ERROR = 0.2  # mm: not seen on a screen, a third of the triangles of the files
 CHORD_ANGLE = 0.3  # rad

@@ -13,7 +13,7 @@ from scanwright.cad.assembly.masses import rotor_moment
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.names import BASE_MOUNT, COUNTERWEIGHT, TRIPOD_FOOT
 from scanwright.cad.parts.all_parts import laid_out, parts_of
-from scanwright.cad.parts.counterweight import bar_spec
+from scanwright.cad.parts.linkage.counterweight import bar_spec
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from scanwright.cad.layout.layout import Layout, layout_of
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.alignment_linkage import linkage_spec
-from scanwright.cad.parts.base_mount import mount_spec
-from scanwright.cad.parts.bearing_cage import base_spec, bell_spec
-from scanwright.cad.parts.bearing_tower import tower_spec
-from scanwright.cad.parts.capsule_holder import holder_spec
-from scanwright.cad.parts.counterweight import counterweight_spec
-from scanwright.cad.parts.drive_plate import plate_spec
-from scanwright.cad.parts.horn_cup import cup_spec
-from scanwright.cad.parts.journal_sleeve import sleeve_spec
-from scanwright.cad.parts.main_shaft import main_shaft_spec
+from scanwright.cad.parts.linkage.alignment_linkage import linkage_spec
+from scanwright.cad.parts.linkage.counterweight import counterweight_spec
+from scanwright.cad.parts.linkage.sub_plate import sub_plate_spec
+from scanwright.cad.parts.mounts.base_mount import mount_spec
+from scanwright.cad.parts.mounts.bearing_cage import base_spec, bell_spec
+from scanwright.cad.parts.mounts.bearing_tower import tower_spec
+from scanwright.cad.parts.mounts.capsule_holder import holder_spec
+from scanwright.cad.parts.mounts.drive_plate import plate_spec
+from scanwright.cad.parts.mounts.servo_frame import frame_spec
+from scanwright.cad.parts.mounts.slip_ring_adapter import adapter_spec
+from scanwright.cad.parts.mounts.tripod_foot import tripod_foot_spec
 from scanwright.cad.parts.part_spec import PartSpec
-from scanwright.cad.parts.pulleys import drive_pulley_spec, shaft_pulley_spec
-from scanwright.cad.parts.servo_frame import frame_spec
-from scanwright.cad.parts.servo_shaft import servo_shaft_spec
-from scanwright.cad.parts.shaft_ring import shaft_ring_spec
-from scanwright.cad.parts.slip_ring_adapter import adapter_spec
-from scanwright.cad.parts.sub_plate import sub_plate_spec
-from scanwright.cad.parts.tripod_foot import tripod_foot_spec
+from scanwright.cad.parts.shafts.horn_cup import cup_spec
+from scanwright.cad.parts.shafts.journal_sleeve import sleeve_spec
+from scanwright.cad.parts.shafts.main_shaft import main_shaft_spec
+from scanwright.cad.parts.shafts.pulleys import drive_pulley_spec, shaft_pulley_spec
+from scanwright.cad.parts.shafts.servo_shaft import servo_shaft_spec
+from scanwright.cad.parts.shafts.shaft_ring import shaft_ring_spec
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 

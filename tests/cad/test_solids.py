@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull
 
 from scanwright.cad import solids
 from scanwright.cad.parts.all_parts import laid_out
-from scanwright.cad.parts.base_mount import base_mount
+from scanwright.cad.parts.mounts.base_mount import base_mount
 
 
 @pytest.mark.parametrize("twist", [0.0, 2e-7, 1e-6, 1e-5, 1e-4, 1e-2])

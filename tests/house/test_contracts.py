@@ -14,7 +14,7 @@ LINT = Path(sys.executable).with_name("lint-imports")
 CONTRACTS = [c["id"] for c in tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]]
 INTRUDERS = {  # contract -> a file, and an import in it that breaks that one
     "design": ("design/sphere/regions.py", "import scanwright.design.search.constraints"),
-    "cad": ("cad/solids.py", "import scanwright.cad.parts.base_mount"),
+    "cad": ("cad/solids.py", "import scanwright.cad.parts.mounts.base_mount"),
     "cad-layout": ("cad/layout/deck.py", "import scanwright.cad.solids"),
     "cad-layout-steps": ("cad/layout/direct/stack.py", "import scanwright.cad.layout.deck"),
     "firmware_io": ("firmware_io/recording/recording.py", "import scanwright.firmware_io.assembly.turns"),

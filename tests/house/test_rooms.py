@@ -14,7 +14,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from imports import FLOORS, PACKAGE, ROOT, imports, loaded_by, modules
 
 MOST = 12
-MOST_IN = {"cad/parts": 24}  # one a part
 HEAVY = {
     "OCP",
     "PIL",
@@ -55,7 +54,7 @@ def folders():
 
 
 def test_no_folder_holds_more_than_a_dozen_modules():
-    assert {f: n for f, n in folders().items() if n > MOST_IN.get(f, MOST)} == {}
+    assert {f: n for f, n in folders().items() if n > MOST} == {}
 
 
 def test_every_room_says_in_one_line_what_one_finds_there():

@@ -18,7 +18,7 @@ from scanwright.cad.checks.table import LEAN_DEG
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD_FOOT
-from scanwright.cad.parts.base_mount import FOOT_RADIUS
+from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.statics.mount_sag import Carried, mount_sag
 from scanwright.cad.statics.spring import Spring

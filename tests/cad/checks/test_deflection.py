@@ -12,7 +12,7 @@ from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.direct.loads import hanging, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.loads import ALUMINIUM_PA, weight_of
 from scanwright.cad.parts.all_parts import laid_out
-from scanwright.cad.parts.horn_cup import horn_cup
+from scanwright.cad.parts.shafts.horn_cup import horn_cup
 from scanwright.cad.solids import box, upright
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.sag import linkage_sag

@@ -10,7 +10,7 @@ from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
 from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.parts.all_parts import laid_out
-from scanwright.cad.parts.base_mount import base_mount
+from scanwright.cad.parts.mounts.base_mount import base_mount
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.deck_holes import Circle, Rectangle

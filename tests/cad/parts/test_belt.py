@@ -34,7 +34,7 @@ from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.outlines import polygon
 from scanwright.cad.parts.all_parts import laid_out, parts_of
-from scanwright.cad.parts.bearing_tower import bearing_tower
+from scanwright.cad.parts.mounts.bearing_tower import bearing_tower
 from scanwright.cad.solids import prism, upright
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.holes import Hole

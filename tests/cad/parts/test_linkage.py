@@ -28,10 +28,10 @@ from scanwright.cad.layout.envelope import (
     slot_ends,
 )
 from scanwright.cad.layout.placement import drive_of, placement_of
-from scanwright.cad.parts.alignment_linkage import alignment_linkage
 from scanwright.cad.parts.all_parts import laid_out
-from scanwright.cad.parts.base_mount import base_mount
-from scanwright.cad.parts.sub_plate import sub_plate
+from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
+from scanwright.cad.parts.linkage.sub_plate import sub_plate
+from scanwright.cad.parts.mounts.base_mount import base_mount
 from scanwright.cad.solids import box, building
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue

@@ -16,7 +16,7 @@ from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.labels.fit_coupon import fit_coupon
 from scanwright.cad.layout.direct.cage import has_room
 from scanwright.cad.layout.placement import drive_of
-from scanwright.cad.parts.alignment_linkage import alignment_linkage
+from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
 from scanwright.cad.screws import SCREWS, thread_in_part, trap_of
 from scanwright.design.angles import Angles
 from scanwright.design.catalogue.catalogue import load_catalogue

@@ -42,10 +42,10 @@ from scanwright.cad.layout.rotor.linkage import (
     cross_thread_mm,
     neck_corners,
 )
-from scanwright.cad.parts.fins import FAR, fins_of
-from scanwright.cad.parts.linkage_hub import hub, hub_cuts, tie_lug, tie_slots
+from scanwright.cad.parts.linkage.fins import FAR, fins_of
+from scanwright.cad.parts.linkage.linkage_hub import hub, hub_cuts, tie_lug, tie_slots
+from scanwright.cad.parts.linkage.sub_plate import front_mark, lidar_joint
 from scanwright.cad.parts.part_spec import PartSpec, Step
-from scanwright.cad.parts.sub_plate import front_mark, lidar_joint
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.arrays import Array

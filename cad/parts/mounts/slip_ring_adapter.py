@@ -25,7 +25,7 @@ from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import RING, SERVO_CASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.bearing_cage import around_base, cage_base, on_ears
+from scanwright.cad.parts.mounts.bearing_cage import around_base, cage_base, on_ears
 from scanwright.cad.parts.part_spec import CRIMPS, ON_CASE, PartSpec, Row, Step
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building

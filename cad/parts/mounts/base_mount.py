@@ -34,7 +34,7 @@ from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import BASE_MOUNT, BEARING_TOWER, DECK, SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.linkage_hub import tie_slots
+from scanwright.cad.parts.linkage.linkage_hub import tie_slots
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.solids import building

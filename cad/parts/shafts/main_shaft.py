@@ -18,7 +18,7 @@ from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import SEATED, TURNED_FROM, PartSpec, Step
-from scanwright.cad.parts.servo_shaft import cross_holes, cross_words
+from scanwright.cad.parts.shafts.servo_shaft import cross_holes, cross_words
 from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.solids import building
 

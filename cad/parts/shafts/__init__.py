@@ -1,0 +1,1 @@
+"""Turning parts between servo and linkage: shafts, sleeves and pulleys."""
