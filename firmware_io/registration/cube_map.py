@@ -46,12 +46,13 @@ def solid_angles_sr(side: int) -> Float64[ndarray, " cells"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthMap:
-    """The nearest and the farthest surface that a scanner saw in each cell.
+    """The nearest and the farthest surface that a scanner saw.
 
     Attributes:
         side: cells along an edge of the cube.
-        near_m: shape (6 * side * side,), +inf if nothing was seen.
-        far_m: as `near_m`, -inf if nothing was seen.
+        near_m: nearest in each cell and its neighbours, since the range changes much within a cell on a slanted
+            surface, shape (6 * side * side,); +inf if nothing was seen.
+        far_m: farthest in each cell, shape (6 * side * side,); -inf if nothing was seen.
     """
 
     side: int
@@ -62,7 +63,17 @@ class DepthMap:
 def depth_map(points_m: Float64[ndarray, "n 3"], side: int) -> DepthMap:
     """What the scanner at the origin saw of points of shape (n, 3)."""
     near, far = _extremes(points_m, cells_of(points_m, side), 6 * side * side)
-    return DepthMap(side, near, far)
+    step = np.pi / 2 / side
+    shifts = [(du, dv) for du in (-step, 0.0, step) for dv in (-step, 0.0, step)]
+    return DepthMap(side, np.min([near[cells_of(_centres(side, *shift), side)] for shift in shifts], axis=0), far)
+
+
+def _centres(side: int, du_rad: float, dv_rad: float) -> Float64[ndarray, "cells 3"]:
+    """A point in the direction of the centre of every cell, moved along its face; past the edge, on the next face."""
+    middle = (np.arange(side) + 0.5) / side * np.pi / 2 - np.pi / 4
+    u, v = np.meshgrid(np.tan(middle + du_rad), np.tan(middle + dv_rad))
+    faces = [np.roll([np.full_like(u, end), u, v], axis, 0) for axis in range(3) for end in (1.0, -1.0)]
+    return np.ascontiguousarray(np.moveaxis(faces, 1, -1).reshape(-1, 3))
 
 
 @njit(cache=True)

@@ -34,7 +34,7 @@ _JUDGED = 20_000  # points of a pair: chance in a share of them is below 0.4 %
 _ALIKE = 0.5  # cosine between normals of one surface: two noisy normals, or a curved surface
 
 MIN_OVERLAP = 0.2  # share of the points; a pair with less is not used
-MAX_CONTRADICTION = 0.07  # share of the points in free space; a pair with more is not used
+MAX_CONTRADICTION = 0.03  # share of the points in free space; a pair with more is not used
 _BLOCK = 10  # times the spacing: ten neighbours make a normal, and voxels are targets of several
 _CLEARLY = 0.3  # of what a surface square to the motion does
 _MIN_RESIST = 0.03  # share of the points; a motion that fewer resist counts as free

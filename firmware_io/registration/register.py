@@ -29,7 +29,6 @@ from scanwright.firmware_io.registration.start import find_start
 _LOG = logging.getLogger(__name__)
 _WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
 _ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach
-_CONFLICT = 1.5  # times what a pair may have: at true poses of a coarse scan chance reaches 1.1 times
 _START_OFF_M, _START_OFF_SHARE = 2.0, 0.3  # of the way between two starts: more than wheels and compass are off by
 
 
@@ -42,7 +41,7 @@ class Registration:
         covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (n, 6, 6).
         pairs: every pair that was tried, the believed ones first.
         conflicts: pairs that the poses lay on each other although one of the two scanners looked through the other's
-            points, if some cloud has more of them than of believed pairs; else empty.
+            points, if some cloud has more of them than half its believed pairs; else empty.
         scale: by how much the stated sigmas of the pairs had to grow for them to agree, at least 1.
     """
 
@@ -102,9 +101,9 @@ def _conflicts(
             votes[[i, j]] += 1
         elif _in_reach(views, poses, i, j):
             pair = judge_pair(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j])
-            if pair.overlap >= MIN_OVERLAP and pair.contradiction > _CONFLICT * MAX_CONTRADICTION:
+            if pair.overlap >= MIN_OVERLAP and pair.contradiction > MAX_CONTRADICTION:
                 conflicts.append(pair)
-                votes[[i, j]] -= 1
+                votes[[i, j]] -= 2
     return tuple(conflicts) if votes.min(initial=0) < 0 else ()
 
 
