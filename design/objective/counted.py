@@ -282,6 +282,12 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
 
 
 @njit(cache=True, error_model="numpy")
+def _before(lines: Array, angle: float, step: float) -> int:
+    """Lines before an angle: by division if they are `step` apart, by a search if that is 0."""
+    return min(len(lines), int(np.ceil(angle / step))) if step > 0 else np.searchsorted(lines, angle)
+
+
+@njit(cache=True, error_model="numpy")
 def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> int:
     """Lines of one beam, of those from `first` to `last`, at whose joint angle it is free."""
     steps = len(blocked)
@@ -314,6 +320,7 @@ def _counts(
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
     flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
     turn, count = 2 * np.pi, first[1]
+    step = lines[1] - lines[0] if len(first) == 2 and count > 1 else 0.0  # of a sweep they have no equal steps
     for i in range(len(directions)):
         x, y, z = directions[i]
         across = np.hypot(x, y)
@@ -341,11 +348,10 @@ def _counts(
                     continue
                 low = (start - turned[i, k]) % turn
                 high = low + 2 * half
-                last = np.searchsorted(mine, high, side="right")
-                counts[i, k] += _free(mine, np.searchsorted(mine, low), last, turned[i, k], blocked[b])
+                before = _before(mine, low, step), _before(mine, high, step)
+                counts[i, k] += _free(mine, *before, turned[i, k], blocked[b])
                 if high > turn:
-                    last = np.searchsorted(mine, high - turn, side="right")
-                    counts[i, k] += _free(mine, 0, last, turned[i, k], blocked[b])
+                    counts[i, k] += _free(mine, 0, _before(mine, high - turn, step), turned[i, k], blocked[b])
     return counts, mean
 
 
