@@ -284,7 +284,7 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
 @njit(cache=True, error_model="numpy")
 def _before(lines: Array, angle: float, step: float) -> int:
     """Lines before an angle: by division if they are `step` apart, by a search if that is 0."""
-    return min(len(lines), int(np.ceil(angle / step))) if step > 0 else np.searchsorted(lines, angle)
+    return min(len(lines), int(np.ceil(angle / step))) if step > 0 else int(np.searchsorted(lines, angle))
 
 
 @njit(cache=True, error_model="numpy")
