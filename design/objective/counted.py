@@ -292,7 +292,7 @@ def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> 
     """Lines of one beam, of those from `first` to `last`, at whose joint angle it is free."""
     steps = len(blocked)
     if steps == 1:
-        return 0 if blocked[0] else last - first
+        return last - first
     free = 0
     for k in range(first, last):
         free += not blocked[int(np.rint((lines[k] + turned) * steps / (2 * np.pi))) % steps]
@@ -343,9 +343,6 @@ def _counts(
             mean[i] += count * half / np.pi
             for k in range(turned.shape[1]):
                 mine = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
-                if half == np.pi:
-                    counts[i, k] += _free(mine, 0, len(mine), turned[i, k], blocked[b])
-                    continue
                 low = (start - turned[i, k]) % turn
                 high = low + 2 * half
                 before = _before(mine, low, step), _before(mine, high, step)
