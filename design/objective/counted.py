@@ -4,7 +4,7 @@ It shares nothing with what it judges but the numbers of the task, the beam tabl
 the beams that parts block: rotations are Rodrigues', windows come from the law of cosines, weights are painted region
 by region, no sum is zonal. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
 three dimensions); the spread of independent shifts is its error.
-With `quadrature = "equal_angle"` the directions are the nodes of the paper's grid, and only the phases are random.
+With `quadrature = "equal_angle"` the directions are nodes of the paper's grid: all, if as many are wanted.
 
 If the axis turns, each direction is counted at several start phases, which share its windows. The mean count over all
 phases is the sum of the window widths, so the deviation of a count from it is a control variate: g minus its slope
@@ -95,7 +95,7 @@ def counted_J(
         angles_rad: the setting.
         seed: of the shifts.
         points: about how many directions each shift draws, in each region by its share of the weight, and more if few
-            of them have a weight; of the paper's grid all nodes are taken, with as many start phases as make up that
+            of them have a weight; of the paper's grid so many nodes, or all with as many start phases as make up that
             number.
         sets: number of shifts.
         bearings_rad: of the beams, shape (n,), if they are not all those of the lidar.
@@ -151,8 +151,9 @@ def counted_J(
         if nodes is None:
             cubes = [_net(n, rng) for n in numbers]
         else:
-            count = len(nodes.value)
-            cubes = [np.column_stack([(np.arange(count) + 0.5) / count, rng.uniform(size=count)])]
+            count = min(points, len(nodes.value))  # one of each so many
+            place = np.arange(count) + rng.uniform(1e-9, 1 - 1e-9, count)
+            cubes = [np.column_stack([place / count, rng.uniform(size=count)])]
         sample = counted(cubes)
         if not len(sample.value):
             continue
