@@ -70,7 +70,7 @@ class Multibeam(Product):
     def _angles_rise(self) -> Multibeam:
         if not (np.diff([-90.0, *self.elevations_deg, 90.0]) > 0).all():
             raise ValueError("elevations_deg do not rise within -90 .. 90")
-        if not self.azimuth_step_deg <= self.azimuth_deg[1] - self.azimuth_deg[0] <= 360:
+        if not self.azimuth_step_deg <= round(self.azimuth_deg[1] - self.azimuth_deg[0], 9) <= 360:
             raise ValueError(f"azimuth_deg {list(self.azimuth_deg)} does not rise by azimuth_step_deg to 360")
         return self
 

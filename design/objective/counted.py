@@ -4,7 +4,7 @@ It shares nothing with what it judges but the numbers of the task, the beam tabl
 the beams that parts block: rotations are Rodrigues', windows come from the law of cosines, weights are painted region
 by region, no sum is zonal. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
 three dimensions); the spread of independent shifts is its error.
-With `quadrature = "equal_angle"` the directions are the nodes of the paper's grid, and only the phases are random.
+With `quadrature = "equal_angle"` the directions are nodes of the paper's grid: all, if as many are wanted.
 
 If the axis turns, each direction is counted at several start phases, which share its windows. The mean count over all
 phases is the sum of the window widths, so the deviation of a count from it is a control variate: g minus its slope
@@ -95,7 +95,7 @@ def counted_J(
         angles_rad: the setting.
         seed: of the shifts.
         points: about how many directions each shift draws, in each region by its share of the weight, and more if few
-            of them have a weight; of the paper's grid all nodes are taken, with as many start phases as make up that
+            of them have a weight; of the paper's grid so many nodes, or all with as many start phases as make up that
             number.
         sets: number of shifts.
         bearings_rad: of the beams, shape (n,), if they are not all those of the lidar.
@@ -151,8 +151,9 @@ def counted_J(
         if nodes is None:
             cubes = [_net(n, rng) for n in numbers]
         else:
-            count = len(nodes.value)
-            cubes = [np.column_stack([(np.arange(count) + 0.5) / count, rng.uniform(size=count)])]
+            count = min(points, len(nodes.value))  # one of each so many
+            place = np.arange(count) + rng.uniform(1e-9, 1 - 1e-9, count)
+            cubes = [np.column_stack([place / count, rng.uniform(size=count)])]
         sample = counted(cubes)
         if not len(sample.value):
             continue
@@ -282,11 +283,17 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
 
 
 @njit(cache=True, error_model="numpy")
+def _before(lines: Array, angle: float, step: float) -> int:
+    """Lines before an angle: by division if they are `step` apart, by a search if that is 0."""
+    return min(len(lines), int(np.ceil(angle / step))) if step > 0 else int(np.searchsorted(lines, angle))
+
+
+@njit(cache=True, error_model="numpy")
 def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> int:
     """Lines of one beam, of those from `first` to `last`, at whose joint angle it is free."""
     steps = len(blocked)
     if steps == 1:
-        return 0 if blocked[0] else last - first
+        return last - first
     free = 0
     for k in range(first, last):
         free += not blocked[int(np.rint((lines[k] + turned) * steps / (2 * np.pi))) % steps]
@@ -314,6 +321,7 @@ def _counts(
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
     flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
     turn, count = 2 * np.pi, first[1]
+    step = lines[1] - lines[0] if len(first) == 2 and count > 1 else 0.0  # of a sweep they have no equal steps
     for i in range(len(directions)):
         x, y, z = directions[i]
         across = np.hypot(x, y)
@@ -336,16 +344,12 @@ def _counts(
             mean[i] += count * half / np.pi
             for k in range(turned.shape[1]):
                 mine = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
-                if half == np.pi:
-                    counts[i, k] += _free(mine, 0, len(mine), turned[i, k], blocked[b])
-                    continue
                 low = (start - turned[i, k]) % turn
                 high = low + 2 * half
-                last = np.searchsorted(mine, high, side="right")
-                counts[i, k] += _free(mine, np.searchsorted(mine, low), last, turned[i, k], blocked[b])
+                before = _before(mine, low, step), _before(mine, high, step)
+                counts[i, k] += _free(mine, *before, turned[i, k], blocked[b])
                 if high > turn:
-                    last = np.searchsorted(mine, high - turn, side="right")
-                    counts[i, k] += _free(mine, 0, last, turned[i, k], blocked[b])
+                    counts[i, k] += _free(mine, 0, _before(mine, high - turn, step), turned[i, k], blocked[b])
     return counts, mean
 
 

@@ -49,13 +49,10 @@ class BlindSpot:
     def words(self) -> str:
         """Return its place and width."""
         x, y, z = self.centre
-        angle = (
-            f"{self.half_angle_deg:.2f} deg"
-            if self.inner_deg == 0
-            else (f"{self.inner_deg:.2f} to {self.half_angle_deg:.2f} deg")
-        )
-        wide = ""
-        if self.inner_deg == 0 and self.half_angle_deg < 20:
+        angle, wide = f"{self.half_angle_deg:.2f} deg", ""
+        if self.inner_deg:
+            angle = f"{self.inner_deg:.2f} to {angle}"
+        elif self.half_angle_deg < 20:
             wide = f", {200 * np.tan(np.radians(self.half_angle_deg)):.2g} cm wide per metre of range"
         return (
             f"blind {heading(np.array(self.centre))}: {angle} about ({x:z.3f}, {y:z.3f}, {z:z.3f}){wide}, "

@@ -109,5 +109,5 @@ def _require_least(loaded: LoadedTask, angles_rad: Setting, result: Score) -> No
 def _require_log(loaded: LoadedTask, angles_rad: Setting) -> None:
     density = loaded.task.density.model_copy(update={"objective": "log"})
     as_log = replace(loaded, task=loaded.task.model_copy(update={"density": density}))
-    problem = problem_of(loaded)
+    problem = replace(problem_of(loaded), nodes=FIRST, tolerance=NEAR)
     require_counted(as_log, angles_rad, score(problem.with_objective(log(problem.field)), np.asarray(angles_rad)))

@@ -28,6 +28,7 @@ from scanwright.design.search.refinement import (
     walked,
 )
 from scanwright.design.search.space import SearchSpace
+from scanwright.design.task.angle_ranges import NAMES
 
 FAMILIES = 10
 EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only
@@ -60,6 +61,11 @@ class Family:
     def angles_rad(self) -> Setting:
         """The four angles in radians, shape (4,)."""
         return np.radians(self.angles_deg)
+
+    def facts(self) -> dict[str, float]:
+        """Angles, J and its error, with units, for JSON."""
+        angles = {f"{name}_deg": angle for name, angle in zip(NAMES, self.angles_deg, strict=True)}
+        return angles | {"J": self.score.J, "J_error": self.score.J_error}
 
 
 @dataclass(frozen=True, slots=True)

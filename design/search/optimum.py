@@ -25,7 +25,6 @@ from scanwright.design.search.mounts.reference import TunedMount, angles_used, r
 from scanwright.design.search.search import SearchResult, search
 from scanwright.design.search.shortest_period import fastest
 from scanwright.design.sphere.directions import spiral
-from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
 SQUARE_DEGREES = 41_253  # on the whole sphere
@@ -82,18 +81,14 @@ class Optimum:
 
     def facts(self) -> dict[str, Any]:
         """Names with units and values, for JSON."""
+        plain = self.search.plain
         return {
             "task": self.loaded.task.name,
             "with_parts": False,
             "duration_s": self.loaded.task.motion.duration_s,
-            "best": [
-                {f"{name}_deg": angle for name, angle in zip(NAMES, family.angles_deg, strict=True)}
-                | {"J": family.score.J, "J_error": family.score.J_error, "settings": family.members}
-                | {"note": family.word}
-                for family in self.search.best
-            ],
-            "holes": [asdict(hole) for hole in holes(self.problem, self.search.best[0].angles_rad)],
-            "plain": None if self.search.plain is None else self._plain_facts(self.search.plain),
+            "best": [family.facts() | {"settings": family.members, "note": family.word} for family in self.search.best],
+            "holes": self._hole_facts(self.search.best[0]),
+            "plain": None if plain is None else plain.facts() | {"holes": self._hole_facts(plain)},
             "least_blind_weight": self.search.least_blind,
             "preferred": self._preferred_facts(),
             "standard": {mount.name: {"J": mount.score.J, "J_error": mount.score.J_error} for mount in self.mounts},
@@ -104,6 +99,9 @@ class Optimum:
             "left_out": [asdict(entry) for entry in self.left_out],
         }
 
+    def _hole_facts(self, family: Family) -> list[dict[str, Any]]:
+        return [asdict(hole) for hole in holes(self.problem, family.angles_rad)]
+
     def _preferred_facts(self) -> dict[str, Any] | None:
         if self.search.lowest is None:
             return None
@@ -111,16 +109,7 @@ class Optimum:
         return {
             "accepted_loss": self.loaded.task.angles.prefer_loss,
             "J_more": self.search.best[0].score.J - optimum.score.J,
-            "lowest_J": {f"{name}_deg": angle for name, angle in zip(NAMES, optimum.angles_deg, strict=True)}
-            | {"J": optimum.score.J, "J_error": optimum.score.J_error},
-        }
-
-    def _plain_facts(self, plain: Family) -> dict[str, Any]:
-        return {
-            **{f"{name}_deg": angle for name, angle in zip(NAMES, plain.angles_deg, strict=True)},
-            "J": plain.score.J,
-            "J_error": plain.score.J_error,
-            "holes": [asdict(hole) for hole in holes(self.problem, plain.angles_rad)],
+            "lowest_J": optimum.facts(),
         }
 
     def lines(self, in_full: bool = False) -> list[str]:

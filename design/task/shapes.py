@@ -66,7 +66,7 @@ class BandRegion(Record):
     def _edges_rise(self) -> BandRegion:
         if not 0 <= self.theta_deg[0] <= self.theta_deg[1] <= 180:
             raise ValueError(f"theta_deg = {list(self.theta_deg)} does not rise within 0 .. 180")
-        if not 0 <= self.phi_deg[1] - self.phi_deg[0] <= 360:
+        if not 0 <= round(self.phi_deg[1] - self.phi_deg[0], 9) <= 360:  # [a, a + 360] is rounded
             raise ValueError(f"phi_deg = {list(self.phi_deg)} does not rise by at most 360")
         for name, (low, high) in (("theta_deg", self.theta_deg), ("phi_deg", self.phi_deg)):
             if high - low < THINNEST_DEG:

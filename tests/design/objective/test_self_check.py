@@ -142,6 +142,22 @@ def test_the_count_of_a_sparse_scan_is_sure_to_four_standard_errors_of_a_few_tho
     assert J_error < 1.2 * self_check.NEAR
 
 
+def test_some_nodes_of_the_papers_grid_stand_for_all(monkeypatch):
+    """A sweep on a fine grid is counted at as many nodes as are wanted: all of them take seconds."""
+    loaded = a_task([GROUND, CONE], motion=MOTIONS["sweep"], quadrature="equal_angle", grid_step_deg=2.0)
+    directions, counts = [], counted._counts
+
+    def recorded(at, *arguments):
+        directions.append(len(at))
+        return counts(at, *arguments)
+
+    monkeypatch.setattr(counted, "_counts", recorded)
+    some, every = counted_J(loaded, SETTING, 1, 256, 16), counted_J(loaded, SETTING, 1, 10**4, 2)
+    assert directions[:16] == [256] * 16
+    assert directions[16] > 1000
+    assert abs(some.J - every.J) <= some.J_error + every.J_error
+
+
 @pytest.mark.parametrize("motion", ["spin", "seam", "stop_and_go"])
 @pytest.mark.parametrize("objective", ["log", "homogeneity", "required", "kl"])
 def test_the_control_variate_does_not_change_the_mean(motion, objective, monkeypatch):

@@ -77,9 +77,11 @@ def test_the_edge_of_a_cone_belongs_to_it():
 
 
 def test_a_band_all_round_holds_the_poles_and_the_seam():
-    f = field([{"shape": "band", "theta_deg": [0, 180], "phi_deg": [-180, 180]}])
-    for theta, phi in [(0, 0), (180, 0), (90, 180), (90, -180), (90, 179.9999999)]:
-        assert f.weight_at(direction(theta, phi)) == 1
+    """From any heading, also where `start + 360` is rounded up."""
+    for start in [-180.0, 179.95, *np.random.default_rng(0).uniform(-180, 180, 20).tolist()]:
+        f = field([{"shape": "band", "theta_deg": [0, 180], "phi_deg": [start, start + 360]}])
+        for theta, phi in [(0, 0), (180, 0), (90, start), (90, start - 1e-9), (90, start + 180)]:
+            assert f.weight_at(direction(theta, phi)) == 1
 
 
 def test_the_last_region_wins_and_masks_win_over_all():
