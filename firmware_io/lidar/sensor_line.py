@@ -19,7 +19,7 @@ from typing import Self, TypeVar
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
-from scanwright.firmware_io.lidar.lidar import TimedScan
+from scanwright.firmware_io.lidar.lidar import Echo, TimedScan
 from scanwright.firmware_io.serial_port import latency_ms
 
 TURN_S = 1.0  # without a turn: ten turns of the slowest sensor
@@ -185,6 +185,11 @@ class LineDriver:
     def condition(self) -> tuple[str, ...]:
         """Nothing, unless the family reports age or state."""
         return ()
+
+    def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
+        """Refuse: only some families have filters; raises as `LidarDriver.set_filters`."""
+        if echo is not None or mean_filter_off:
+            raise DeviceError(f"{self._line.name}: echo, mean_filter_off: a {self.model} has no such filter; omit them")
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; raises as `LidarDriver.start`."""

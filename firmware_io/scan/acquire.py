@@ -64,6 +64,7 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
     )  # loads the message types: half a second that must not fall into the recording
     with _unturned_until_opened() as opened, ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
+        lidar.set_filters(plan.echo, mean_filter_off=plan.mean_filter_off)
         servo = stack.enter_context(
             open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id, spins=isinstance(plan.motion, Spin))
         )

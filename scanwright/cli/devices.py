@@ -115,7 +115,14 @@ def scan(
     intensity: Intensity = False,
     cluster: Annotated[int, Option(min=1, max=99, metavar="N", help="Merge N steps into the smallest range.")] = 1,
     every: Annotated[int, Option(min=1, max=10, metavar="N", help="Use every Nth scan of the lidar.")] = 1,
-    stamp_at: Annotated[Literal["step_0", "rear"], Option(help="Beam of the lidar's timestamps.")] = "step_0",
+    stamp_at: Annotated[
+        Literal["step_0", "rear", "first_beam", "last_beam"] | None,
+        Option(help="Beam of the lidar's timestamps: Hokuyo step_0, rear; SICK first_beam, last_beam."),
+    ] = None,
+    echo: Annotated[Literal["first", "last"] | None, Option(help="Echo that a SICK reports, until power-off.")] = None,
+    mean_filter_off: Annotated[
+        bool, Option("--mean-filter-off", help="Switch a SICK's mean filter off, until power-off.")
+    ] = False,
     dry_run: Annotated[bool, Option("--dry-run", help="Print the plan and exit.")] = False,
     live: Annotated[bool, Option("--live", help="Show the growing cloud in the browser.")] = False,
     foxglove: Annotated[bool, Option("--foxglove", help="Serve scans and points to Foxglove.")] = False,
@@ -146,6 +153,8 @@ def scan(
         cluster=cluster,
         every=every,
         stamp_at=stamp_at,
+        echo=echo,
+        mean_filter_off=mean_filter_off,
     )
     progress = ConsoleProgress()
     result = ScanResult(_devices_of(plan), plan.angles_path, plan.duration_s)

@@ -76,7 +76,7 @@ class _PacketClock:
 class LdrobotLidar(LineDriver):
     """An LDROBOT lidar, which tells no serial number and no version."""
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Listen to it; without a model of the catalogue it is the first whose speed of measuring fits."""
         self.address = address
         self._bad_before = 0

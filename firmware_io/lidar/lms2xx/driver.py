@@ -37,7 +37,7 @@ _PATIENCE = 8  # telegrams: a fifth of a second
 class LmsLidar(LineDriver):
     """An LMS 2xx, which tells no serial number."""
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop its stream; `model` is a name of the catalogue, None for the one that it gives itself."""
         self.address = address
         self._bad_before = self._bad_scans = 0

@@ -41,7 +41,7 @@ class ScipLidar(LineDriver):
         self,
         address: str,
         _model: str | None = None,
-        stamp_at: StampAt = "step_0",
+        stamp_at: StampAt | None = None,
         *,
         search: Callable[[], Iterable[str]] = lidar_ports,
     ) -> None:
@@ -55,7 +55,7 @@ class ScipLidar(LineDriver):
         self.address = address
         self.dropped = 0
         self._search = search
-        self._stamp_at: StampAt = stamp_at
+        self._stamp_at = stamp_at
         self._bad_scans = 0
         self._counter = StampCounter()
         self._request = b""

@@ -62,7 +62,7 @@ class Parameters:
         """All measured steps."""
         return Window(first_step=self.first_step, last_step=self.last_step)
 
-    def since_stamp_s(self, step: float, stamp_at: StampAt) -> float:
+    def since_stamp_s(self, step: float, stamp_at: StampAt | None) -> float:
         """Time from the moment that a stamp means to a step.
 
         The specification puts the stamp at step 0 (p. 12); drivers put it where the beam points backward, as other

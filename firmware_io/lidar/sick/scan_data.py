@@ -103,16 +103,9 @@ class ScanData:
         return self.wide[0].step * _ANGLE_UNIT_DEG / 360 / self.scan_rate_hz * 1e6
 
     @property
-    def first_beam_before_sent_us(self) -> float:
-        """From the first beam to the sending of the telegram.
-
-        Documents do not say which moment of the scan its time means, and captures differ: an LMS100 sends 23 ms after
-        it, longer than its scan takes, so there it is the first beam; a TiM55x sends 4 ms after it, in which it can
-        measure no scan of 50 ms, so there it is the end of the last beam.
-        """
-        after_us = (self.sent_us - self.scan_us) % WRAP_US
-        took_us = self.wide[0].raw.size * self.beam_us
-        return after_us if after_us > took_us / 2 else after_us + took_us
+    def sent_after_us(self) -> float:
+        """From the time of the scan to the sending of the telegram."""
+        return (self.sent_us - self.scan_us) % WRAP_US
 
 
 def scan_data(telegram: Telegram) -> ScanData:

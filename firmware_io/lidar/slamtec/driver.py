@@ -31,7 +31,7 @@ _RPM = 600  # the SDK's default
 class SlamtecLidar(LineDriver):
     """An RPLIDAR."""
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop what it does; `model` is a name of the catalogue, None for whatever answers."""
         self.address = address
         self._bad_before = 0
