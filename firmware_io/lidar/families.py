@@ -1,7 +1,6 @@
-"""The families of lidars that can be driven. One line here makes a family known to every command.
+"""Lidar families that can be driven; one line here makes a family known to every command.
 
-An installed package adds one without a line here: an entry point of the group "scanwright.lidars" that names a
-`LidarFamily`; the TOML files beside its module are products of the catalogue (docs/how-to/new-lidar.md).
+An installed package adds a `LidarFamily` by an entry point of the group "scanwright.lidars" (docs/how-to/new-lidar.md).
 """
 
 from __future__ import annotations

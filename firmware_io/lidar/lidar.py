@@ -1,4 +1,4 @@
-"""What every command asks of a lidar, whatever it says on its line; `families` is the list of who answers."""
+"""Interface of all lidar drivers; `families` lists the implementations."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class TimedScan:
             wanders.
         arrival_ns: `time.monotonic_ns` when its last byte came.
         uncertainty_ns: standard uncertainty of its time.
-        warning: what the sensor says of itself that a person should mend, and how; empty where all is well.
+        warning: what the sensor says of itself that a person should mend, and how; empty if all is well.
     """
 
     scan: Scan
@@ -40,11 +40,11 @@ class LidarDriver(Protocol):
     Attributes:
         address: where it was found last: a serial port, or HOST:PORT.
         model: name of its type, as in the catalogue. A sensor that does not tell is what it was opened as.
-        serial_number: by which it is found again; empty where the sensor tells none.
-        firmware: version, as the sensor writes it; empty where it tells none.
+        serial_number: by which it is found again; empty if the sensor tells none.
+        firmware: version, as the sensor writes it; empty if it tells none.
         scan_rate_hz: turns per second that it should make.
-        dropped: turns that are missing between those that were read.
-        bad_packets: packets that were thrown away.
+        dropped: missing turns between those read.
+        bad_packets: packets dropped.
     """
 
     address: str

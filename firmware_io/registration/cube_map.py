@@ -46,17 +46,11 @@ def solid_angles_sr(side: int) -> Float64[ndarray, " cells"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthMap:
-    """The nearest and the farthest surface that a scanner saw in each cell.
+    """The nearest and the farthest surface that a scanner saw in each cell."""
 
-    Attributes:
-        side: cells along an edge of the cube.
-        near_m: shape (6 * side * side,), +inf if nothing was seen.
-        far_m: as `near_m`, -inf if nothing was seen.
-    """
-
-    side: int
-    near_m: Float64[ndarray, " cells"]
-    far_m: Float64[ndarray, " cells"]
+    side: int  # cells along an edge of the cube
+    near_m: Float64[ndarray, " cells"]  # shape (6 * side * side,), +inf if nothing was seen
+    far_m: Float64[ndarray, " cells"]  # as `near_m`, -inf if nothing was seen
 
 
 def depth_map(points_m: Float64[ndarray, "n 3"], side: int) -> DepthMap:

@@ -1,7 +1,7 @@
 """Stated errors of beam times when the reader is held up.
 
     python -m benchmarks.firmware_io.devices.stalls [STALLS]
-    python -m benchmarks.firmware_io.devices.stalls --soak HOURS
+    python -m benchmarks.firmware_io.devices.stalls --soak HOURS [--only MODEL ...]
 
 Each lidar streams to its driver on one virtual clock, and the driver is held up STALLS times (default 20, which are 520
 in all), for 0.05 to 10 s, in a read or between two. What comes meanwhile waits in a buffer of a pseudo-terminal's or of
@@ -254,6 +254,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("stalls", nargs="?", type=int, default=20)
     arguments.add_argument("--soak", type=float, metavar="HOURS")
+    arguments.add_argument("--only", nargs="+", choices=SOAKED, default=SOAKED, metavar="MODEL")
     chosen = arguments.parse_args()
     print(
         "| lidar | buffer, latency | turns | missing, counted | within 1, 2, 3 times the stated error | worst | back |"
@@ -262,7 +263,7 @@ def main() -> None:
     wrong, count = 0, chosen.stalls if chosen.soak is None else round(chosen.soak * 3600 / _SOAK_STALL_S)
     runs = [(model, size) for model in MODELS for size in BUFFER_BYTES]
     if chosen.soak is not None:
-        runs = [(model, BUFFER_BYTES[0]) for model in SOAKED]
+        runs = [(model, BUFFER_BYTES[0]) for model in chosen.only]
     for model, buffer_bytes in runs:
         rng = np.random.default_rng([count, MODELS.index(model), buffer_bytes])
         apart_s = (0.05, 2.0) if chosen.soak is None else (2.0, 60.0)

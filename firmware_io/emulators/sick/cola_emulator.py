@@ -1,4 +1,4 @@
-"""A TiM or LMS1xx in software: requests in, answers out, turn after turn, at times that somebody else tells."""
+"""Emulator of a TiM or LMS1xx: requests, answers and scans at given times."""
 
 from __future__ import annotations
 
@@ -47,42 +47,27 @@ class SickMachine:
     """The state of one sensor.
 
     Attributes:
-        lidar: which model.
-        ranging: what it sees.
-        began_ns: true time at which its clock showed `clock_us`.
-        clock_us: what it showed then.
-        rate_error: of its clock, 5e-5 is 50 ppm fast.
         stamps_end: its scan time is that of the last beam's end, not of the first beam; None for that of its model.
-        status: second status byte of its scans: 2 dirt warning, 5 dirt error, 1 fault.
-        busy_until_ns: it says so until then.
-        silent_until_ns: it says nothing until then.
-        dialects: those that it understands; True is CoLa B.
-        run_tenth_h: how long it has run, tenths of an hour.
-        starts: how often it was switched on.
-        refusals: codes with which it refuses what it is asked next, one each.
-        filters: values that were set, by name.
         setting: scan rate, 0.01 Hz, and step, 1e-4 deg, that it reports; scans always have those of the catalogue.
-        without: variables that this firmware does not have.
-        scanning: what it tells scans; None where nobody asked.
     """
 
-    lidar: Lidar
-    ranging: Ranging
-    began_ns: int
-    clock_us: int = 0
-    rate_error: float = 0.0
+    lidar: Lidar  # which model
+    ranging: Ranging  # its surroundings
+    began_ns: int  # true time at which its clock showed `clock_us`
+    clock_us: int = 0  # clock at that time
+    rate_error: float = 0.0  # of its clock, 5e-5 is 50 ppm fast
     stamps_end: bool | None = None
-    status: int = 0
-    busy_until_ns: int = 0
-    silent_until_ns: int = 0
-    dialects: tuple[bool, ...] = (True, False)
-    refusals: list[int] = field(default_factory=list)
-    filters: dict[str, list[float]] = field(default_factory=dict)
-    without: tuple[str, ...] = ()
+    status: int = 0  # second status byte of its scans: 2 dirt warning, 5 dirt error, 1 fault
+    busy_until_ns: int = 0  # reports busy until then
+    silent_until_ns: int = 0  # silent until then
+    dialects: tuple[bool, ...] = (True, False)  # dialects understood; True is CoLa B
+    refusals: list[int] = field(default_factory=list)  # error codes for the next requests, one each
+    filters: dict[str, list[float]] = field(default_factory=dict)  # values that were set, by name
+    without: tuple[str, ...] = ()  # variables that this firmware does not have
     serial_number: int = 18_030_000
-    run_tenth_h: int = 6641
-    starts: int = 597
-    scanning: _Scanning | None = None
+    run_tenth_h: int = 6641  # how long it has run, tenths of an hour
+    starts: int = 597  # number of starts
+    scanning: _Scanning | None = None  # client and next turn; None if not requested
     intensity: bool = False
     interval: int = 1
     measuring: bool = False

@@ -49,20 +49,15 @@ class LmsMachine:
     """The state of one sensor; times are true ones.
 
     Attributes:
-        lidar: of the catalogue.
-        ranging: what it sees.
-        began_ns: when it got its power.
-        millimetres: whether it tells ranges in them, up to 8 m, and not in centimetres.
         status: that its answers end with.
-        rate_error: its motor turns this part too fast.
     """
 
-    lidar: Lidar
-    ranging: Ranging
-    began_ns: int
-    millimetres: bool = True
+    lidar: Lidar  # of the catalogue
+    ranging: Ranging  # its surroundings
+    began_ns: int  # when it got its power
+    millimetres: bool = True  # unit of its ranges: millimetres (up to 8 m), else centimetres
     status: int = 0x10  # [assumed] bits without a meaning to us
-    rate_error: float = 1e-3
+    rate_error: float = 1e-3  # its motor turns this part too fast
 
     def __post_init__(self) -> None:
         self.scanning: object | None = None

@@ -1,7 +1,4 @@
-"""A SICK lidar of the TiM5xx, TiM7xx or LMS1xx that speaks CoLa A or B, over TCP.
-
-Written from documents; no sensor has been at the other end yet.
-"""
+"""SICK TiM5xx, TiM7xx or LMS1xx over TCP in CoLa A or B. Written from documents, not tried on a sensor."""
 
 from __future__ import annotations
 
@@ -30,11 +27,7 @@ _STLMS_READY = 7  # state of STlms; telegram listing 8014631
 
 
 class SickLidar(LineDriver):
-    """A SICK lidar.
-
-    Attributes:
-        dropped: telegrams that are missing between those that were read, by their counter.
-    """
+    """A SICK lidar."""
 
     def __init__(self, address: str, model: str | None = None, stamp_at: StampAt | None = None) -> None:
         """Open it.
@@ -47,7 +40,7 @@ class SickLidar(LineDriver):
                 (15 and 21 ms); TiM55x 3.8 ms, TiM56x 4.9 and 5.1 ms, shorter (50 ms).
         """
         self.address = address
-        self.dropped = 0
+        self.dropped = 0  # missing telegrams between those read, by their counter
         self._stamp_at: StampAt | None = stamp_at
         self._stamps_last = stamp_at == "last_beam"
         self._measuring = False
@@ -72,11 +65,11 @@ class SickLidar(LineDriver):
 
     @property
     def bad_packets(self) -> int:
-        """Telegrams that were thrown away."""
+        """Telegrams dropped."""
         return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
-        """Return the hours that it has run, how often it was switched on, and its filters, as far as it tells them."""
+        """Return operating hours, number of starts and filters, as far as the sensor reports them."""
         hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
         age = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
         switched = [] if starts is None else [f"it was switched on {starts:,} times"]
@@ -91,7 +84,7 @@ class SickLidar(LineDriver):
         self._mean_filter_off = mean_filter_off
 
     def _begin(self, intensity: bool, skip: int) -> None:
-        """At the rate and resolution of the catalogue."""
+        """Start at the rate and resolution of the catalogue."""
         self._login()
         set_rate(self._dialogue, self._lidar)
         if self._wanted_echo is not None:
@@ -124,7 +117,7 @@ class SickLidar(LineDriver):
                 self._bad_scans += 1
 
     def _halt(self) -> None:
-        """Stop the telegrams, and what `start` lit; a laser that cannot be put out stays on."""
+        """Stop the telegrams, and the laser if `start` switched it on and it can be switched off."""
         self._dialogue.ask(self._dialogue.writer("sEN LMDscandata").number("u8", 0))
         if not self._measuring:
             return
@@ -150,7 +143,7 @@ class SickLidar(LineDriver):
         ).strip()
 
     def _serial_number(self) -> str:
-        """Empty from a sensor that does not tell it."""
+        """Empty if the sensor does not report it."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer("sRN SerialNumber"))
         except RefusedError:
@@ -158,17 +151,17 @@ class SickLidar(LineDriver):
         return self._dialogue.checked("SerialNumber", reply.text).strip()
 
     def _counter(self, name: str) -> int | None:
-        """Return a count; None from a sensor that does not count this, or tells it to others only."""
+        """Return a counter; None if the sensor does not have it or refuses it."""
         values = self._values(name, "u32")
         return values[0] if values else None
 
     def _averaged_scans(self) -> int | None:
-        """Return of how many scans the mean filter makes one, 0 if it is off; None from a sensor without it."""
+        """Return how many scans the mean filter averages, 0 if it is off; None without such a filter."""
         values = self._values("LFPmeanfilter", "u8", "u16")
         return values[0] and values[1] if values else None
 
     def _values(self, name: str, *kinds: Kind) -> list[int]:
-        """Return the first values of a variable; none from a sensor that refuses to tell it."""
+        """Return the first values of a variable; none if the sensor refuses."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
         except RefusedError:
@@ -180,7 +173,7 @@ class SickLidar(LineDriver):
         self._dialogue.insist(out, 1)
 
     def _wait_until_ready(self, patience_s: float) -> None:
-        """A sensor that starts its motor, or is busy with somebody else, is asked again and again."""
+        """Wait for a sensor that starts its motor or serves another client."""
         deadline_s = time.monotonic() + patience_s
         while not self._ready():
             if time.monotonic() > deadline_s:
@@ -188,7 +181,7 @@ class SickLidar(LineDriver):
             time.sleep(POLL_S)
 
     def _ready(self) -> bool:
-        """Asked as the TiM knows it, then as the LMS does."""
+        """Read the device state as the TiM has it, else as the LMS has it."""
         try:
             state = self._dialogue.ask(self._dialogue.writer("sRN SCdevicestate"))
         except RefusedError as refused:
@@ -199,7 +192,7 @@ class SickLidar(LineDriver):
         return self._dialogue.checked("SCdevicestate", state.number, "u8") == 1
 
     def _forget(self) -> None:
-        """What comes next is of another run of the sensor."""
+        """Forget clock and counter: the next telegram is of another run."""
         self._stamps.restart()
         self._count: int | None = None
         self._clock: ArrivalLine | None = None
@@ -241,11 +234,7 @@ class SickLidar(LineDriver):
         return TimedScan(turn, arrival_ns, self._clock.uncertainty_ns, dirty)
 
     def _first_beam_before_sent_us(self, scan: ScanData) -> float:
-        """From the first beam to the sending of the telegram.
-
-        Raises:
-            DeviceError: the scan time cannot be that of the first beam, as was requested.
-        """
+        """Return the time from first beam to sending; DeviceError if the requested `first_beam` is impossible."""
         after_us, took_us = scan.sent_after_us, scan.wide[0].raw.size * scan.beam_us
         if after_us < took_us:
             if self._stamp_at == "first_beam":

@@ -1,6 +1,6 @@
-"""An RPLIDAR on its serial line: asked who it is, its motor started, its typical mode streamed.
+"""RPLIDAR on its serial line: it is identified, its motor started, its typical mode streamed.
 
-It has no clock of its own in these modes: its points follow each other evenly, and counting them is the clock.
+These modes have no timestamps: points are evenly spaced, and their count is the clock.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class SlamtecLidar(LineDriver):
 
     @property
     def bad_packets(self) -> int:
-        """Packets that were thrown away."""
+        """Packets dropped."""
         return self._bad_before + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
@@ -97,7 +97,7 @@ class SlamtecLidar(LineDriver):
         self._turn_motor(on=False)
 
     def _find(self) -> None:
-        """Open it again where it was."""
+        """Open the same port again."""
         self._line.reopen()
         self._recognise(self.model)
 
