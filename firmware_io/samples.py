@@ -153,19 +153,12 @@ def echo_count(scan: Scan) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Consecutive scans that differ only in time and in what they measured; rows are scans, columns beams.
+    """Consecutive scans that differ only in time and in what they measured; rows are scans, columns beams."""
 
-    Attributes:
-        first: the first of them, for what they share.
-        stamp_ns: time of the first beam of each scan, shape (s,).
-        range_m: shape (s, n).
-        intensity: shape (s, n), or (s, 0) where the sensor measures none.
-    """
-
-    first: Scan
-    stamp_ns: Int64[ndarray, " scans"]
-    range_m: Float32[ndarray, "scans beams"]
-    intensity: Float32[ndarray, "scans m"]
+    first: Scan  # the first of them, for what they share
+    stamp_ns: Int64[ndarray, " scans"]  # time of the first beam of each scan, shape (s,)
+    range_m: Float32[ndarray, "scans beams"]  # shape (s, n)
+    intensity: Float32[ndarray, "scans m"]  # shape (s, n), or (s, 0) where the sensor measures none
 
 
 def blocks(scans: Iterable[Scan], most: int = 256) -> Iterator[Block]:
@@ -212,17 +205,11 @@ class JointSample:
 
 @dataclass(frozen=True, slots=True)
 class PoseSample:
-    """Where the platform was at one time: the `world` frame on the map.
+    """Where the platform was at one time: the `world` frame on the map."""
 
-    Attributes:
-        time_ns: since 1970, or on whatever clock the scans are.
-        position_m: x y z.
-        quaternion: x y z w.
-    """
-
-    time_ns: int
-    position_m: tuple[float, float, float]
-    quaternion: tuple[float, float, float, float]
+    time_ns: int  # since 1970, or on whatever clock the scans are
+    position_m: tuple[float, float, float]  # x y z
+    quaternion: tuple[float, float, float, float]  # x y z w
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -269,11 +256,10 @@ class AxisCurve:
     """Servo angle as a piecewise cubic of time.
 
     Attributes:
-        knot_ns: where the pieces begin, and where the last one ends, shape (k + 1,), increasing.
         coefficient: shape (k, 4); in piece i the angle [rad] is sum_j coefficient[i, j] s^j, s seconds into the piece.
     """
 
-    knot_ns: Int64[ndarray, " knots"]
+    knot_ns: Int64[ndarray, " knots"]  # where the pieces begin, and where the last one ends, shape (k + 1,), increasing
     coefficient: Float64[ndarray, "pieces 4"]
 
     def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:

@@ -10,6 +10,7 @@ import serial
 from serial.tools.list_ports import comports
 
 from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.capture import captured
 
 _WRITE_S = 10.0  # only a dead port takes longer; a busy computer can take seconds
 _ADAPTERS = Path("/sys/bus/usb-serial/devices")
@@ -17,6 +18,14 @@ _ADAPTERS = Path("/sys/bus/usb-serial/devices")
 
 class _UntouchedLines(serial.Serial):  # type: ignore[misc]
     """A port whose DTR and RTS stay as they are: pyserial always raises them, which resets boards."""
+
+    def read(self, size: int = 1) -> bytes:
+        """Read up to so many bytes."""
+        return captured(str(self.port), "<", super().read(size))
+
+    def write(self, data: bytes) -> int:
+        """Send all bytes."""
+        return int(super().write(captured(str(self.port), ">", data)))
 
     def _update_dtr_state(self) -> None:
         """Leave it."""

@@ -42,22 +42,16 @@ class SmoothAxis:
     """A smoothed joint log.
 
     Attributes:
-        curve: the angle.
-        knot_s: usual time from knot to knot.
-        per_knot: samples to a knot.
-        step_rad: step of the encoder; 0 where the positions have none.
-        residual_rad: rms of samples against the curve.
         error_rad: rms error of the curve, from its residuals and from what a curve with half the knots makes of them.
-        rejected_ns: times of the samples that lie far off the others and were not used.
     """
 
-    curve: AxisCurve
-    knot_s: float
-    per_knot: float
-    step_rad: float
-    residual_rad: float
+    curve: AxisCurve  # the angle
+    knot_s: float  # usual time from knot to knot
+    per_knot: float  # samples to a knot
+    step_rad: float  # step of the encoder; 0 where the positions have none
+    residual_rad: float  # rms of samples against the curve
     error_rad: float
-    rejected_ns: Times
+    rejected_ns: Times  # times of the samples that lie far off the others and were not used
 
 
 def axis_curve(log: JointLog, *, at_rest: bool) -> tuple[AxisCurve, str]:

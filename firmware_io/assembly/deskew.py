@@ -28,21 +28,13 @@ from scanwright.firmware_io.samples import AxisCurve, JointLog, Scan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedScan:
-    """One scan in the world; row i is beam i.
+    """One scan in the world; row i is beam i."""
 
-    Attributes:
-        scan: what was measured.
-        time_ns: shape (n,).
-        joint_rad: servo angle of each beam, shape (n,), NaN outside the joint log.
-        verdict: a `Verdict` for each beam, shape (n,).
-        points_m: shape (n, 3), NaN where the verdict is not POINT.
-    """
-
-    scan: Scan
-    time_ns: Int64[ndarray, " n"]
-    joint_rad: Float64[ndarray, " n"]
-    verdict: UInt8[ndarray, " n"]
-    points_m: Float64[ndarray, "n 3"]
+    scan: Scan  # what was measured
+    time_ns: Int64[ndarray, " n"]  # shape (n,)
+    joint_rad: Float64[ndarray, " n"]  # servo angle of each beam, shape (n,), NaN outside the joint log
+    verdict: UInt8[ndarray, " n"]  # a `Verdict` for each beam, shape (n,)
+    points_m: Float64[ndarray, "n 3"]  # shape (n, 3), NaN where the verdict is not POINT
 
 
 def deskew(scan: Scan, joint: JointLog | AxisCurve, angles: AngleSet, lag_s: float = 0.0) -> Float64[ndarray, "n 3"]:

@@ -35,13 +35,11 @@ class PlacedBlock:
 
     Attributes:
         joint_rad: shape (s, n), NaN outside the joint log; (0, n) where it was not asked for.
-        verdict: shape (s, n).
-        points_m: shape (s, n, 3), NaN where the verdict is not POINT.
     """
 
     joint_rad: Float64[ndarray, "rows beams"]
-    verdict: UInt8[ndarray, "scans beams"]
-    points_m: Float32[ndarray, "scans beams 3"]
+    verdict: UInt8[ndarray, "scans beams"]  # shape (s, n)
+    points_m: Float32[ndarray, "scans beams 3"]  # shape (s, n, 3), NaN where the verdict is not POINT
 
 
 def place_block(
@@ -93,25 +91,19 @@ class _Fan(NamedTuple):
     """What all scans of a block share, as the kernel wants it.
 
     Attributes:
-        x: direction of each beam in the rotation frame, shape (n,); so y, z.
-        origin_m: where the beams start in the rotation frame, shape (3,).
-        offset_ns: time of each beam after the stamp, whole numbers, not decreasing, shape (n,).
-        near_m: shortest and `far_m` longest range that means something.
-        verdict: OWN_BODY for a beam that the own body hides at every axis angle, else POINT, shape (n,).
         stator: whether it hides a beam at each of g equal steps of the axis angle, shape (n, g); (n, 0) if none does.
-        gamma_rot_rad: axis angle at joint position 0.
     """
 
-    x: Floats
+    x: Floats  # direction of each beam in the rotation frame, shape (n,); so y, z
     y: Floats
     z: Floats
-    origin_m: Floats
-    offset_ns: Floats
-    near_m: np.float32
+    origin_m: Floats  # where the beams start in the rotation frame, shape (3,)
+    offset_ns: Floats  # time of each beam after the stamp, whole numbers, not decreasing, shape (n,)
+    near_m: np.float32  # shortest and `far_m` longest range that means something
     far_m: np.float32
-    verdict: Bytes
+    verdict: Bytes  # OWN_BODY for a beam that the own body hides at every axis angle, else POINT, shape (n,)
     stator: Mask
-    gamma_rot_rad: float
+    gamma_rot_rad: float  # axis angle at joint position 0
 
 
 def _fan(scan: Scan, angles: AngleSet, own_body: OwnBody | None) -> _Fan:

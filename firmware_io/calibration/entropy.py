@@ -41,18 +41,14 @@ class Witness:
     """The entropy of a calibration; lower is crisper.
 
     Attributes:
-        width_m: of the kernel.
-        before: entropy with the parameters it began with.
-        after: with those that were found.
-        change_sd: sampling error of `after - before`.
-        minima: where the entropy's own minimum lies from the result, for each mounting error [SI]; None where the
-            two sides see too little in common for it to have one.
+        minima: where the entropy's own minimum lies from the result, for each mounting error [SI]; None where the two
+            sides see too little in common for it to have one.
     """
 
-    width_m: float
-    before: float
-    after: float
-    change_sd: float
+    width_m: float  # of the kernel
+    before: float  # entropy with the parameters it began with
+    after: float  # with those that were found
+    change_sd: float  # sampling error of `after - before`
     minima: dict[str, float | None]
 
     @property

@@ -51,28 +51,19 @@ class Estimate:
     """What was found.
 
     Attributes:
-        x: parameters, held ones as they were, shape (COUNT,).
-        choice: which of them were found, and why the others were not.
         covariance: of the found ones, shape (k, k): what the noise brings, and a backlash that had to be held.
-        spectrum: singular values of their information, in units of their limits, shape (k,).
-        tiles: what it was found from.
-        grouping: their surfaces.
-        clear: which of their beams surely met these, and were used, shape (n,).
-        noise_m: standard deviation of a range, after all.
-        bulge_m: standard deviation of the walls from planes; 0 if the noise hides it.
-        drifts: how the platform seems to have moved, recording by recording.
     """
 
-    x: Float64[ndarray, " parameters"]
-    choice: Choice
+    x: Float64[ndarray, " parameters"]  # parameters, held ones as they were, shape (COUNT,)
+    choice: Choice  # which of them were found, and why the others were not
     covariance: Float64[ndarray, "free free"]
-    spectrum: Float64[ndarray, " free"]
-    tiles: FlatTiles
-    grouping: Grouping
-    clear: Bool[ndarray, " beams"]
-    noise_m: float
-    bulge_m: float
-    drifts: tuple[Drift, ...]
+    spectrum: Float64[ndarray, " free"]  # singular values of their information, in units of their limits, shape (k,)
+    tiles: FlatTiles  # what it was found from
+    grouping: Grouping  # their surfaces
+    clear: Bool[ndarray, " beams"]  # which of their beams surely met these, and were used, shape (n,)
+    noise_m: float  # standard deviation of a range, after all
+    bulge_m: float  # standard deviation of the walls from planes; 0 if the noise hides it
+    drifts: tuple[Drift, ...]  # how the platform seems to have moved, recording by recording
 
 
 def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " parameters"]) -> Estimate:

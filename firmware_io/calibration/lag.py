@@ -39,34 +39,21 @@ _CELLS = 600  # over the common angles; on 60 degrees a tenth of a degree, about
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LagCurve:
-    """Cost of each assumed lag.
+    """Cost of each assumed lag."""
 
-    Attributes:
-        lag_s: assumed lags, shape (k,); positive where the joint log's stamps are late.
-        cost_m: mean capped difference of the ranges seen on both ways, shape (k,).
-        best_s: the minimum, refined from its two neighbours.
-        sd_s: its standard deviation; infinite for a single beam.
-    """
-
-    lag_s: Float64[ndarray, " lags"]
-    cost_m: Float64[ndarray, " lags"]
-    best_s: float
-    sd_s: float
+    lag_s: Float64[ndarray, " lags"]  # assumed lags, shape (k,); positive where the joint log's stamps are late
+    cost_m: Float64[ndarray, " lags"]  # mean capped difference of the ranges seen on both ways, shape (k,)
+    best_s: float  # the minimum, refined from its two neighbours
+    sd_s: float  # its standard deviation; infinite for a single beam
 
 
 @dataclass(frozen=True, slots=True)
 class Lag:
-    """How late the angles of a recording are.
+    """How late the angles of a recording are."""
 
-    Attributes:
-        late_s: positive where the joint log's stamps are late.
-        sd_s: its standard deviation, of which backlash is no part.
-        speed_rad_s: mean speed of the axis; half of any backlash, divided by it, is inside `late_s`.
-    """
-
-    late_s: float
-    sd_s: float
-    speed_rad_s: float
+    late_s: float  # positive where the joint log's stamps are late
+    sd_s: float  # its standard deviation, of which backlash is no part
+    speed_rad_s: float  # mean speed of the axis; half of any backlash, divided by it, is inside `late_s`
 
 
 def find_lag(recording: Recording) -> Lag:

@@ -37,21 +37,13 @@ AT_REST_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number that a calibration may find.
+    """One number that a calibration may find."""
 
-    Attributes:
-        name: key in reports; ends in its unit.
-        words: for people.
-        shown: factor from SI to the unit people read.
-        unit: that unit.
-        limit: standard deviation [SI] above which the scene is taken as not showing it.
-    """
-
-    name: str
-    words: str
-    shown: float
-    unit: str
-    limit: float
+    name: str  # key in reports; ends in its unit
+    words: str  # for people
+    shown: float  # factor from SI to the unit people read
+    unit: str  # that unit
+    limit: float  # standard deviation [SI] above which the scene is taken as not showing it
 
 
 _DEG, _MM, _MS = float(np.degrees(1.0)), 1e3, 1e3
@@ -79,23 +71,17 @@ class ReturnedBeams:
     """Every beam that returned, of all recordings, in the order they were fired.
 
     Attributes:
-        range_m: shape (n,).
-        bearing_rad: shape (n,).
         joint_rad: logged joint angle at the beam's time plus the lag that was asked for, shape (n,).
-        speed_rad_s: of the joint, shape (n,).
-        recording: number of the beam's recording, shape (n,).
-        place: number of the scanner's place, shape (n,).
-        time_ns: shape (n,).
         curves: the joint's angle over time in each recording, as `assemble` takes it: the encoder's steps smoothed.
     """
 
-    range_m: Float64[ndarray, " n"]
-    bearing_rad: Float64[ndarray, " n"]
+    range_m: Float64[ndarray, " n"]  # shape (n,)
+    bearing_rad: Float64[ndarray, " n"]  # shape (n,)
     joint_rad: Float64[ndarray, " n"]
-    speed_rad_s: Float64[ndarray, " n"]
-    recording: Int64[ndarray, " n"]
-    place: Int64[ndarray, " n"]
-    time_ns: Int64[ndarray, " n"]
+    speed_rad_s: Float64[ndarray, " n"]  # of the joint, shape (n,)
+    recording: Int64[ndarray, " n"]  # number of the beam's recording, shape (n,)
+    place: Int64[ndarray, " n"]  # number of the scanner's place, shape (n,)
+    time_ns: Int64[ndarray, " n"]  # shape (n,)
     curves: tuple[AxisCurve, ...]
 
     def select(self, which: NDArray[np.generic]) -> ReturnedBeams:
@@ -195,17 +181,11 @@ def backlash_rad(servo: str) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mount:
-    """The laser's scan plane in the rotation frame, for one vector of parameters.
+    """The laser's scan plane in the rotation frame, for one vector of parameters."""
 
-    Attributes:
-        designed: rotation of the angle set without its delta, shape (3, 3).
-        along_m: translation along the axis, which no calibration changes.
-        backlash_rad: of the servo's gear, as wide as a backlash can be that is not found.
-    """
-
-    designed: Rotation
-    along_m: float
-    backlash_rad: float
+    designed: Rotation  # rotation of the angle set without its delta, shape (3, 3)
+    along_m: float  # translation along the axis, which no calibration changes
+    backlash_rad: float  # of the servo's gear, as wide as a backlash can be that is not found
 
     @staticmethod
     def of(angles: AngleSet) -> Mount:

@@ -38,17 +38,11 @@ class Fixed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
-    """What to find.
+    """What to find."""
 
-    Attributes:
-        free: parameters to find, in the order of `PARAMETERS`.
-        fixed: those that the recordings do not show.
-        notes: what a person should know though nothing had to be held for it.
-    """
-
-    free: Int64[ndarray, " free"]
-    fixed: tuple[Fixed, ...]
-    notes: tuple[str, ...]
+    free: Int64[ndarray, " free"]  # parameters to find, in the order of `PARAMETERS`
+    fixed: tuple[Fixed, ...]  # those that the recordings do not show
+    notes: tuple[str, ...]  # what a person should know though nothing had to be held for it
 
 
 def check_fan(mount: Mount) -> None:

@@ -29,12 +29,11 @@ class Agreement:
     """How well beams and planes agree under one vector of parameters.
 
     Attributes:
-        residual_m: root mean square of the ranges' residuals about the surfaces that they belong to.
-        walls_m: straightness of the largest surfaces: root mean square height of what each side of the fan sees in
-            each square metre. Noise averages out of it; bent and double walls do not.
+        walls_m: straightness of the largest surfaces: root mean square height of what each side of the fan sees in each
+            square metre. Noise averages out of it; bent and double walls do not.
     """
 
-    residual_m: float
+    residual_m: float  # root mean square of the ranges' residuals about the surfaces that they belong to
     walls_m: tuple[float, ...]
 
 

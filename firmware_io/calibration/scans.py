@@ -17,21 +17,17 @@ class Scans:
     """The beams as rows of an image: which scan each is of, and where in it.
 
     Attributes:
-        scan: number of each beam's scan, rising, shape (n,).
-        run: number of each scan's run: of one recording, turning one way, shape (s,).
-        joint_rad: of each scan's middle, shape (s,).
-        bearing_rad: from where a scan begins, rising in it, shape (n,).
-        first_rad, sense: bearing there, and +1 or -1 as bearings rise or fall.
-        gap_rad: between neighbours in a scan, where none is missing.
+        bearing_rad: from where a scan begins, rising in it, shape (n,). first_rad, sense: bearing there, and +1 or -1
+            as bearings rise or fall.
     """
 
-    scan: Ints
-    run: Ints
-    joint_rad: Floats
+    scan: Ints  # number of each beam's scan, rising, shape (n,)
+    run: Ints  # number of each scan's run: of one recording, turning one way, shape (s,)
+    joint_rad: Floats  # of each scan's middle, shape (s,)
     bearing_rad: Floats
     first_rad: float
     sense: float
-    gap_rad: float
+    gap_rad: float  # between neighbours in a scan, where none is missing
 
     @staticmethod
     def of(beams: ReturnedBeams) -> Scans:

@@ -36,14 +36,12 @@ class Grouping:
     """Which surface and which spot of it each tile sees.
 
     Attributes:
-        surface: number of each tile's surface, -1 for none, shape (m,).
         spot: number of each tile's spot, counted over all surfaces; meaningless where surface is -1, shape (m,).
-        q: plane of each surface, q . p = 1, shape (s, 3).
     """
 
-    surface: Int64[ndarray, " tiles"]
+    surface: Int64[ndarray, " tiles"]  # number of each tile's surface, -1 for none, shape (m,)
     spot: Int64[ndarray, " tiles"]
-    q: Float64[ndarray, "surfaces 3"]
+    q: Float64[ndarray, "surfaces 3"]  # plane of each surface, q . p = 1, shape (s, 3)
 
     @property
     def used(self) -> Ints:
@@ -53,17 +51,11 @@ class Grouping:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """What is left when bulges and planes are gone.
+    """What is left when bulges and planes are gone."""
 
-    Attributes:
-        information: of the free parameters, shape (k, k).
-        right: right-hand side, shape (k,).
-        plane_rows: for each surface, dq = plane_rows @ [dx, 1], shape (s, 3, k + 1).
-    """
-
-    information: Float64[ndarray, "free free"]
-    right: Float64[ndarray, " free"]
-    plane_rows: Floats
+    information: Float64[ndarray, "free free"]  # of the free parameters, shape (k, k)
+    right: Float64[ndarray, " free"]  # right-hand side, shape (k,)
+    plane_rows: Floats  # for each surface, dq = plane_rows @ [dx, 1], shape (s, 3, k + 1)
 
 
 def sums(

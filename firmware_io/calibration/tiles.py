@@ -32,26 +32,19 @@ class FlatTiles:
     """Flat looks, and the beams in them sorted by tile.
 
     Attributes:
-        beams: beams of all tiles.
-        start: index of each tile's first beam, shape (m + 1,).
-        middle: one beam per tile, through its middle, its range by the tile's own plane, shape (m,).
         normal_laser: normal of the tile's plane in the laser frame, towards the laser, shape (m, 3).
-        normal_sd_rad: how well that is known, shape (m,).
-        rms_m: of the beams' ranges about the tile's plane, shape (m,).
         side: which side of the fan looks, 0 or 1: the first half of the fan meets what the second half sees too.
-        noise_m: standard deviation of a range: the median of what tiles show.
-        dropped: beams in no tile.
     """
 
-    beams: ReturnedBeams
-    start: Int64[ndarray, " bounds"]
-    middle: ReturnedBeams
+    beams: ReturnedBeams  # beams of all tiles
+    start: Int64[ndarray, " bounds"]  # index of each tile's first beam, shape (m + 1,)
+    middle: ReturnedBeams  # one beam per tile, through its middle, its range by the tile's own plane, shape (m,)
     normal_laser: Float64[ndarray, "tiles 3"]
-    normal_sd_rad: Float64[ndarray, " tiles"]
-    rms_m: Float64[ndarray, " tiles"]
+    normal_sd_rad: Float64[ndarray, " tiles"]  # how well that is known, shape (m,)
+    rms_m: Float64[ndarray, " tiles"]  # of the beams' ranges about the tile's plane, shape (m,)
     side: Int64[ndarray, " tiles"]
-    noise_m: float
-    dropped: int
+    noise_m: float  # standard deviation of a range: the median of what tiles show
+    dropped: int  # beams in no tile
 
     @property
     def count(self) -> Int64[ndarray, " tiles"]:

@@ -31,18 +31,14 @@ class CloudFormat:
     """A format of clouds.
 
     Attributes:
-        name: suffix of its files in lower case, without the dot.
-        module: dotted name of the module that reads and writes it; imported when it is used.
-        packages: top-level names of the packages that the module needs, of the extra `clouds`.
         rows: fields if the format has fields for rows and columns, comments if it can keep them in comments, else none.
-        several: a file can hold several clouds; `write` takes a list of them.
     """
 
-    name: str
-    module: str
-    packages: tuple[str, ...] = ()
+    name: str  # suffix of its files in lower case, without the dot
+    module: str  # dotted name of the module that reads and writes it; imported when it is used
+    packages: tuple[str, ...] = ()  # top-level names of the packages that the module needs, of the extra `clouds`
     rows: Literal["fields", "comments", "none"] = "none"
-    several: bool = False
+    several: bool = False  # a file can hold several clouds; `write` takes a list of them
 
 
 FORMATS = (
@@ -94,17 +90,11 @@ def check_target(path: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What became of clouds that were written.
+    """What became of clouds that were written."""
 
-    Attributes:
-        paths: the files.
-        rows: in all of them.
-        notes: what they do not hold, one sentence each.
-    """
-
-    paths: tuple[Path, ...]
-    rows: int
-    notes: tuple[str, ...]
+    paths: tuple[Path, ...]  # the files
+    rows: int  # in all of them
+    notes: tuple[str, ...]  # what they do not hold, one sentence each
 
 
 def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False) -> Written:

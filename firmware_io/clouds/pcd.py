@@ -107,23 +107,14 @@ class PcdField:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PcdHeader:
-    """The header of a cloud, checked against the file.
+    """The header of a cloud, checked against the file."""
 
-    Attributes:
-        fields: of a row, padding included.
-        shape: HEIGHT and WIDTH.
-        encoding: ascii, binary or binary_compressed.
-        start: byte after the header.
-        T_world_cloud: VIEWPOINT.
-        comments: lines that begin with #.
-    """
-
-    fields: tuple[PcdField, ...]
-    shape: tuple[int, int]
-    encoding: str
-    start: int
-    T_world_cloud: Pose
-    comments: tuple[str, ...]
+    fields: tuple[PcdField, ...]  # of a row, padding included
+    shape: tuple[int, int]  # HEIGHT and WIDTH
+    encoding: str  # ascii, binary or binary_compressed
+    start: int  # byte after the header
+    T_world_cloud: Pose  # VIEWPOINT
+    comments: tuple[str, ...]  # lines that begin with #
 
     @property
     def rows(self) -> int:

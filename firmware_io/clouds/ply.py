@@ -59,15 +59,11 @@ def ply_writer(path: Path, fields: np.dtype[np.void], comments: Iterable[str]) -
 
 
 class PlyRows:
-    """Rows on their way to a file; its header counts them.
-
-    Attributes:
-        rows: written so far.
-    """
+    """Rows on their way to a file; its header counts them."""
 
     def __init__(self, stream: IO[bytes], fields: np.dtype[np.void], comments: Sequence[str]) -> None:
         self._stream, self._fields, self._comments = stream, fields, comments
-        self.rows = 0
+        self.rows = 0  # written so far
         stream.write(self.header())
 
     def write(self, rows: NDArray[np.void]) -> None:
@@ -127,21 +123,13 @@ class PlyElement:
 
 @dataclass(frozen=True, slots=True)
 class PlyHeader:
-    """The header of a PLY file.
+    """The header of a PLY file."""
 
-    Attributes:
-        form: ascii, binary_little_endian or binary_big_endian.
-        elements: in the order of the file; one is `vertex`, with x y z.
-        comments: without the filler.
-        start: byte after the header.
-        lines: of the header.
-    """
-
-    form: str
-    elements: tuple[PlyElement, ...]
-    comments: tuple[str, ...]
-    start: int
-    lines: int
+    form: str  # ascii, binary_little_endian or binary_big_endian
+    elements: tuple[PlyElement, ...]  # in the order of the file; one is `vertex`, with x y z
+    comments: tuple[str, ...]  # without the filler
+    start: int  # byte after the header
+    lines: int  # of the header
 
     @property
     def vertex(self) -> PlyElement:

@@ -25,15 +25,10 @@ from scanwright.firmware_io.samples import AxisCurve, straight
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
-    """One image and the pose of its camera.
+    """One image and the pose of its camera."""
 
-    Attributes:
-        file: of the image.
-        T_cloud_camera: shape (4, 4).
-    """
-
-    file: Path
-    T_cloud_camera: Pose
+    file: Path  # of the image
+    T_cloud_camera: Pose  # shape (4, 4)
 
 
 def load_views(

@@ -1,8 +1,7 @@
-"""How a servo's horn really turns: motor, gear with play, control loop, and an off-axis mass that gravity pulls.
+"""True motion of a servo's horn: motor, gear with play, control loop and off-axis mass (`servo_plant.py`).
 
-Its equations are those of `firmware_io/emulators/servo_plant.py`. The gear's teeth are stiff (`stiffness_nm_rad` on a
-rotor of some 1e-3 kg m2: a millisecond) against turns of seconds, so a stiff solver integrates it, up to the time that
-is requested.
+The gear's teeth are stiff (a millisecond) against turns of seconds, so a stiff solver integrates, up to the requested
+time.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ class Solver:
 class HornMotion:
     """The horn's motion under a history of drives, integrated lazily and kept for `history_s`.
 
-    Times are integer nanoseconds of whatever clock the caller uses. Thread-safe.
+    Times are integer nanoseconds on the caller's clock. Thread-safe.
     """
 
     def __init__(
@@ -94,11 +93,7 @@ class HornMotion:
             return self._drives[self._index((time_ns - self._origin_ns) / 1e9)][1]
 
     def angle_rad(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
-        """True angle of the horn at given times, in the shape given.
-
-        Raises:
-            ValueError: a time lies before what is kept.
-        """
+        """True angle of the horn at given times, in their shape; ValueError for a time before what is kept."""
         at_s = (np.asarray(time_ns, np.int64) - self._origin_ns) / 1e9
         with self._lock:
             return self._states(at_s.ravel())[2].reshape(at_s.shape)

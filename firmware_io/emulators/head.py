@@ -20,11 +20,7 @@ _GRAVITY_M_S2 = np.array([0.0, 0.0, -frames.STANDARD_GRAVITY_M_S2])
 
 
 def read_load(out: Path, angles: AngleSet) -> Load:
-    """Inertia and gravity of the links `rot` and `laser` about the axis; a light, balanced head before the build.
-
-    Raises:
-        DeviceError: `scanner.urdf` is there, but does not tell the masses of these links.
-    """
+    """Inertia and gravity of the links `rot` and `laser`; a light, balanced head if there is no `scanner.urdf`."""
     file = out / "scanner.urdf"
     if not file.is_file():
         return Load()

@@ -1,7 +1,4 @@
-"""Model of an emulated Hokuyo: its identity, and its clock.
-
-Texts and statuses are those of captured sensors, except where an entry says otherwise.
-"""
+"""Identity and clock of emulated Hokuyos, from captures of real sensors unless an entry states otherwise."""
 
 from __future__ import annotations
 
@@ -14,33 +11,19 @@ from scanwright.firmware_io.lidar.scip.parameters import Parameters
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """What tells one model from another.
+    """What tells one model from another."""
 
-    Attributes:
-        parameters: its PP reply.
-        product: PROD of VV.
-        firmware: FIRM of VV.
-        serial_number: SERI of VV.
-        speed: SCSP of II.
-        mode: MESM of II.
-        line: SBPS of II.
-        speed_request: status of a CR request that changes nothing.
-        no_return: number that stands for a beam that does not come back.
-        too_near: number that stands for something in front of the least range.
-        intensity: whether it measures intensities.
-    """
-
-    parameters: Parameters
-    product: str
-    firmware: str
-    serial_number: str
-    speed: str
-    mode: str = "CLASSIC"
-    line: str = "USB Full Speed"
-    speed_request: str = "04"
-    no_return: int
-    too_near: int
-    intensity: bool = True
+    parameters: Parameters  # its PP reply
+    product: str  # PROD of VV
+    firmware: str  # FIRM of VV
+    serial_number: str  # SERI of VV
+    speed: str  # SCSP of II
+    mode: str = "CLASSIC"  # MESM of II
+    line: str = "USB Full Speed"  # SBPS of II
+    speed_request: str = "04"  # status of a CR request that changes nothing
+    no_return: int  # number that stands for a beam that does not come back
+    too_near: int  # number that stands for something in front of the least range
+    intensity: bool = True  # whether it measures intensities
 
 
 # Parameters: model, range [mm], steps per turn, first, last and front step, rpm

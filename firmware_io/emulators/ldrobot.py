@@ -1,6 +1,6 @@
-"""LD06, LD19 and STL27L in software: they talk from power-up on, their motor wanders, their clock runs in milliseconds.
+"""Emulator of LD06, LD19 and STL27L: they send from power-up, their motor wanders, their clock has milliseconds.
 
-Written from the maker's description of the packet; what nobody found described is marked [assumed].
+Written from the maker's description of the packet; what it lacks is marked [assumed].
 """
 
 from __future__ import annotations
@@ -47,23 +47,14 @@ def write_packet(speed_deg_s: float, start_deg: float, end_deg: float, stamp_ms:
 
 @dataclass
 class LdrobotMachine:
-    """The state of one sensor; times are true ones.
+    """The state of one sensor; times are true ones."""
 
-    Attributes:
-        lidar: of the catalogue.
-        ranging: what it sees.
-        began_ns: when its clock was 0.
-        baud: of its line.
-        rate_error: of its clock, 5e-5 is 50 ppm fast.
-        first_ms: what its clock showed first.
-    """
-
-    lidar: Lidar
-    ranging: Ranging
-    began_ns: int
-    baud: int
-    rate_error: float = 0.0
-    first_ms: int = 0
+    lidar: Lidar  # of the catalogue
+    ranging: Ranging  # its surroundings
+    began_ns: int  # when its clock was 0
+    baud: int  # of its line
+    rate_error: float = 0.0  # of its clock, 5e-5 is 50 ppm fast
+    first_ms: int = 0  # first clock value
 
     def __post_init__(self) -> None:
         self._packet = 0

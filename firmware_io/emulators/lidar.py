@@ -26,20 +26,17 @@ def hokuyo_emulator(
     scip_1: bool = False,
     seed: int = 0,
 ) -> LidarLine[LidarMachine]:
-    """A lidar that answers SCIP.
+    """Return the emulator of a Hokuyo.
 
     Args:
         model: a key of `IDENTITIES`.
-        look: true times of the beams, as for `Ranging`; it is asked once per turn for every measured step.
+        look: as `Ranging`; called once per turn for every measured step.
         rate_error: of the sensor's clock, 5e-5 is 50 ppm fast.
-        jitter_s: scans arrive up to this much late, evenly spread.
-        clock_ms: what the sensor's clock shows at the start; beyond 2**24 it wraps.
-        scanning: it scans already, as if somebody had not stopped it.
-        scip_1: it wakes up in SCIP 1.1.
+        jitter_s: scans arrive up to this much late.
+        clock_ms: the sensor's clock at the start.
+        scanning: it scans from the start.
+        scip_1: it starts in SCIP 1.1.
         seed: of the jitter.
-
-    Raises:
-        DeviceError: there is no emulator of this model.
     """
     if model not in IDENTITIES:
         raise DeviceError(f"no emulator of the lidar '{model}'{suggest(model, IDENTITIES)}")

@@ -1,7 +1,4 @@
-"""A lidar in software on its line: a pseudo-terminal, and TCP where the model has it, with the faults of real ones.
-
-What the sensor is and says is its `LidarMachine`'s, what it sees its `Ranging`'s.
-"""
+"""Line of an emulated lidar: a pseudo-terminal, and TCP if the model has it, with the faults of real ones."""
 
 from __future__ import annotations
 
@@ -33,7 +30,7 @@ _LAG_NS = 500_000_000  # where this computer sees more slowly than a sensor turn
 
 
 class Machine(Protocol):
-    """What a sensor does, at times that somebody else tells.
+    """What a sensor does, at given times.
 
     Attributes:
         scanning: another value each time that it begins or ends to scan.
@@ -47,7 +44,7 @@ class Machine(Protocol):
         ...
 
     def next_ns(self) -> int:
-        """When the beams that it measures next are over; far away where it measures none."""
+        """When the beams that it measures next are over; far away if it measures none."""
         ...
 
     def next_packets(self) -> list[tuple[int, bytes]]:
@@ -81,8 +78,6 @@ class LidarLine(Generic[M_co]):
 
     Attributes:
         port: like "/dev/serial/by-id/...": it stays the same over a re-plug.
-        address: "127.0.0.1:PORT"; empty where it has no network.
-        machine: the sensor.
     """
 
     def __init__(
@@ -96,23 +91,23 @@ class LidarLine(Generic[M_co]):
         network: bool = True,
         seed: int = 0,
     ) -> None:
-        """Nothing runs before `with`.
+        """Prepare the emulator; it starts in `with`.
 
         Args:
             name: of the model.
             machine: the sensor.
-            jitter_s: scans arrive up to this much late, evenly spread.
-            head: bytes of a packet before its measured numbers, which `garble` spares.
-            backlog: bytes that wait for a slow reader before whole packets are dropped, as in a sensor's buffer.
-            network: whether it can be reached over TCP, too.
+            jitter_s: scans arrive up to this much late.
+            head: bytes of a packet before its ranges, which `garble` spares.
+            backlog: bytes that wait for a slow reader before whole packets are dropped.
+            network: whether it has TCP too.
             seed: of jitter and faults.
         """
-        self.machine = machine
+        self.machine = machine  # the sensor
         self._name = name
         self._head = head
         self._backlog = backlog
         self._network = network
-        self.address = ""
+        self.address = ""  # "127.0.0.1:PORT"; empty if it has no network
         self._rng = np.random.default_rng(seed)
         self._jitter_ns = round(jitter_s * 1e9)
         self._lock = threading.RLock()

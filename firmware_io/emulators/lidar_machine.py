@@ -1,4 +1,4 @@
-"""What a Hokuyo lidar does: requests in, replies out, turn after turn, at times that somebody else tells."""
+"""What a Hokuyo lidar does: requests in, replies out, turn after turn, at given times."""
 
 from __future__ import annotations
 
@@ -37,29 +37,17 @@ class Scanning:
 
 @dataclass
 class LidarMachine:
-    """The state of one sensor; times are true ones, `time.monotonic_ns()` or made up.
+    """The state of one sensor; times are true ones, `time.monotonic_ns()` or made up."""
 
-    Attributes:
-        identity: which model.
-        look: true times of all beams of a turn -> ranges and intensities.
-        quartz: the sensor's clock.
-        motor_error: turns take this part longer than the sensor says.
-        stamp_at: which moment of a turn the stamps mean.
-        scip_1: it talks SCIP 1.1 until it is told otherwise.
-        state: STAT of II.
-        laser: whether it is on.
-        scanning: what it scans for; None where nobody asked.
-    """
-
-    identity: Identity
-    look: Look
-    quartz: Quartz
-    motor_error: float = 0.0
-    stamp_at: StampAt = "step_0"
-    scip_1: bool = False
-    state: str = "Sensor works well."
-    laser: bool = False
-    scanning: Scanning | None = None
+    identity: Identity  # which model
+    look: Look  # true times of all beams of a turn -> ranges and intensities
+    quartz: Quartz  # the sensor's clock
+    motor_error: float = 0.0  # turns take this part longer than the sensor says
+    stamp_at: StampAt = "step_0"  # which moment of a turn the stamps mean
+    scip_1: bool = False  # it talks SCIP 1.1 until it is told otherwise
+    state: str = "Sensor works well."  # STAT of II
+    laser: bool = False  # whether it is on
+    scanning: Scanning | None = None  # what it scans for; None if not requested
     _adjusting: bool = False
     _rebooting: bool = False
     _silent_until_ns: int = 0
@@ -89,13 +77,13 @@ class LidarMachine:
         return b"".join(self.answer(request, now_ns) for request in requests), rest
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """The scan of the turn that is over next; none where nobody asked for it."""
+        """The scan of the turn that is over next; none if nobody asked for it."""
         over_ns = self.next_ns()
         scan = self.next_scan()
         return [(over_ns, scan)] if scan else []
 
     def next_ns(self) -> int:
-        """When the next turn is measured to its end; never where nobody waits for one."""
+        """When the next turn is measured to its end; never if nobody waits for one."""
         return self._measured_ns(self.scanning.turn) if self.scanning else _NEVER_NS
 
     def power_cycle(self, now_ns: int) -> None:
@@ -110,7 +98,7 @@ class LidarMachine:
             self.scanning.turn += max(behind, 0)
 
     def next_scan(self) -> bytes:
-        """Measure the next turn; empty where it is one to skip."""
+        """Measure the next turn; empty if it is one to skip."""
         scanning = self.scanning
         if scanning is None:
             return b""

@@ -44,7 +44,7 @@ def emulated_scanner(
     seed: int = 0,
     factory_servo: bool = False,
 ) -> Iterator[EmulatedScanner]:
-    """Run the emulators of a scanner's devices while the body runs.
+    """Run the emulators of a scanner's devices during the body.
 
     Args:
         angles: angle set of the scanner.

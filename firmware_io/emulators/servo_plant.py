@@ -33,54 +33,31 @@ _SLOW_RAD_S = 1e-4  # below it Coulomb friction fades, so that it has a slope a 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What hangs on the horn.
+    """What hangs on the horn."""
 
-    Attributes:
-        inertia_kg_m2: about the axis.
-        gravity_nm: largest torque of gravity on the axis; 0 where the axis is upright or the head balanced.
-        gravity_phase_rad: that torque is `gravity_nm cos(angle + gravity_phase_rad)`.
-        bearing_nm: Coulomb friction of bearing and slip ring.
-    """
-
-    inertia_kg_m2: float = 5e-4
-    gravity_nm: float = 0.0
-    gravity_phase_rad: float = 0.0
-    bearing_nm: float = 0.01
+    inertia_kg_m2: float = 5e-4  # about the axis
+    gravity_nm: float = 0.0  # largest torque of gravity on the axis; 0 if the axis is upright or the head balanced
+    gravity_phase_rad: float = 0.0  # that torque is `gravity_nm cos(angle + gravity_phase_rad)`
+    bearing_nm: float = 0.01  # Coulomb friction of bearing and slip ring
 
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """One servo with its control loop.
+    """One servo with its control loop."""
 
-    Attributes:
-        stall_torque_nm: at full supply.
-        no_load_rad_s: at full supply.
-        inertia_kg_m2: of rotor and gear.
-        friction_nm: Coulomb friction of motor and gear.
-        backlash_rad: full play of the gear.
-        stiffness_nm_rad: of the teeth.
-        impact_s_rad: how much of a hit the teeth swallow (mu above).
-        sensor_lag_s: between the horn's angle and what the loop knows of it.
-        velocity_p: duty per rad/s of speed error.
-        velocity_i: duty per rad of the error's integral.
-        position_p: duty per rad of position error.
-        margin_rad: position error that the loop ignores.
-        punch: least duty beyond the margin.
-    """
-
-    stall_torque_nm: float
-    no_load_rad_s: float
-    inertia_kg_m2: float
-    friction_nm: float
-    backlash_rad: float
-    stiffness_nm_rad: float
-    impact_s_rad: float
-    sensor_lag_s: float
-    velocity_p: float
-    velocity_i: float
-    position_p: float
-    margin_rad: float
-    punch: float
+    stall_torque_nm: float  # at full supply
+    no_load_rad_s: float  # at full supply
+    inertia_kg_m2: float  # of rotor and gear
+    friction_nm: float  # Coulomb friction of motor and gear
+    backlash_rad: float  # full play of the gear
+    stiffness_nm_rad: float  # of the teeth
+    impact_s_rad: float  # how much of a hit the teeth swallow (mu above)
+    sensor_lag_s: float  # between the horn's angle and what the loop knows of it
+    velocity_p: float  # duty per rad/s of speed error
+    velocity_i: float  # duty per rad of the error's integral
+    position_p: float  # duty per rad of position error
+    margin_rad: float  # position error that the loop ignores
+    punch: float  # least duty beyond the margin
 
 
 def plant_of(model: str) -> Plant:
@@ -112,23 +89,14 @@ def plant_of(model: str) -> Plant:
 
 @dataclass(frozen=True, slots=True)
 class Actuation:
-    """What acts on the plant from one moment on.
+    """What acts on the plant from one moment on."""
 
-    Attributes:
-        mode: motor open, share of the supply, velocity or position loop.
-        goal: nothing, a duty in -1..1, rad/s or rad.
-        rate_rad_s: at which the goal position is walked to.
-        supply: voltage as a fraction of the rated one.
-        torque_limit: largest duty.
-        blocked: something holds the horn where it is.
-    """
-
-    mode: Mode = "off"
-    goal: float = 0.0
-    rate_rad_s: float = math.inf
-    supply: float = 1.0
-    torque_limit: float = 1.0
-    blocked: bool = False
+    mode: Mode = "off"  # motor open, share of the supply, velocity or position loop
+    goal: float = 0.0  # nothing, a duty in -1..1, rad/s or rad
+    rate_rad_s: float = math.inf  # at which the goal position is walked to
+    supply: float = 1.0  # voltage as a fraction of the rated one
+    torque_limit: float = 1.0  # largest duty
+    blocked: bool = False  # something holds the horn where it is
 
 
 def walked_rad(elapsed_s: float, start: float, goal: float, rate_rad_s: float) -> float:

@@ -1,7 +1,4 @@
-"""A recording without devices, faster than real time, of a scanner whose servo follows its motion exactly.
-
-The emulators behind ports (`scanner.py`) add packets, clocks, ripple and faults.
-"""
+"""Recording without devices, faster than real time: exact motion, no packets, clocks, ripple or faults."""
 
 from __future__ import annotations
 

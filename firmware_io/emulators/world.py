@@ -1,7 +1,7 @@
-"""What a turning lidar sees: every beam cast at the axis angle of its own time, and what the sensor makes of it.
+"""What a turning lidar sees: every beam cast at the axis angle of its own time, and the sensor's range of it.
 
-The rays go through `AngleSet.T_world_laser`, the definition of the frame chain, and not through the short cut that
-`assemble` takes: the two check each other.
+Rays use `AngleSet.T_world_laser`, the definition of the frame chain, not the kernel of `assemble`: each checks the
+other.
 """
 
 from __future__ import annotations
@@ -30,21 +30,13 @@ _WANDER_S = 1.7  # period of it [assumed]
 
 @dataclass(frozen=True, slots=True)
 class RangeModel:
-    """How a sensor turns a distance into a range.
+    """How a sensor turns a distance into a range."""
 
-    Attributes:
-        sigma_m: standard deviation of the noise, or that at ranges in metres.
-        quantum_m: step of the ranges that it sends.
-        range_min_m: nothing nearer is measured.
-        range_max_m: nothing farther comes back.
-        incidence_max_rad: a surface that is met at a flatter angle (from its normal) sends nothing back.
-    """
-
-    sigma_m: float | Callable[[Floats], Floats]
-    quantum_m: float
-    range_min_m: float
-    range_max_m: float
-    incidence_max_rad: float
+    sigma_m: float | Callable[[Floats], Floats]  # standard deviation of the noise, or that at ranges in metres
+    quantum_m: float  # step of the ranges that it sends
+    range_min_m: float  # nothing nearer is measured
+    range_max_m: float  # nothing farther comes back
+    incidence_max_rad: float  # a surface that is met at a flatter angle (from its normal) sends nothing back
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,22 +44,15 @@ class Measured:
     """One scan as the sensor means it; row i is beam i.
 
     Attributes:
-        range_m: shape (n,); +inf where nothing came back, -inf where something was too near (REP 117).
-        intensity: shape (n,), 0 where there is no range.
+        range_m: shape (n,); +inf if nothing came back, -inf if something was too near (REP 117).
     """
 
     range_m: Float64[ndarray, " n"]
-    intensity: Float64[ndarray, " n"]
+    intensity: Float64[ndarray, " n"]  # shape (n,), 0 if there is no range
 
 
 def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
-    """The model of a catalogue sensor; `sigma_mm` replaces the noise of its data sheet.
-
-    SCIP sends millimetres. No data sheet says at which incidence a surface is lost: 85 deg is assumed.
-
-    Raises:
-        TaskError: the noise is none.
-    """
+    """Return the range model of a catalogue sensor, with an assumed incidence limit of 85 deg."""
     if sigma_mm is not None and not 0 <= sigma_mm <= _MOST_NOISE_MM:
         raise TaskError(f"noise {sigma_mm} mm: 0 to {_MOST_NOISE_MM:g}")
     return RangeModel(
@@ -94,10 +79,7 @@ def see(scene: Scene, angles: AngleSet, bearing_rad: Float64[ndarray, " n"], joi
 
 
 def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> Measured:
-    """Ranges with noise, in whole quanta, and intensities; draws one number per beam, hit or not.
-
-    The intensity falls with the cosine of incidence and with range: plausible, but no model of a certain sensor.
-    """
+    """Return ranges with noise, in whole quanta, and plausible intensities; draws one number per beam."""
     sigma_m = model.sigma_m(hits.range_m) if callable(model.sigma_m) else model.sigma_m
     noise_m = sigma_m * rng.standard_normal(hits.range_m.size)
     range_m = np.rint((hits.range_m + noise_m) / model.quantum_m) * model.quantum_m
@@ -117,10 +99,7 @@ def looking(
     model: RangeModel,
     seed: int = 0,
 ) -> Callable[[Times, Floats], tuple[Floats, Floats]]:
-    """What a lidar emulator asks: the true times and bearings of beams -> range [m] and intensity.
-
-    `angle_at` is the true angle of the axis at given times.
-    """
+    """Return the `Ranging` of a lidar emulator; `angle_at`: true angle of the axis at given times."""
     rng = np.random.default_rng(seed)
 
     def look(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
@@ -131,20 +110,14 @@ def looking(
 
 
 def turned_deg(rate_hz: float, since_s: Floats) -> tuple[Floats, Floats]:
-    """Angle [deg] that the motor of a cheap sensor has turned by, and its speed [deg/s]: it wanders by a hundredth.
-
-    How much and how fast is assumed: no maker says.
-    """
+    """Return angle [deg] and speed [deg/s] of a cheap sensor's motor, which wanders by 1 % [assumed]."""
     usual_deg_s, phase = 360 * rate_hz, 2 * np.pi * since_s / _WANDER_S
     wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
     return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
 
 
 def spun_up(since_s: Floats) -> tuple[Floats, Floats]:
-    """Time [s] at full speed in which a motor turns as far as since its start from rest, and its share of that speed.
-
-    It nears its speed exponentially.
-    """
+    """Return the time [s] at full speed for the angle turned since rest, and the share of that speed (exponential)."""
     share = -np.expm1(-since_s / SPIN_UP_S)
     return since_s - SPIN_UP_S * share, share
 
@@ -164,11 +137,7 @@ def furnished_room() -> Float64[ndarray, "triangles 3 3"]:
 
 
 def room(mesh: Path | None, unit_m: float = 1.0, at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Scene:
-    """The scene of a mesh, or of the furnished room; the scanner's world frame stands at `at_m` in it.
-
-    Raises:
-        SceneError: the mesh cannot be used.
-    """
+    """Return the scene of a mesh or the furnished room, with the scanner at `at_m`; SceneError for a bad mesh."""
     if mesh is None:
         return build_scene(furnished_room() - np.array(at_m))
     return load_scene(mesh, unit_m, frames.rigid(np.eye(3), -np.array(at_m)))

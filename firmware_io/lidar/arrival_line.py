@@ -1,7 +1,6 @@
-"""A sensor's even clock on the host's, from packets that can be late and never early.
+"""Line that maps a sensor's time to the host's, from packets that can be late but never early.
 
-The straight line below all arrivals of the last seconds, as close to them as it goes, gives rate and offset: it is that
-edge of their lower convex hull which spans the middle (of each bucket of time the earliest arrival is kept).
+The line below all arrivals of the last seconds: the edge of their lower convex hull that spans the middle.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import termios
 from typing import Protocol
 
 from scanwright.design.errors import DeviceError
+from scanwright.firmware_io.capture import captured
 from scanwright.firmware_io.serial_port import open_serial_port
 
 FIRST_BAUD = 115_200  # until a driver sets its own
@@ -87,6 +88,7 @@ class SocketStream:
     """A TCP connection."""
 
     def __init__(self, host: str, port: int) -> None:
+        self._address = f"{host}:{port}"
         self._socket = socket.create_connection((host, port), timeout=2.0)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
@@ -97,11 +99,11 @@ class SocketStream:
         received = self._socket.recv(1 << 16)
         if not received:
             raise ConnectionError("the sensor closed the connection")
-        return received
+        return captured(self._address, "<", received)
 
     def write(self, data: bytes) -> None:
         """Send all of it."""
-        self._socket.sendall(data)
+        self._socket.sendall(captured(self._address, ">", data))
 
     def close(self) -> None:
         """Let go of the connection."""

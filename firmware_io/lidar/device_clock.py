@@ -1,13 +1,9 @@
-"""A sensor's clock on the host's: offset and rate from what the sensor stamped and when it arrived.
+"""Offset and rate of a sensor's clock, from its timestamps and their arrivals.
 
-A packet can be late, never early: among the arrivals only the earliest say anything about the clocks. The way is
-
-1. stamps are whole milliseconds, turns are nearly even: `stamp_line` finds where between two ticks a turn began (a
-   constant part of a tick may stay unknown, and does no harm: the offset takes it up);
-2. the line below the arrivals (`arrival_line`) gives rate and offset;
-3. the declared smallest delay, from the moment that a stamp means to the last byte of an undelayed packet, is taken
-   off: from arrivals alone no one can tell it from the offset;
-4. a time synchronisation before the scans (question and answer: both bounds) keeps the result within what it allows.
+1. `stamp_line` finds the start of each turn between two ticks: stamps are whole milliseconds, turns nearly even.
+2. `arrival_line` gives rate and offset: packets can be late, never early.
+3. The declared smallest delay from timestamp to last byte is subtracted; arrivals cannot show it.
+4. A time synchronisation before the scans bounds the result.
 
 Sensor time is milliseconds, host time is `time.monotonic_ns()`.
 """
@@ -29,15 +25,10 @@ TICK_NS = 1e6 / math.sqrt(12)  # standard deviation of a tick of a millisecond, 
 
 @dataclass(frozen=True, slots=True)
 class ScanMoment:
-    """A sensor time on the host's clock.
+    """A sensor time on the host's clock."""
 
-    Attributes:
-        time_ns: host time.
-        uncertainty_ns: standard uncertainty; the declared smallest delay counts as exact.
-    """
-
-    time_ns: int
-    uncertainty_ns: int
+    time_ns: int  # host time
+    uncertainty_ns: int  # standard uncertainty; the declared smallest delay counts as exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +50,10 @@ class TimeSync:
 
 
 def synchronised(exchanges: Sequence[Exchange]) -> TimeSync:
-    """The offset that all exchanges (of a second or so) allow.
-
-    An answer of n milliseconds means that the sensor's clock stood within [n, n + 1) at some time between question and
-    answer.
+    """Return the offset that all exchanges allow; an answer of n ms means a clock within [n, n + 1) ms.
 
     Raises:
-        DeviceError: no offset agrees with all of them: the sensor's clock began anew in between.
+        DeviceError: no offset agrees with all of them, because the sensor's clock restarted.
     """
     first = exchanges[0].stamp_ms
     since_ms = [exchange.stamp_ms - first for exchange in exchanges]
@@ -78,20 +66,11 @@ def synchronised(exchanges: Sequence[Exchange]) -> TimeSync:
 
 
 class StampCounter:
-    """Unwraps the stamps of a counter of few bits.
-
-    Attributes:
-        restarts: how often the sensor's clock began anew; stamps compare within one only.
-    """
+    """Unwraps the stamps of a counter of few bits."""
 
     def __init__(self, wrap: int = STAMP_WRAP_MS, per_ms: int = 1) -> None:
-        """Nothing was stamped yet.
-
-        Args:
-            wrap: the stamp that is 0 again.
-            per_ms: ticks in a millisecond.
-        """
-        self.restarts = 0
+        """`wrap`: stamp at which the counter returns to 0; `per_ms`: ticks per millisecond."""
+        self.restarts = 0  # how often the sensor's clock began anew; stamps compare within one only
         self._wrap, self._per_ms = wrap, per_ms
         self._last: tuple[int, int] | None = None
 

@@ -1,7 +1,6 @@
-"""The families of lidars that can be driven. One line here makes a family known to every command.
+"""Lidar families that can be driven; one line here makes a family known to every command.
 
-An installed package adds one without a line here: an entry point of the group "scanwright.lidars" that names a
-`LidarFamily`; the TOML files beside its module are products of the catalogue (docs/how-to/new-lidar.md).
+An installed package adds a `LidarFamily` by an entry point of the group "scanwright.lidars" (docs/how-to/new-lidar.md).
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from scanwright.firmware_io.lidar.ldrobot.driver import LdrobotLidar
 from scanwright.firmware_io.lidar.lidar import LidarDriver, LidarFamily, StampAt
 from scanwright.firmware_io.lidar.lms2xx.driver import LmsLidar
 from scanwright.firmware_io.lidar.scip.driver import ScipLidar
-from scanwright.firmware_io.lidar.sick.driver import SickLidar
+from scanwright.firmware_io.lidar.sick.driver import SICK_STAMPS, SickLidar
 from scanwright.firmware_io.lidar.slamtec.driver import SlamtecLidar
 
 _EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers must not import emulators
@@ -24,9 +23,11 @@ _EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers 
 # If no model is named, they are tried in this order: first the one that only listens.
 FAMILIES = (
     LidarFamily("ldrobot", "LDROBOT", LdrobotLidar, f"{_EMULATORS}.ldrobot:ldrobot_emulator"),
-    LidarFamily("scip", "Hokuyo (SCIP 2.0)", ScipLidar, f"{_EMULATORS}.lidar:scip_emulator", stamp_choice=True),
+    LidarFamily("scip", "Hokuyo (SCIP 2.0)", ScipLidar, f"{_EMULATORS}.lidar:scip_emulator", ("step_0", "rear")),
     LidarFamily("slamtec", "Slamtec RPLIDAR", SlamtecLidar, f"{_EMULATORS}.slamtec.machine:slamtec_emulator"),
-    LidarFamily("sick", "SICK (CoLa A and B)", SickLidar, f"{_EMULATORS}.sick.cola_emulator:sick_emulator"),
+    LidarFamily(
+        "sick", "SICK (CoLa A and B)", SickLidar, f"{_EMULATORS}.sick.cola_emulator:sick_emulator", SICK_STAMPS
+    ),
     LidarFamily("lms2xx", "SICK LMS 2xx (RS-422)", LmsLidar, f"{_EMULATORS}.sick.lms_emulator:lms_emulator"),
 )
 
@@ -53,13 +54,13 @@ def family_of(model: str) -> LidarFamily:
     return all_families()[name]
 
 
-def open_lidar(address: str, model: str | None = None, stamp_at: StampAt = "step_0") -> LidarDriver:
+def open_lidar(address: str, model: str | None = None, stamp_at: StampAt | None = None) -> LidarDriver:
     """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing.
 
     Args:
         address: where it is.
         model: name in the catalogue of what it should be; None asks one family after the other.
-        stamp_at: which moment of a turn its stamps mean, where documents differ.
+        stamp_at: beam of its timestamps, if documents differ; None for the family's default.
 
     Raises:
         DeviceError: no such port, it is in use, or what answers is no sensor that is known.
@@ -67,11 +68,16 @@ def open_lidar(address: str, model: str | None = None, stamp_at: StampAt = "step
     """
     if model is not None:
         family = family_of(model)
-        if stamp_at != "step_0" and not family.stamp_choice:
-            raise DeviceError(f"stamp_at = '{stamp_at}': the stamps of a {model} ({family.title}) mean one thing only")
+        if stamp_at is not None and stamp_at not in family.stamp_choices:
+            allowed = (
+                f"use {' or '.join(family.stamp_choices)}" if family.stamp_choices else "it has no choice; omit it"
+            )
+            raise DeviceError(f"stamp_at = '{stamp_at}': {model} ({family.title}): {allowed}")
         return family.open(address, model, stamp_at)
     failures = []
     for family in all_families().values():
+        if stamp_at is not None and stamp_at not in family.stamp_choices:
+            continue
         try:
             return family.open(address, None, stamp_at)
         except DeviceError as error:

@@ -1,4 +1,4 @@
-"""What every command asks of a lidar, whatever it says on its line; `families` is the list of who answers."""
+"""Interface of all lidar drivers; `families` lists the implementations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Literal, Protocol, Self
 
 from scanwright.firmware_io.samples import Scan
 
-StampAt = Literal["step_0", "rear"]
+StampAt = Literal["step_0", "rear", "first_beam", "last_beam"]
+Echo = Literal["first", "last"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +22,7 @@ class TimedScan:
             wanders.
         arrival_ns: `time.monotonic_ns` when its last byte came.
         uncertainty_ns: standard uncertainty of its time.
-        warning: what the sensor says of itself that a person should mend, and how; empty where all is well.
+        warning: what the sensor says of itself that a person should mend, and how; empty if all is well.
     """
 
     scan: Scan
@@ -39,11 +40,11 @@ class LidarDriver(Protocol):
     Attributes:
         address: where it was found last: a serial port, or HOST:PORT.
         model: name of its type, as in the catalogue. A sensor that does not tell is what it was opened as.
-        serial_number: by which it is found again; empty where the sensor tells none.
-        firmware: version, as the sensor writes it; empty where it tells none.
+        serial_number: by which it is found again; empty if the sensor tells none.
+        firmware: version, as the sensor writes it; empty if it tells none.
         scan_rate_hz: turns per second that it should make.
-        dropped: turns that are missing between those that were read.
-        bad_packets: packets that were thrown away.
+        dropped: missing turns between those read.
+        bad_packets: packets dropped.
     """
 
     address: str
@@ -70,6 +71,18 @@ class LidarDriver(Protocol):
 
     def condition(self) -> tuple[str, ...]:
         """Return what it reports of its age and state, one line each; call before `start` only."""
+        ...
+
+    def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
+        """Set filters of the sensor at the next `start`, until its power is switched off; call before `start`.
+
+        Args:
+            echo: echo that a beam reports; None leaves it as it is.
+            mean_filter_off: do not average several scans.
+
+        Raises:
+            DeviceError: the sensor has no such filter.
+        """
         ...
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
@@ -102,15 +115,15 @@ class LidarFamily:
     Attributes:
         name: as in the catalogue's `family`.
         title: maker and protocol, in words.
-        open: address, name of the model (None: whatever answers) and which moment its stamps mean -> the lidar;
+        open: address, name of the model (None: whatever answers), beam of its timestamps (None: default) -> the lidar;
             DeviceError if none of this family answers there.
         emulator: "package.module:function" that makes an emulated device of (catalogue record,
             `emulators.lidar_line.Ranging`, seed) -> `emulators.lidar_line.LidarLine`; drivers import no emulators.
-        stamp_choice: whether `stamp_at` changes anything: what the maker's documents say of the stamps differs.
+        stamp_choices: values of `stamp_at` that it accepts, if documents differ.
     """
 
     name: str
     title: str
-    open: Callable[[str, str | None, StampAt], LidarDriver]
+    open: Callable[[str, str | None, StampAt | None], LidarDriver]
     emulator: str
-    stamp_choice: bool = False
+    stamp_choices: tuple[StampAt, ...] = ()

@@ -1,9 +1,7 @@
-"""The line to one sensor, and the life cycle of its driver.
+"""Line to one sensor, and the life cycle shared by its drivers.
 
-Arrival times of bytes are right only if the bytes are read when they arrive. A reader that was held up (a stopped
-process, a busy computer) finds bytes that waited in the buffers of kernel and adapter, and others are missing.
-
-A device that is gone, silent or refuses raises DeviceError.
+Arrival times are right only if bytes are read when they arrive. After a pause of the reader, bytes waited in the
+buffers of kernel and adapter, and others are missing. A device that is gone, silent or refuses raises DeviceError.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from typing import Self, TypeVar
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
 from scanwright.firmware_io.lidar.byte_stream import SerialStream, open_stream
-from scanwright.firmware_io.lidar.lidar import TimedScan
+from scanwright.firmware_io.lidar.lidar import Echo, TimedScan
 from scanwright.firmware_io.serial_port import latency_ms
 
 TURN_S = 1.0  # without a turn: ten turns of the slowest sensor
@@ -65,17 +63,17 @@ class SensorLine:
     def hear(
         self, feed: Callable[[bytes], list[Packet]], deadline_s: float, pause_s: float = math.inf
     ) -> tuple[list[Packet], int]:
-        """What comes until something is whole, and when that came [ns, time.monotonic_ns].
+        """Return the next complete packets and their arrival [ns, time.monotonic_ns].
 
         Args:
-            feed: what the bytes make whole.
+            feed: splitter of the received bytes.
             deadline_s: on time.monotonic.
-            pause_s: where arrivals are the sensor's clock: the longest time between two reads after which arrivals and
-                count of packets can still be trusted. After a longer one everything that waited is dropped, and
-                nothing is returned: what comes next is fresh, and continues nothing.
+            pause_s: if arrivals are the sensor's clock, longest time between two reads after which they can be trusted.
+                After a longer one, all waiting bytes are dropped and no packet is returned: the next one continues
+                nothing.
 
         Raises:
-            DeviceTimeoutError: nothing was whole in time.
+            DeviceTimeoutError: no complete packet in time.
             DeviceError: the connection broke.
         """
         late_bytes = 0
@@ -95,12 +93,7 @@ class SensorLine:
                 raise DeviceTimeoutError(f"{self.name}: nothing came in time; check power and cable")
 
     def drop_waiting(self) -> None:
-        """Drop all that waits to be read, until the port is empty: what comes afterwards has just arrived.
-
-        Raises:
-            DeviceTimeoutError: it never is: the sensor sends faster than it is read.
-            DeviceError: the connection broke.
-        """
+        """Drop all bytes that wait; raises DeviceTimeoutError if the sensor sends faster than it is read."""
         settled_s = time.monotonic() + _SETTLE_S
         for _ in range(_READS):
             if not self._look(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
@@ -108,10 +101,7 @@ class SensorLine:
         raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
     def widened(self, uncertainty_ns: float) -> int:
-        """Return the standard uncertainty of a time made of arrivals, with that of an adapter which gathers bytes.
-
-        Bytes wait in it from none to all of its latency, and nothing tells how long: root mean square of the delay.
-        """
+        """Return the standard uncertainty of an arrival time with the even delay of a USB adapter added."""
         return round(math.hypot(uncertainty_ns, self._gathers_ns / math.sqrt(3)))
 
     def close(self) -> None:
@@ -138,7 +128,7 @@ class SensorLine:
 
     @contextmanager
     def closed_on_error(self) -> Iterator[None]:
-        """Closes the line where the body fails."""
+        """Close the line if the body fails."""
         try:
             yield
         except BaseException:
@@ -147,7 +137,7 @@ class SensorLine:
 
     @contextmanager
     def broken_line_as_error(self) -> Iterator[None]:
-        """Turns what a vanished port raises into a DeviceError of one line."""
+        """Turn the exceptions of a vanished port into a DeviceError of one line."""
         try:
             yield
         # A port that we closed after it vanished is None to pyserial, and -1 to select.
@@ -156,10 +146,9 @@ class SensorLine:
 
 
 class LineDriver:
-    """A lidar on a line: the life that all families share. `LidarDriver` describes the public methods.
+    """Life cycle of a lidar on a line; `LidarDriver` documents the public methods.
 
-    A family connects to its sensor in `_find`, begins to scan in `_begin`, returns turns from `_turn` and ends in
-    `_halt`. The end of a `with` stops the sensor, and closes the line whatever happens.
+    A family implements `_find` (connect), `_begin`, `_turn` and `_halt`. `with` stops the sensor and closes the line.
     """
 
     address: str
@@ -185,6 +174,11 @@ class LineDriver:
     def condition(self) -> tuple[str, ...]:
         """Nothing, unless the family reports age or state."""
         return ()
+
+    def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
+        """Refuse: only some families have filters; raises as `LidarDriver.set_filters`."""
+        if echo is not None or mean_filter_off:
+            raise DeviceError(f"{self._line.name}: echo, mean_filter_off: a {self.model} has no such filter; omit them")
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
         """Scan until `stop`; raises as `LidarDriver.start`."""

@@ -1,13 +1,9 @@
-"""When turns begin, finer than the ticks that their stamps are counted in.
+"""Start of turns, finer than the ticks of their timestamps. Time is in ticks (milliseconds) since any origin.
 
-A stamp is the last whole tick before the beginning of a turn, and turns are nearly even: the beginnings lie on a
-straight line over the turn's number, and that line passes within the tick of every stamp. Of all such lines the one in
-their middle is taken, which runs half a tick above the minimax fit of the stamps. It is found over as many of the last
-seconds as some line explains: a motor that wanders leaves few of them, an even one a hundred, and then a beat of turns
-and ticks that takes a minute is seen through. Where not even the last seconds lie on a line (stamps that jitter by
-more than their tick), a line of least squares has to do.
-
-Time is in ticks (milliseconds) since any origin.
+A stamp is the last whole tick before the start of a turn, and turns are nearly even. So the starts lie on a line over
+the turn's number that passes within the tick of every stamp; the middle one of these lines is used, half a tick above
+the minimax fit. It spans as many of the last seconds as one line explains. If not even those lie on a line (stamps that
+jitter by more than a tick), a least-squares line is used.
 """
 
 from __future__ import annotations
@@ -27,17 +23,12 @@ _SLACK_MS = 0.02  # by which a motor may be uneven from turn to turn
 
 
 class StampLine:
-    """The line through the stamps of one life of a sensor's clock, in constant memory.
-
-    Attributes:
-        first_turn: the oldest turn that the line holds for.
-        fits: how often the line has changed.
-    """
+    """The line through the stamps of one life of a sensor's clock, in constant memory."""
 
     def __init__(self, period_ms: float) -> None:
         """Nothing is known but the period, to one part in a hundred."""
-        self.first_turn = 0
-        self.fits = 0
+        self.first_turn = 0  # the oldest turn that the line holds for
+        self.fits = 0  # how often the line has changed
         self._turn = -1
         self._stamp_ms = -period_ms
         self._slope_ms = period_ms

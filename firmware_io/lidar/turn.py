@@ -19,19 +19,12 @@ _BACK_DEG = 10.0  # by which the angle of a point may lie before that of the one
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Consecutive points of a sensor that turns clockwise, as seen from above.
+    """Consecutive points of a sensor that turns clockwise, as seen from above."""
 
-    Attributes:
-        angle_deg: clockwise from its front, shape (n,).
-        range_m: NaN where nothing came back, shape (n,).
-        intensity: as it tells them, shape (n,).
-        sensor_ns: when each was measured, on a clock that runs evenly, shape (n,).
-    """
-
-    angle_deg: Float64[ndarray, " n"]
-    range_m: Float32[ndarray, " n"]
-    intensity: Float32[ndarray, " n"]
-    sensor_ns: Float64[ndarray, " n"]
+    angle_deg: Float64[ndarray, " n"]  # clockwise from its front, shape (n,)
+    range_m: Float32[ndarray, " n"]  # NaN without a return, shape (n,)
+    intensity: Float32[ndarray, " n"]  # as reported, shape (n,)
+    sensor_ns: Float64[ndarray, " n"]  # when each was measured, on a clock that runs evenly, shape (n,)
 
     def part(self, where: slice) -> Points:
         """Some of them."""
@@ -39,10 +32,10 @@ class Points:
 
 
 class TurnCutter:
-    """Cuts a stream of points where it passes the front; the turn in which it begins is not whole, and left out.
+    """Cuts a stream of points at the sensor's front; the incomplete first turn is dropped.
 
-    Sensors that triangulate tell angles that go to and fro a little: a turn is over where its front is passed first,
-    and angles count on from there, so that a turn may begin a little before 0 and end a little behind 360.
+    Angles of triangulating sensors go back a little: a turn ends where its front is first passed, so the next one can
+    begin a little before 0 and end a little after 360 deg.
     """
 
     def __init__(self) -> None:
@@ -70,14 +63,10 @@ class TurnCutter:
 
 
 class TurnQueue:
-    """Turns that wait to be read.
-
-    Attributes:
-        dropped: turns that are missing between those that were handed out or left out.
-    """
+    """Turns that wait to be read."""
 
     def __init__(self) -> None:
-        self.dropped = 0
+        self.dropped = 0  # missing turns between returned or skipped ones
         self.begin_anew(0)
 
     def begin_anew(self, skip: int) -> None:
@@ -100,11 +89,7 @@ class TurnQueue:
         self._waiting.extend((turn, arrival_ns) for turn in self._cutter.add(points))
 
     def next(self, line: ArrivalLine) -> tuple[Points, int] | None:
-        """The next turn and when its last points came; None if none is whole yet.
-
-        Args:
-            line: the points' times on the host's clock, by which missing turns are counted.
-        """
+        """Return the next complete turn and its arrival, or None; `line` counts the missing turns."""
         while self._waiting:
             turn, arrival_ns = self._waiting.popleft()
             begin_ns, end_ns = (line.host_ns(float(turn.sensor_ns[at])) for at in (0, -1))

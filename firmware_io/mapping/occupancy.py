@@ -28,18 +28,13 @@ _HIGHEST_M = 100.0  # no robot is as high: a value beyond is a mistake
 class Heights:
     """Which layer of the world is in the way of a robot.
 
-    Attributes:
-        floor_m: height of the floor in the frame of the points.
-        from_m: above the floor; what is lower is driven over.
-        to_m: above the floor; what is higher is driven under.
-
     Raises:
         RecordingError: they are not in that order.
     """
 
-    floor_m: float
-    from_m: float = 0.1
-    to_m: float = 1.8
+    floor_m: float  # height of the floor in the frame of the points
+    from_m: float = 0.1  # above the floor; what is lower is driven over
+    to_m: float = 1.8  # above the floor; what is higher is driven under
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.floor_m):
@@ -56,13 +51,11 @@ class OccupancyGrid:
 
     Attributes:
         cells: `UNKNOWN`, `FREE` or `OCCUPIED`, shape (rows, columns); rows go with y, columns with x.
-        resolution_m: edge of a cell.
-        origin_m: corner of cell (0, 0) where x and y are smallest, shape (2,); whole cells from 0.
     """
 
     cells: Int8[ndarray, "rows columns"]
-    resolution_m: float
-    origin_m: Float64[ndarray, " 2"]
+    resolution_m: float  # edge of a cell
+    origin_m: Float64[ndarray, " 2"]  # corner of cell (0, 0) where x and y are smallest, shape (2,); whole cells from 0
 
     def count(self, value: int) -> int:
         """How many cells have a value."""

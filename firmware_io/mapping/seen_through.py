@@ -29,15 +29,10 @@ _AT_ONCE = 1 << 16  # points: bounds the memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stand:
-    """Points that one place saw, in the frame of the map.
+    """Points that one place saw, in the frame of the map."""
 
-    Attributes:
-        points_m: shape (n, 3), finite.
-        eye_m: optical centre of the scanner, shape (3,); NaN if unknown.
-    """
-
-    points_m: Float64[ndarray, "n 3"]
-    eye_m: Vector
+    points_m: Float64[ndarray, "n 3"]  # shape (n, 3), finite
+    eye_m: Vector  # optical centre of the scanner, shape (3,); NaN if unknown
 
 
 def seen_through(positions: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool[ndarray, " n"]]:

@@ -32,20 +32,14 @@ _WORSE = 1.1  # times the turn without the gyro: it must not add to it, but for 
 class Gyro:
     """Rates of turn over time.
 
-    Attributes:
-        time_ns: shape (n,), n >= 2, strictly increasing.
-        rate_rad_s: about the axes of the IMU, shape (n, 3).
-        frame: name of those axes; "" if unknown.
-        left_out: samples that are no numbers, or of the time of another.
-
     Raises:
         RecordingError: fewer than two samples.
     """
 
-    time_ns: Int64[ndarray, " n"]
-    rate_rad_s: Float64[ndarray, "n 3"]
-    frame: str = ""
-    left_out: int = 0
+    time_ns: Int64[ndarray, " n"]  # shape (n,), n >= 2, strictly increasing
+    rate_rad_s: Float64[ndarray, "n 3"]  # about the axes of the IMU, shape (n, 3)
+    frame: str = ""  # name of those axes; "" if unknown
+    left_out: int = 0  # samples that are no numbers, or of the time of another
 
     def __post_init__(self) -> None:
         if self.time_ns.size < 2:

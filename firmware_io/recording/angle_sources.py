@@ -1,8 +1,6 @@
-"""Where the axis angle of somebody's recording stands: a number in messages, a pair of frames in `/tf`, or a table.
+"""Source of the axis angle in a foreign recording: number in messages, pair of frames in `/tf`, or table; unit checks.
 
-And what speaks against the unit that it is said to have.
-
-Input that cannot be used raises RecordingError.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -56,7 +54,7 @@ def is_table(text: str) -> bool:
 
 
 def parse_frames(text: str) -> FrameSource | None:
-    """Read `TOPIC:PARENT:CHILD`; None where it is not of that kind."""
+    """Read `TOPIC:PARENT:CHILD`; None if it is not of that kind."""
     parts = text.split(":")
     return FrameSource(*parts) if len(parts) == 3 and all(parts) else None
 
@@ -77,13 +75,9 @@ def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[
 
 
 def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source) -> tuple[Floats, str]:
-    """How far a frame has turned about the one axis that it turns about, shape (n,), and what a person must know.
+    """Return how far a frame has turned about its one axis, shape (n,), and a note for the user.
 
-    Counted from where the frames agree, where they ever do, else from the first one.
-
-    Args:
-        quaternions: x y z w.
-        source: for errors.
+    Counted from where the frames agree, else from the first one. `source`: for errors.
     """
     turned = Rotation.from_quat(quaternions)
     since = (turned[0].inv() * turned).as_quat()
@@ -119,14 +113,7 @@ def read_table(text: str) -> tuple[Times, Floats]:
 
 
 def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[str]:
-    """What speaks for the other unit: where angles wrap, how fast the axis would turn, how far; whole numbers.
-
-    Args:
-        time_ns: of the angles.
-        angle: in their unit, as they were told, shape (n,).
-        log: the same, unwrapped.
-        angle_unit: that they are said to have.
-    """
+    """Return evidence for the other unit: wraps, speed, range, whole numbers; `log`: `angle` unwrapped."""
     counts = _counts_of_turn(angle)
     if counts and angle_unit in ("deg", "rad"):
         yield f"angles are integers from 0 to nearly {counts}: is the unit {counts}/turn?"

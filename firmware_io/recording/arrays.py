@@ -23,7 +23,7 @@ class RecordingArrays:
     Attributes:
         time_ns: of each beam, shape (scans, beams).
         bearing_rad: of each beam in the scan plane, shape (scans, beams); NaN behind the last beam of a short scan.
-        range_m: shape (scans, beams); NaN, inf or 0 where nothing returned.
+        range_m: shape (scans, beams); NaN, inf or 0 if nothing returned.
         intensity: shape (scans, beams), or (scans, 0) where the sensor measures none.
         joint_log: the servo's angle over time.
     """

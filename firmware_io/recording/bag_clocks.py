@@ -1,8 +1,7 @@
-"""Which clock the times of an imported bag are on, and the joint log on that clock.
+"""Choice of the clock of an imported bag, and the joint log on it.
 
-A scan and an angle are on one clock or they cannot be joined. Header stamps are the better times (a stamp is when
-the sensor measured, a receive time is when somebody heard of it), but not every message has one, and not every
-sensor's clock is the host's.
+Scans and angles must share a clock. Header stamps are better than receive times, but some messages have none, and some
+sensors' clocks differ from the host's.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamps:
-    """Times of the messages of one source, both shape (n,); a stamp is 0 where the message has none."""
+    """Times of the messages of one source, both shape (n,); a stamp is 0 if the message has none."""
 
     stamp_ns: Int64[ndarray, " n"]
     receive_ns: Int64[ndarray, " n"]
@@ -44,7 +43,7 @@ class Stamps:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OneClock:
-    """Scan and angle times on one clock; `note` is "" where both are header stamps, else what a person must know."""
+    """Scan and angle times on one clock; `note` is "" where both are header stamps, else what a person should know."""
 
     scan_ns: Int64[ndarray, " scans"]
     angle_ns: Int64[ndarray, " angles"]
@@ -54,13 +53,8 @@ class OneClock:
 def one_clock(scans: Stamps, angles: Stamps, arc_ns: Int64[ndarray, " scans"]) -> OneClock:
     """Choose the times of scans and angles, each shape (n,).
 
-    Stamps after their receipt are from another clock. If both sources share that clock, their stamps agree and stay;
-    if they differ, the receipt decides, for a scan less the time from its first to its last beam.
-
-    Args:
-        scans: times of the scans.
-        angles: times of the angles.
-        arc_ns: from the first to the last beam of each scan, shape (n,).
+    Stamps after their receipt are of another clock. If both sources share that clock, their stamps agree and stay; else
+    the receipt decides, minus `arc_ns` for scans: the time from first to last beam.
     """
     ahead_s = [_ahead_s(stamps) if stamps.complete() else 0.0 for stamps in (scans, angles)]
     after_arc_s = ahead_s[0] + 1e-9 * float(np.median(arc_ns)) if len(arc_ns) else ahead_s[0]
@@ -91,17 +85,10 @@ def one_clock(scans: Stamps, angles: Stamps, arc_ns: Int64[ndarray, " scans"]) -
 def log_at_rest(
     log: JointLog, begin_ns: Int64[ndarray, " scans"], arc_ns: Int64[ndarray, " scans"]
 ) -> tuple[JointLog, int]:
-    """A log that stands still during each scan: two samples, at its first and at its last beam, with one angle.
+    """Return a log with one angle during each scan, and the number of scans cut short by the next one.
 
-    The angle is the last one of `log` at or before the first beam. A scan that begins outside `log` gets no sample.
-
-    Args:
-        log: unwrapped angles.
-        begin_ns: time of the first beam of each scan, shape (n,).
-        arc_ns: from the first to the last beam of each scan, shape (n,).
-
-    Returns:
-        The log, and the number of scans that had to be cut short because the next one begins before their last beam.
+    The angle is the last one of `log` at or before the first beam; a scan before `log` gets no sample. `arc_ns`: time
+    from first to last beam.
     """
     begin_ns, first = np.unique(begin_ns, return_index=True)
     known = (begin_ns >= log.time_ns[0]) & (begin_ns <= log.time_ns[-1])
@@ -128,7 +115,7 @@ def _overlap(a_ns: Times, b_ns: Times) -> bool:
 
 
 def gap_warnings(log: JointLog) -> Iterator[str]:
-    """What a person must know of the times between two angles."""
+    """What a person should know of the times between two angles."""
     gaps_s = np.diff(log.time_ns) / 1e9
     if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
         usual = f"usually {np.median(gaps_s):.3f} s"

@@ -1,10 +1,8 @@
-"""Other people's bags: ROS 1, ROS 2 sqlite3 and ROS 2 MCAP, custom message types included.
+"""Foreign bags: ROS 1, ROS 2 sqlite3 and ROS 2 MCAP, custom message types included.
 
-A value inside a bag is named `TOPIC[:FIELD]`, FIELD being a dotted path such as `laserScan` or `position[0]`.
-ROS 1 and MCAP bags carry their message definitions; sqlite3 bags of older ROS 2 releases do not, and then only the
-types that come with ROS 2 can be read.
-
-Input that cannot be used raises RecordingError.
+A value inside a bag is `TOPIC[:FIELD]`, FIELD a dotted path such as `laserScan` or `position[0]`. sqlite3 bags of older
+ROS 2 releases lack message definitions: only types that come with ROS 2 can be read.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -200,10 +198,10 @@ def scan_fault(laser_scan: Any) -> str:
 
 
 def numbers_at(body: Any, source: Source, bag: Path) -> tuple[tuple[float, ...], int]:
-    """Return the number that `source` names, or the x y z w of a quaternion, and its stamp [ns] (0: none).
+    """Return the number at `source`, or the x y z w of a quaternion, and its stamp [ns] (0: none).
 
-    Without a field: the only joint of a JointState, `data` of a std_msgs message. Of a JointState a field may also be
-    the name of a joint. A JointState without it, or without its position, has no numbers: others publish there, too.
+    Default field: the only joint of a JointState, `data` of std_msgs. A field can be a joint name; a JointState without
+    it has no numbers, as other programs publish there too.
     """
     if not source.field:
         if _kind(body) == ros_messages.JOINT_STATE:

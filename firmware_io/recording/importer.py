@@ -1,7 +1,4 @@
-"""`scanwright import`: convert a ROS bag to a recording.
-
-Two passes over the bag. The first reads every time and every angle (small), the second copies the scans one by one.
-"""
+"""`scanwright import`: the first pass over a bag reads times and angles, the second copies the scans."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""The messages of an MCAP file, read and written a chunk at a time.
+"""Messages of an MCAP file (https://mcap.dev/spec), read and written a chunk at a time.
 
-The layout is https://mcap.dev/spec. The `mcap` package reads the summary and unpacks the chunks; the records inside a
-chunk are cut here, because its reader makes an object of each record, which takes longer than all the rest.
-
-Input that cannot be used raises RecordingError.
+The `mcap` package reads the summary and unpacks chunks; records inside a chunk are cut here, because its reader makes
+an object of each, which takes most of the time. Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -41,10 +39,7 @@ _Timed = tuple[int, int, str, bytes]  # log time [ns], place of the chunk, topic
 
 
 class TimedChunks(Writer):
-    """Ends a chunk of messages where the next one of their topics comes `CHUNK_S` after the first, or before it.
-
-    Each topic is timed by itself: clocks of two topics may have nothing in common.
-    """
+    """Ends a chunk when the next message of a topic is `CHUNK_S` after its first, or before it; per topic."""
 
     def __init__(self, stream: Any) -> None:
         super().__init__(stream)
@@ -67,17 +62,16 @@ def read_topics(path: Path) -> dict[str, str]:
 
 
 def read_note(path: Path, name: str) -> dict[str, str]:
-    """The metadata record of a name; empty where the file has none."""
+    """The metadata record of a name; empty if the file has none."""
     with _opened(path) as stream:
         records = foreign(f"{path}: damaged", lambda: list(SeekingReader(stream).iter_metadata()))
     return next((record.metadata for record in records if record.name == name), {})
 
 
 def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -> Iterator[tuple[str, bytes]]:
-    """Topic and bytes of each message, in the order of the log times, as they stand in the file where those are equal.
+    """Yield topic and bytes of each message in the order of log times.
 
-    Holds the chunks that overlap in time, commonly one, and unpacks the next ones while these are used. `summed`: their
-    check sums are compared, as they need not be where the file was read before.
+    Holds only chunks that overlap in time, and unpacks the next ones meanwhile. `summed`: verify checksums.
     """
     with _opened(path) as stream:
         summary = _summary(path, stream)

@@ -1,7 +1,6 @@
-"""Many messages of a topic at once, as arrays: those that differ in time and measurement only are one block of bytes.
+"""Many messages of a topic as arrays: those that differ only in time and measurement are one block of bytes.
 
-What tells the layout of a message (byte order, lengths, numbers that all beams share) is read of the first one and
-compared in the others.
+The layout (byte order, lengths, shared numbers) is read from the first message and compared in the others.
 """
 
 from __future__ import annotations
@@ -33,12 +32,7 @@ def outlines_in(messages: Sequence[bytes]) -> Iterator[ScanOutline]:
 
 
 def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
-    """Blocks of LaserScan messages in CDR, in their order, each as long as they differ in nothing else.
-
-    Raises:
-        ValueError: a message is no LaserScan; so of `struct`, where it is cut off.
-        RecordingError: as `Scan` does.
-    """
+    """Yield blocks of LaserScan messages in CDR with one layout; ValueError for other messages."""
     for scan, places, rows in _alike_scans(messages):
         yield Block(
             first=scan,
@@ -62,13 +56,7 @@ def _alike_scans(messages: Sequence[bytes]) -> Iterator[tuple[Scan, ScanPlaces, 
 
 
 def joints_in(messages: Sequence[bytes]) -> tuple[Times, Floats]:
-    """Times [ns] and positions [rad] of the spin joint in JointState messages in CDR, shape (n,) each.
-
-    NaN where a message does not name the joint, or tells no position of it.
-
-    Raises:
-        ValueError: a message is no JointState; so of `struct`, where it is cut off.
-    """
+    """Return times [ns] and positions [rad] of the spin joint, NaN if absent; ValueError for other messages."""
     lengths = _lengths(messages)
     time_ns, position_rad = np.empty(lengths.size, np.int64), np.empty(lengths.size)
     for length in set(lengths.tolist()):

@@ -1,9 +1,7 @@
-"""What is known of a recording beside its messages, and how that gets through bags, which hold messages only.
+"""Metadata of a recording, and its way through bags, which hold messages only.
 
-In MCAP it is a metadata record. In a bag it is a latched message of text, JSON of the same names and values, so that
-`import` of such a bag knows what the recording knew: above all whether the motor stood still during each scan.
-
-Input that cannot be used raises RecordingError.
+MCAP: a metadata record. Bag: a latched text message of JSON, so that `import` knows whether the axis rested.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations

@@ -72,21 +72,13 @@ def encode_scan(scan: Scan) -> bytes:
 
 
 class ScanPlaces(NamedTuple):
-    """Where a LaserScan in CDR has its numbers.
+    """Where a LaserScan in CDR has its numbers."""
 
-    Attributes:
-        order: of the bytes, for `struct`.
-        numbers: the seven that all beams share.
-        ranges: float32 each.
-        intensities: the same; empty where they do not match the ranges one by one and say nothing about a beam.
-        shared: what messages have in common that differ in time and measurement only.
-    """
-
-    order: str
-    numbers: slice
-    ranges: slice
-    intensities: slice
-    shared: tuple[slice, ...]
+    order: str  # of the bytes, for `struct`
+    numbers: slice  # the seven that all beams share
+    ranges: slice  # float32 each
+    intensities: slice  # the same; empty if they do not match the ranges one by one and say nothing about a beam
+    shared: tuple[slice, ...]  # what messages have in common that differ in time and measurement only
 
     @classmethod
     def of(cls, data: bytes) -> ScanPlaces:
@@ -250,21 +242,15 @@ def encode_text(text: str) -> bytes:
 
 
 class JointPlaces(NamedTuple):
-    """Where a JointState in CDR has the position of the spin joint.
+    """Where a JointState in CDR has the position of the spin joint."""
 
-    Attributes:
-        order: of the bytes, for `struct`.
-        position: float64.
-        shared: what messages have in common that name the same joints.
-    """
-
-    order: str
-    position: slice
-    shared: tuple[slice, ...]
+    order: str  # of the bytes, for `struct`
+    position: slice  # float64
+    shared: tuple[slice, ...]  # what messages have in common that name the same joints
 
     @classmethod
     def of(cls, data: bytes) -> JointPlaces | None:
-        """Those of a message, None where it tells no position of the joint; errors as of `ScanPlaces`."""
+        """Those of a message, None if it tells no position of the joint; errors as of `ScanPlaces`."""
         order, _, at = _cdr_header(data)
         (count,) = struct.unpack_from(f"{order}I", data, at)
         at += 4
@@ -284,7 +270,7 @@ class JointPlaces(NamedTuple):
 
 
 def decode_joint(data: bytes) -> tuple[int, float]:
-    """Time [ns] and position [rad] of the spin joint in a CDR JointState; NaN where it does not name the joint."""
+    """Time [ns] and position [rad] of the spin joint in a CDR JointState; NaN if it does not name the joint."""
     places, time_ns = JointPlaces.of(data), _cdr_header(data)[1]
     if places is None:
         return time_ns, math.nan

@@ -46,18 +46,12 @@ def solid_angles_sr(side: int) -> Float64[ndarray, " cells"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthMap:
-    """The nearest and the farthest surface that a scanner saw.
+    """The nearest and the farthest surface that a scanner saw, in maps of shape (6 * side * side,)."""
 
-    Attributes:
-        side: cells along an edge of the cube.
-        near_m: nearest in each cell and its neighbours, since the range changes much within a cell on a slanted
-            surface, shape (6 * side * side,); +inf if nothing was seen.
-        far_m: farthest in each cell, shape (6 * side * side,); -inf if nothing was seen.
-    """
-
-    side: int
+    side: int  # cells along an edge of the cube
+    # of a cell and its neighbours, since the range changes much within a cell on a slanted surface; +inf if none
     near_m: Float64[ndarray, " cells"]
-    far_m: Float64[ndarray, " cells"]
+    far_m: Float64[ndarray, " cells"]  # of a cell alone, -inf if nothing was seen
 
 
 def depth_map(points_m: Float64[ndarray, "n 3"], side: int) -> DepthMap:

@@ -36,19 +36,12 @@ class Edge:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Graph:
-    """Solved poses.
+    """Solved poses."""
 
-    Attributes:
-        T_world: shape (n, 4, 4).
-        covariance: shape (n, 6, 6), zero for the first, which is held.
-        left_out: edges that contradict all others.
-        scale: by how much the stated sigmas of the edges had to grow, at least 1.
-    """
-
-    T_world: Float64[ndarray, "n 4 4"]
-    covariance: Float64[ndarray, "n 6 6"]
-    left_out: tuple[Edge, ...]
-    scale: float
+    T_world: Float64[ndarray, "n 4 4"]  # shape (n, 4, 4)
+    covariance: Float64[ndarray, "n 6 6"]  # shape (n, 6, 6), zero for the first, which is held
+    left_out: tuple[Edge, ...]  # edges that contradict all others
+    scale: float  # by how much the stated sigmas of the edges had to grow, at least 1
 
 
 def solve_graph(T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]) -> Graph:

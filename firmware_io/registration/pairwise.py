@@ -45,23 +45,17 @@ class Pair:
     """The pose of stand b in the frame of stand a, with its evidence.
 
     Attributes:
-        a: name of the first cloud.
-        b: name of the second.
-        T_a_b: shape (4, 4), NaN if there was no start.
         covariance: of a small motion (rotation vector [rad], translation [m]) on the right of `T_a_b`, shape (6, 6);
             NaN if the common surfaces leave a motion free.
-        overlap: share of the smaller view's points that lie on the other's surfaces.
-        contradiction: share of the mutually visible points that hang in space the other scanner saw to be free.
-        why_not: one line for every fact that speaks against the pose; empty where it is believed.
     """
 
-    a: str
-    b: str
-    T_a_b: Pose
+    a: str  # name of the first cloud
+    b: str  # name of the second
+    T_a_b: Pose  # shape (4, 4), NaN if there was no start
     covariance: Float64[ndarray, "6 6"]
-    overlap: float
-    contradiction: float
-    why_not: tuple[str, ...]
+    overlap: float  # share of the smaller view's points that lie on the other's surfaces
+    contradiction: float  # share of the mutually visible points that hang in space the other scanner saw to be free
+    why_not: tuple[str, ...]  # one line for every fact that speaks against the pose; empty where it is believed
 
     @property
     def merit(self) -> float:

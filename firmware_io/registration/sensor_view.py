@@ -28,40 +28,24 @@ _DEPTH_SIDE = 30  # cells of 3 deg: finer ones take mixed pixels at edges, and g
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Level:
-    """Points at one scale, as small_gicp takes them.
+    """Points at one scale, as small_gicp takes them."""
 
-    Attributes:
-        points_m: shape (n, 3).
-        normals: unit, towards the scanner, shape (n, 3); zero if the neighbours give none.
-        cloud: the same with the covariances of the neighbourhoods.
-        tree: nearest-neighbour search in it.
-    """
-
-    points_m: Float64[ndarray, "n 3"]
-    normals: Float64[ndarray, "n 3"]
-    cloud: small_gicp.PointCloud
-    tree: small_gicp.KdTree
+    points_m: Float64[ndarray, "n 3"]  # shape (n, 3)
+    normals: Float64[ndarray, "n 3"]  # unit, towards the scanner, shape (n, 3); zero if the neighbours give none
+    cloud: small_gicp.PointCloud  # the same with the covariances of the neighbourhoods
+    tree: small_gicp.KdTree  # nearest-neighbour search in it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorView:
-    """The view of one stand, in the frame of its scanner, whose optical centre is the origin.
+    """The view of one stand, in the frame of its scanner, whose optical centre is the origin."""
 
-    Attributes:
-        name: for messages.
-        spacing_m: edge of the finest voxels.
-        fine: points about `spacing_m` apart.
-        coarse: points about four times as far apart.
-        depth: how far the scanner saw in each direction.
-        beams: everything, as it was measured.
-    """
-
-    name: str
-    spacing_m: float
-    fine: Level
-    coarse: Level
-    depth: DepthMap
-    beams: Beams
+    name: str  # for messages
+    spacing_m: float  # edge of the finest voxels
+    fine: Level  # points about `spacing_m` apart
+    coarse: Level  # points about four times as far apart
+    depth: DepthMap  # how far the scanner saw in each direction
+    beams: Beams  # everything, as it was measured
 
 
 def make_view(

@@ -44,15 +44,10 @@ Complexes = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """A guess.
+    """A guess."""
 
-    Attributes:
-        T_a_b: shape (4, 4).
-        score: cosine of the angle between the two plans as vectors: 1 if they are equal.
-    """
-
-    T_a_b: Pose
-    score: float
+    T_a_b: Pose  # shape (4, 4)
+    score: float  # cosine of the angle between the two plans as vectors: 1 if they are equal
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -57,25 +57,15 @@ _LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durabilit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PublishedScanner:
-    """Whose scans are published.
+    """Whose scans are published."""
 
-    Attributes:
-        angles: angle set in use.
-        own_body: beams that end on the scanner; None where that is not known.
-        urdf: its description with the frames of `angles`; None for none.
-        smooth: smooth the steps of the encoder in `points`.
-        publish_tf: whether nobody else does.
-        per_turn: one message of points a turn, not a scan.
-        points_frame: frame of the points; `rot` of single scans only.
-    """
-
-    angles: AngleSet
-    own_body: OwnBody | None
-    urdf: str | None
-    smooth: bool = True
-    publish_tf: bool = True
-    per_turn: bool = False
-    points_frame: PointsFrame = "world"
+    angles: AngleSet  # angle set in use
+    own_body: OwnBody | None  # beams that end on the scanner; None where that is not known
+    urdf: str | None  # its description with the frames of `angles`; None for none
+    smooth: bool = True  # smooth the steps of the encoder in `points`
+    publish_tf: bool = True  # whether nobody else does
+    per_turn: bool = False  # one message of points a turn, not a scan
+    points_frame: PointsFrame = "world"  # frame of the points; `rot` of single scans only
 
 
 class ScannerNode:

@@ -30,19 +30,12 @@ _RANGE_M = 10.0  # at which a difference of frames is stated
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixedFrame:
-    """A frame that stands still in its parent.
+    """A frame that stands still in its parent."""
 
-    Attributes:
-        joint: its name in the URDF.
-        parent: frame.
-        child: frame.
-        T_parent_child: shape (4, 4), m.
-    """
-
-    joint: str
-    parent: str
-    child: str
-    T_parent_child: Pose
+    joint: str  # its name in the URDF
+    parent: str  # frame
+    child: str  # frame
+    T_parent_child: Pose  # shape (4, 4), m
 
     @property
     def xyz(self) -> str:

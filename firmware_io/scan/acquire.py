@@ -1,10 +1,8 @@
 """Scan: turn the lidar, record both devices, and stop them on every exit.
 
-The order of a run: open and check both devices; the laser on, until the sensor's clock is known on the host's; the
-servo turns, until it turns steadily; then, and only then, the recording begins, and lasts for the turns that were asked
-for. Two threads: one asks the servo for its angle a hundred times a second, the other reads the scans as they come.
-
-Where the lidar was away (`firmware_io/scan/lidar_scans.py`) the full scan in which it was lost is taken again, whole.
+Order: open and check both devices; laser on until its clock is known; servo on until it turns steadily; record the
+requested turns. One thread reads the servo a hundred times a second, the other the scans.
+If the lidar was lost (`lidar_scans.py`), that full scan is recorded again.
 """
 
 from __future__ import annotations
@@ -54,7 +52,7 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
         watch: gets scans, angles and messages.
 
     Raises:
-        ServoSetupError: settings of the servo that outlast the power must change first; nothing was moved.
+        ServoSetupError: settings of the servo that are permanent must change first; nothing was moved.
         DeviceError: a device is absent, another one than the angle set names, or fails.
         RecordingError: the recording cannot be written.
     """
@@ -64,6 +62,7 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
     )  # loads the message types: half a second that must not fall into the recording
     with _unturned_until_opened() as opened, ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
+        lidar.set_filters(plan.echo, mean_filter_off=plan.mean_filter_off)
         servo = stack.enter_context(
             open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id, spins=isinstance(plan.motion, Spin))
         )
@@ -97,11 +96,7 @@ def _unturned_until_opened() -> Iterator[Event]:
 
 
 def check_model(angles: AngleSet, lidar: LidarDriver) -> None:
-    """Refuse a lidar that is not the one of the angle set.
-
-    Raises:
-        DeviceError: it is another model.
-    """
+    """Raise DeviceError if the lidar is not that of the angle set."""
     if lidar.model != angles.sensor:
         raise DeviceError(f"{lidar.address}: this is a {lidar.model}, but the angle set is for a {angles.sensor}")
 
@@ -113,18 +108,7 @@ def _wait_until_steady(
     reporter: Reporter,
     keep: Callable[[ServoState], None] = lambda _: None,
 ) -> int:
-    """Read scans until the servo is at the start of the motion, and a spin is even and at its speed.
-
-    Args:
-        scans: of the lidar.
-        axis: of the servo.
-        motion: to begin.
-        reporter: of the scan.
-        keep: gets the angles meanwhile.
-
-    Returns:
-        The number of scans that were read.
-    """
+    """Read scans until the motion begins and a spin is even; return their number. `keep` gets the angles."""
     read = 0
 
     def patience_s() -> float:  # begins anew with the motion, where the lidar is lost meanwhile
@@ -222,11 +206,7 @@ class _Run:
             self._report()
 
     def summary(self) -> ScanSummary:
-        """Check the last scans, and sum up.
-
-        Raises:
-            DeviceError: there is no scan.
-        """
+        """Check the last scans and return the summary; DeviceError without a scan."""
         for finding in self._checks.check():
             self._reporter.warn(sentence(finding))
         if not self._recorded:

@@ -1,10 +1,7 @@
-"""The servo's side of a scan: a thread that gives its orders and asks, a hundred times a second, where it is.
+"""Servo thread of a scan: gives its orders and reads its angle a hundred times a second, at uneven times.
 
-It asks at uneven times. At even ones an axis may pass very nearly a whole step of its encoder from one question to the
-next (an AX-12A at 30 deg/s does): all answers of a while are then rounded by the same part of a step, which no
-smoothing can find. At uneven times the rounding differs from sample to sample, and averages out.
-
-A device that is gone, silent or refuses raises DeviceError.
+At even times an axis can turn nearly whole encoder steps between reads (an AX-12A at 30 deg/s): all readings are then
+rounded alike, which no smoothing removes. Uneven times average it out. Failures raise DeviceError.
 """
 
 from __future__ import annotations
@@ -43,20 +40,16 @@ class AxisThread:
 
     Attributes:
         begins_ns: when the motion proper begins; before it the axis is on its way to the start.
-        orders: courses for the thread, None where the axis shall stand.
-        received: states and errors from the thread.
+        orders: courses for the thread, None if the axis shall stand.
         stop_answers: from the thread, whether the servo answered the order to stand; False from one that has failed.
-        window: the good angles of the last half second.
-        left_out: angles that are not recorded, reason -> count.
-        longest_gap_ns: between two good angles.
     """
 
     def __init__(self, motion: Motion, start_rad: float, step_rad: float) -> None:
         self.orders: SimpleQueue[Iterator[Move] | None] = SimpleQueue()
-        self.received: SimpleQueue[ServoState | Exception] = SimpleQueue()
-        self.window: deque[ServoState] = deque(maxlen=_WINDOW)
-        self.left_out: Counter[str] = Counter()
-        self.longest_gap_ns = 0
+        self.received: SimpleQueue[ServoState | Exception] = SimpleQueue()  # states and errors from the thread
+        self.window: deque[ServoState] = deque(maxlen=_WINDOW)  # the good angles of the last half second
+        self.left_out: Counter[str] = Counter()  # angles that are not recorded, reason -> count
+        self.longest_gap_ns = 0  # between two good angles
         self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
         self._unread: list[ServoState] = []  # heard by `go`, for the next who hears
         self._failure: Exception | None = None
@@ -130,7 +123,7 @@ class AxisThread:
 
 @contextmanager
 def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
-    """The servo makes its motion, and is asked where it is, while the body runs."""
+    """The servo makes its motion, and is asked where it is, during the body."""
     start_rad = servo.read().position_rad
     if math.isnan(start_rad):
         raise DeviceError(

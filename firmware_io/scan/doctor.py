@@ -74,18 +74,15 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
 
 
 def fix(out: Path | None, servo: str | None, servo_id: int | None) -> tuple[str, Iterator[str | Path]]:
-    """Set what keeps a servo from working well; only on a port that was named, or of an emulated scanner.
+    """Correct servo settings; only on a named port or an emulated scanner (else DeviceError).
 
     Args:
-        out: build folder, which gets the file of the old settings; None for the working folder.
+        out: build folder, which gets the undo file; None for the working folder.
         servo: port.
-        servo_id: number of the servo on its bus; None if it is alone.
+        servo_id: id on its bus; None if it is alone.
 
     Returns:
         The port, and the steps of `settings.set_up`.
-
-    Raises:
-        DeviceError: no port was named.
     """
     emulators = None if out is None else emulated(out)
     port = servo or (emulators.servo if emulators else None)

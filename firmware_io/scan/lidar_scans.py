@@ -1,10 +1,7 @@
-"""Scans of a lidar as they come, also after it was away for a while, and its clock on the host's.
+"""Scans of a lidar, across disconnections, and its clock on the host's.
 
-A lidar that falls silent may have torn its cable, so the servo stands at once, and holds. If the sensor is back within
-ten seconds, the servo turns on, up to nine times in ten minutes. A sensor that reports a fault of its own is not waited
-for.
-
-A device that is gone, silent or refuses raises DeviceError.
+If the lidar falls silent, its cable may be torn, so the servo stops and holds at once. If the sensor is back within ten
+seconds, the scan goes on, up to nine times in ten minutes. A sensor that reports a fault of its own ends it.
 """
 
 from __future__ import annotations
@@ -27,30 +24,19 @@ _SERVO_UNKNOWN = "the servo has not answered that it stands: look, and cut its p
 
 
 class LidarScans:
-    """Scans with the host's times, as they come; goes on after the sensor was away for a while.
-
-    Attributes:
-        axis: stops while the sensor is away; None before the servo turns.
-        clock_ns: standard uncertainty of the last scan's time.
-        away: how often the sensor was.
-    """
+    """Scans with the host's times, as they come; goes on after the sensor was away for a while."""
 
     def __init__(self, lidar: LidarDriver, reporter: Reporter) -> None:
         self.lidar = lidar
-        self.axis: AxisThread | None = None
-        self.clock_ns = 0
-        self.away = 0
+        self.axis: AxisThread | None = None  # stops while the sensor is away; None before the servo turns
+        self.clock_ns = 0  # standard uncertainty of the last scan's time
+        self.away = 0  # how often the sensor was
         self._warned = ""
         self._reporter = reporter
         self._lost_s: deque[float] = deque(maxlen=_MOST_LOST)
 
     def next(self) -> Scan:
-        """The next one, however long the sensor was away before it.
-
-        Raises:
-            DeviceFaultError: the sensor reports a fault of its own.
-            DeviceError: it stayed away, was lost ten times in ten minutes, or the servo failed meanwhile.
-        """
+        """Return the next scan, after a reconnection if needed; DeviceError if it or the servo fails."""
         try:
             timed = self.lidar.read()
         except DeviceFaultError:

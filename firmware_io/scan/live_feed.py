@@ -1,8 +1,7 @@
-"""Scans for a live view: handed over without waiting, placed as `assemble` places them.
+"""Scans for a live view, placed as `assemble` places them.
 
-The thread that reads the devices only appends to two short queues. Another thread empties them five times a second into
-a pipe; at its other end, in a process of its own, scans meet the servo's angles and become points. A viewer that
-cannot keep up loses the oldest scans of its view, which are counted; the recording loses nothing.
+The reading thread appends to two short queues; another thread sends them five times a second to a process of its own
+that makes points. A slow viewer loses its oldest scans, which are counted; the recording loses nothing.
 """
 
 from __future__ import annotations

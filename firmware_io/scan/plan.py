@@ -13,7 +13,7 @@ from scanwright.design.errors import RecordingError, ScanwrightError
 from scanwright.design.files.atomic_file import check_place, place_in
 from scanwright.design.motion import Motion, Spin
 from scanwright.firmware_io.device_ports import Ports, find_ports
-from scanwright.firmware_io.lidar.lidar import StampAt
+from scanwright.firmware_io.lidar.lidar import Echo, StampAt
 
 _LONGEST_S = 7 * 24 * 3600.0  # a week
 
@@ -31,7 +31,9 @@ class ScanPlan:
         intensity: whether intensities are recorded.
         cluster: steps that share one range, the least of theirs.
         every: one scan of so many is recorded.
-        stamp_at: which moment of a turn the sensor's stamps mean.
+        stamp_at: beam of the sensor's timestamps; None for the default of its family.
+        echo: echo that a beam of a SICK reports; None leaves it as it is.
+        mean_filter_off: switch a SICK's mean filter off.
         ports: where the devices are.
         servo_id: number of the servo on its bus; None if it is alone there.
         recording: file to write.
@@ -47,7 +49,9 @@ class ScanPlan:
     intensity: bool
     cluster: int
     every: int
-    stamp_at: StampAt
+    stamp_at: StampAt | None
+    echo: Echo | None
+    mean_filter_off: bool
     ports: Ports
     servo_id: int | None
     recording: Path
@@ -83,7 +87,9 @@ def plan_scan(
     intensity: bool = False,
     cluster: int = 1,
     every: int = 1,
-    stamp_at: StampAt = "step_0",
+    stamp_at: StampAt | None = None,
+    echo: Echo | None = None,
+    mean_filter_off: bool = False,
     endless: bool = False,
 ) -> ScanPlan:
     """Plan a scan with the scanner of a build folder; touch no device and write nothing.
@@ -98,7 +104,9 @@ def plan_scan(
         intensity: record intensities.
         cluster: steps that share one range.
         every: one scan of so many is recorded.
-        stamp_at: which moment of a turn the sensor's stamps mean.
+        stamp_at: beam of the sensor's timestamps; None for the default of its family.
+        echo: echo that a beam of a SICK reports; None leaves it as it is.
+        mean_filter_off: switch a SICK's mean filter off.
         endless: record nothing, and go on until it is ended; `turns` and `recording` have no effect then.
 
     Raises:
@@ -132,6 +140,8 @@ def plan_scan(
         cluster=cluster,
         every=every,
         stamp_at=stamp_at,
+        echo=echo,
+        mean_filter_off=mean_filter_off,
         ports=find_ports(out, lidar, servo),
         servo_id=servo_id,
         recording=recording or place_in(out, f"recordings/{datetime.now():%Y%m%d-%H%M%S}.mcap", RecordingError),

@@ -1,10 +1,8 @@
-"""Records a live run: the file of `recording`, written as it comes, so that a crash costs no more than a second.
+"""Recorder of a live scan: a crash costs less than a second.
 
-Every quarter of a second all messages so far go to the file as one whole chunk, and on to the disk. A program that
-is killed, a full disk or a pulled plug leave a file without an index, which `scanwright repair` closes.
-
-The devices' times are on the host's monotonic clock, which no clock adjustment ever sets back; ROS wants wall time.
-One difference between the two, taken at the start and kept with the recording, leads from each to the other.
+Every quarter of a second the messages so far are written as one chunk and synced. After kill -9, a full disk or a power
+cut the file has no index; `scanwright repair` adds it. Device times are on the monotonic clock; the difference to the
+wall clock is taken once at the start and kept in the file.
 """
 
 from __future__ import annotations
@@ -28,10 +26,7 @@ from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 
 
 class Recorder:
-    """Writes a recording while it happens; use it in a `with` statement.
-
-    However that ends, the recording is closed and readable, unless the disk itself refuses. A thread of its own waits
-    for the disk, so that `scan` and `joint` return at once.
+    """Recorder; use it in `with`. A thread waits for the disk, so that `scan` and `joint` return at once.
 
     Raises:
         RecordingError: the file exists or cannot be created.

@@ -1,7 +1,7 @@
-"""What the servo is told, and when, so that it makes the motion of an angle set.
+"""Orders to the servo, and their times, for the motion of an angle set.
 
-The angle is measured and each beam is de-skewed with it, so the servo only has to come near the motion: it moves from
-goal to goal at a rate, with the ramps of its own control loop.
+Beams are de-skewed with the measured angle, so the servo only has to come near the motion: it moves from goal to goal
+at a rate, with the ramps of its own control loop.
 """
 
 from __future__ import annotations
@@ -18,17 +18,11 @@ _LEAD_S = 0.5  # to come to rest after the way to the start
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One order to the servo.
+    """One order to the servo."""
 
-    Attributes:
-        at_s: when, since the course began.
-        goal_rad: where to, inf for turning without end.
-        rate_rad_s: how fast.
-    """
-
-    at_s: float
-    goal_rad: float
-    rate_rad_s: float
+    at_s: float  # when, since the course began
+    goal_rad: float  # where to, inf for turning without end
+    rate_rad_s: float  # how fast
 
 
 def course(motion: Motion, from_rad: float) -> tuple[float, Iterator[Move]]:

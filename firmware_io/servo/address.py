@@ -1,7 +1,4 @@
-"""Give a servo another number or speed, with care: a mistake makes it hard to find again.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Change the id or baud rate of a servo, with care: a mistake makes it hard to find again."""
 
 from __future__ import annotations
 
@@ -22,21 +19,20 @@ _IDS = range(253)
 def set_address(
     port: str, new_id: int | None, new_baud: int | None, from_id: int | None, from_baud: int | None, folder: Path
 ) -> Iterator[str | Path]:
-    """Set number and speed of a servo; yields as `settings.set_up`.
+    """Set id and baud rate of a servo; yields as `settings.set_up`.
 
     Args:
         port: of the servo.
-        new_id: the number that it gets; None to keep its own.
-        new_baud: bits per second that it gets; None to keep its own.
-        from_id: its number now; None if it is the only servo that answers, at whatever speed.
-        from_baud: its speed now; None to look at all that are known.
-        folder: gets the file that undoes the changes.
+        new_id: None to keep its id.
+        new_baud: None to keep its baud rate.
+        from_id: current id; None if it is the only servo that answers.
+        from_baud: current baud rate; None to try all known ones.
+        folder: for the undo file.
 
     Raises:
-        ScanwrightError: nothing to do, or no such number.
-        DeviceError: not one servo but none or several could be meant, the number is taken, the servo
-            does not know the speed or the adapter cannot have it, it holds its torque, or keeps what it has; or the
-            file cannot be written. But for the last two nothing was changed.
+        ScanwrightError: nothing to do, or no such id.
+        DeviceError: no servo or several match, the id is taken, servo or adapter lack the baud rate, its torque is on,
+            or the undo file cannot be written: then nothing was changed. Or the servo keeps its old setting.
     """
     if new_id is None and new_baud is None:
         raise ScanwrightError(f"{port}: nothing to set: give new_id, new_baud or both")

@@ -1,7 +1,6 @@
-"""The families of servos that can be driven. One line here makes a family known to every command.
+"""Servo families that can be driven; one line here makes a family known to every command.
 
-An installed package adds one without a line here: an entry point of the group "scanwright.servos" that names a
-`ServoFamily`; the TOML files beside its module are products of the catalogue (docs/how-to/new-servo.md).
+An installed package adds a `ServoFamily` by an entry point of the group "scanwright.servos" (docs/how-to/new-servo.md).
 """
 
 from __future__ import annotations

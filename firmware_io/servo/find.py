@@ -1,7 +1,4 @@
-"""Find a servo on a port: its speed, its packets, its model. Only a mute servo is written to, and only on request.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Find baud rate, protocol and model of a servo on a port. Writes only to unmute a servo, on request."""
 
 from __future__ import annotations
 
@@ -39,7 +36,7 @@ def find_servo(
         servo_id: its number; None if it is alone.
         baud: the only speed to ask at; None for all that are known.
         unmute: whether to set a servo that answers nothing but pings to answer everything: never, only if that setting
-            is gone with the power (else its torque is turned off), or always.
+            is volatile (else its torque is turned off), or always.
 
     Raises:
         ServoSetupError: it is mute, and may not be unmuted.
@@ -145,10 +142,9 @@ def _any_table(packets: PacketFormat) -> ControlTable:
 
 
 def _identity(unit: ServoUnit) -> ControlTable | int | None:
-    """The table of a servo that answers; its model number if that is unknown; None if it has none.
+    """Return the table of a servo that answers; its model number if that is unknown; None if it has none.
 
-    Families that share a form of packets read each other's registers as numbers of models. So a servo must have its own
-    id, too, where the table says.
+    Families with one packet format read each other's registers as model numbers, so the id must match too.
     """
     with suppress(DeviceTimeoutError, ProtocolError):  # a late answer to the ping at another speed, or a mute one
         number = unit.count(unit.table.model_number)

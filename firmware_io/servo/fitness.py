@@ -38,7 +38,7 @@ class SettingChange:
 
 
 class ServoSetupError(DeviceError):
-    """Settings that outlast the power must change before the servo can be used; nothing was written, nothing moved.
+    """Settings that are permanent must change before the servo can be used; nothing was written, nothing moved.
 
     Attributes:
         port: of the servo.
@@ -56,12 +56,7 @@ class ServoSetupError(DeviceError):
 
 
 def needed_settings(table: ControlTable, *, spins: bool | None) -> list[tuple[Setting, str]]:
-    """The settings that the driver cannot do without, and what another count does.
-
-    Args:
-        table: of the servo.
-        spins: whether it must turn continuously (True) or go to angles (False); None if that is not known yet.
-    """
+    """Return the settings that the driver requires, and the effect of others; `spins` None: motion not known yet."""
     mode = () if spins is None else table.mode(spins=spins)
     return [
         ((table.status_return, table.answers_all), _ANSWERS_LESS),
@@ -83,10 +78,7 @@ def mode_changes(unit: ServoUnit, *, spins: bool) -> list[SettingChange]:
 
 
 def needed_changes(unit: ServoUnit, *, spins: bool | None) -> list[SettingChange]:
-    """The settings that differ and that the driver cannot do without; only reads. `spins` as in `needed_settings`.
-
-    A servo that was mute and was made to answer has that change first: it was made, and must be kept and undone.
-    """
+    """Return the required settings that differ; an unmuting that was made comes first, to be kept and undone."""
     level = unit.table.status_return
     muted = [SettingChange(level, 0, unit.table.answers_all, _MUTE)] if unit.was_mute else []
     return muted + _differing(unit, needed_settings(unit.table, spins=spins))
@@ -122,7 +114,7 @@ def settable(table: ControlTable) -> dict[str, Register]:
 
 
 def slow_adapter(port: str) -> str | None:
-    """What to do about a USB adapter that gathers bytes before it hands them over; None where there is none."""
+    """What to do about a USB adapter that gathers bytes before it hands them over; None if there is none."""
     gathers_ms = latency_ms(port)
     if gathers_ms <= 1:
         return None

@@ -1,12 +1,11 @@
-"""A small process that holds the servo's port, and stops the servo when the program that drives it is gone.
+"""Small process that shares the servo's port and stops the servo if the driving program dies or hangs.
 
-No handler can run in a program that is killed. So the port is opened once and shared: the guard inherits it, listens on
-a pipe to the program, and when that pipe ends without a word (kill -9, a crash, a power cut of the terminal), or stays
-silent while the servo turns (Ctrl-Z, a program that hangs), it sends the packet that takes the servo's torque, until it
-is answered. The port's lock belongs to the open port, so nobody else gets in before the servo stands.
+A killed program runs no handler. The guard inherits the open port and reads a pipe from the program. If the pipe ends
+without a word (kill -9, crash) or stays silent while the servo turns (Ctrl-Z, hang), the guard sends the packet that
+turns the torque off until it is answered. The port's lock lasts until then.
 
-The file is also the guard's program: it imports the standard library only, to be there in some 20 ms.
-What it cannot do: stop a servo whose bus is cut, or do anything once the machine itself has lost its power.
+The file is also the guard's program: only the standard library, to start in 20 ms.
+It cannot stop a servo whose bus is cut, or act after a power cut of the computer.
 """
 
 from __future__ import annotations
@@ -105,11 +104,7 @@ def watch(port_fd: int, packet: bytes, answer: bytes, silence_s: float) -> None:
 
 
 def stop(port_fd: int, packet: bytes, answer: bytes) -> None:
-    """Send the packet until it is answered.
-
-    Raises:
-        OSError: the port is gone, as termios.error does; or nobody answers.
-    """
+    """Send the packet until it is answered; raises OSError if the port is gone or no answer comes."""
     end_s = time.monotonic() + _GIVE_UP_S
     while time.monotonic() < end_s:
         termios.tcflush(port_fd, termios.TCIFLUSH)  # an answer to the dead program is none to us

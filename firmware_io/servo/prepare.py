@@ -1,7 +1,4 @@
-"""Make a servo ready to be driven: torque off, faults cleared. It never writes permanent registers without consent.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Prepare a servo: torque off, faults cleared. Permanent registers are never written without consent."""
 
 from __future__ import annotations
 
@@ -24,15 +21,10 @@ _REBOOT_S = 3.0  # [assumed]: the e-manual states no time
 
 
 def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) -> tuple[str, ...]:
-    """Turn the torque off, clear faults, check the settings; the warnings for the user.
-
-    Args:
-        unit: the servo.
-        spins: as in `fitness.needed_settings`.
-        undo_folder: as in `set_agreed`.
+    """Turn the torque off, clear faults, check the settings; return warnings for the user.
 
     Raises:
-        ServoSetupError: settings that outlast the power must change, and may not be written.
+        ServoSetupError: permanent settings must change, and `undo_folder` is None.
         DeviceError: the servo does not answer, or does not keep a setting.
     """
     table, bus = unit.table, unit.bus
@@ -53,15 +45,10 @@ def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) ->
 
 
 def set_agreed(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: Path | None) -> None:
-    """Write settings: those that are gone with the power at once, the others only if there is a folder for their undo.
-
-    Args:
-        unit: the servo, without torque.
-        changes: what differs.
-        undo_folder: gets the file that undoes the changes; None if nothing that outlasts the power may be written.
+    """Write volatile settings at once, and permanent ones only with a folder for their undo file.
 
     Raises:
-        ServoSetupError: a setting outlasts the power and there is no folder; nothing was written.
+        ServoSetupError: a permanent setting differs and there is no folder; nothing was written.
         DeviceError: the file cannot be written, or a setting does not stay.
     """
     permanent = [change for change in changes if unit.table.is_permanent(change.register)]

@@ -37,24 +37,17 @@ class ServoState:
 
 @dataclass(frozen=True, slots=True)
 class TurnOrder:
-    """What the servo was told to do, and where it was when it last got on with it.
+    """What the servo was told to do, and where it was when it last got on with it."""
 
-    Attributes:
-        rate_rad_s: how fast, negative clockwise.
-        goal_rad: where to; infinite for turning without end.
-        since_ns: when it last got on with it; 0 before it was seen to.
-        from_rad: where it was then.
-    """
-
-    rate_rad_s: float
-    goal_rad: float
-    since_ns: int = 0
-    from_rad: float = math.nan
+    rate_rad_s: float  # how fast, negative clockwise
+    goal_rad: float  # where to; infinite for turning without end
+    since_ns: int = 0  # when it last got on with it; 0 before it was seen to
+    from_rad: float = math.nan  # where it was then
 
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """How far it came, and how far it should have; NaN where it stayed in a dead sector."""
+    """How far it came, and how far it should have; NaN if it stayed in a dead sector."""
 
     moved_rad: float
     due_rad: float
@@ -66,13 +59,7 @@ class Stall:
 
 
 def follow(order: TurnOrder, state: ServoState, step_rad: float) -> TurnOrder | Stall | None:
-    """The order with the progress made; None when the goal is reached.
-
-    Args:
-        order: that the servo has.
-        state: as it was read last.
-        step_rad: of its encoder.
-    """
+    """Return the order with the progress made; None when the goal is reached."""
     here_rad, latest_ns = state.position_rad, state.time_ns + state.time_bound_ns
     if abs(order.goal_rad - here_rad) < _ARRIVED_RAD:
         return None

@@ -12,14 +12,14 @@ from scanwright.firmware_io.servo.progress import ServoState, TurnOrder
 def state_of(
     table: ControlTable, answer: ServoAnswer, *, spins: bool, known: ServoState | None, order: TurnOrder | None
 ) -> ServoState:
-    """The state that an answer tells.
+    """Return the state in an answer.
 
     Args:
         table: of the servo.
         answer: to a reading of its block.
         spins: whether it is in wheel mode.
-        known: the last state with a position, from which turns are counted; None before there was one.
-        order: to turn, if it has one.
+        known: last state with a position, from which turns are counted.
+        order: current order to turn.
     """
     data = answer.data
     count = round(table.pick(table.position, data) / table.position.unit)

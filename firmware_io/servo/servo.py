@@ -1,14 +1,11 @@
-"""Drive one servo: spin, sweep, hold, read; whatever happens, it is told to stop and its port is closed in the end.
+"""Driver of one servo: spin, sweep, hold, read. On every exit the servo is stopped and its port closed.
 
-An error that leaves the `with` statement carries as a note what the servo answered to that: that its torque is off, or
-that it could not be stopped.
+An error that leaves `with` has a note: that the servo answered that its torque is off, or that it could not be stopped.
+`open_servo` finds baud rate, protocol and model, and turns the torque off. Permanent settings are written only if the
+caller names a folder for the undo file. While the servo turns, call `read` at least every two seconds: it counts turns,
+and a servo that is not read is stopped by the guard process, and by its bus watchdog if it has one.
 
-`open_servo` finds speed, protocol and model, and turns the torque off. Settings that outlast the power are written only
-if the caller names a folder for the file that undoes them. While the servo turns, `read` it at least every two seconds:
-turns are counted from what is read, and a servo that nobody listens to is stopped (by the guard process, and by the bus
-watchdog where the servo has one).
-
-What nobody can help: a servo without a watchdog (protocol 1.0, STS) that spins goes on when its bus is cut.
+A servo without a watchdog (protocol 1.0, STS) that spins continues if its bus is cut.
 """
 
 from __future__ import annotations
@@ -84,11 +81,7 @@ class ServoDriver:
                 error.add_note(f"{self} {_IS_OFF}")
 
     def close(self) -> None:
-        """Take the torque, close the port. May be called again.
-
-        Raises:
-            UnsafeError: the servo does not answer, and may still turn.
-        """
+        """Turn the torque off, close the port; UnsafeError if the servo does not answer. Can be called again."""
         if not self._bus.is_open:
             return
         trouble: BaseException | None = None
@@ -121,7 +114,7 @@ class ServoDriver:
         An AX-12A has no speed loop: it gets that share of its voltage which would give this rate without load.
 
         Raises:
-            ServoSetupError: the servo is set to go to angles, and that outlasts the power.
+            ServoSetupError: the servo is set to go to angles, and that is permanent.
             DeviceError: the rate is beyond the motor.
         """
         self._check_rate(rate_rad_s)
@@ -135,7 +128,7 @@ class ServoDriver:
         """Go to an angle at a rate (above 0); angles are those of the encoder, turns counted before are forgotten.
 
         Raises:
-            ServoSetupError: the servo is set to spin, and that outlasts the power.
+            ServoSetupError: the servo is set to spin, and that is permanent.
             DeviceError: the servo has no such angle, or the rate is beyond the motor.
         """
         table = self._table
@@ -298,7 +291,7 @@ def open_servo(
         servo_id: its number on the bus; None if it is alone there.
         spins: whether it is going to spin (True) or to sweep (False), so that a wrong mode is an error at once; None if
             that is not known yet.
-        undo_folder: lets settings that outlast the power be written, and gets a file that undoes each such change; None
+        undo_folder: lets settings that are permanent be written, and gets a file that undoes each such change; None
             if the servo must stay as it is.
 
     Raises:

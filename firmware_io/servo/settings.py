@@ -83,10 +83,7 @@ def wanted_changes(port: str, model: str | None, servo_id: int | None, *, spins:
 
 
 def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: Path) -> Iterator[str | Path]:
-    """Keep the counts in a file, write the changes to a servo without torque, read all of them back in the end.
-
-    Yields and raises as `set_up`.
-    """
+    """Save the counts in a file, write the changes without torque, read all back. Yields and raises as `set_up`."""
     try:
         file = keep_settings(undo_folder, unit, [(one.register, one.now, one.needed) for one in changes])
     except DeviceError:
@@ -118,11 +115,7 @@ def _still_true(unit: ServoUnit, agreed: Sequence[SettingChange]) -> Sequence[Se
 
 
 def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Register, int, int]]) -> Path:
-    """Write a file with the registers that are going to be changed, and their counts before and after; the file.
-
-    Raises:
-        DeviceError: the file cannot be written; nothing was changed then.
-    """
+    """Write the undo file of the changes and return its path; DeviceError if that fails, before any change."""
     model, at = unit.table.model, f"{datetime.now():%Y%m%d-%H%M%S}"
     saved = ServoSettings(
         schema_name="scanwright/servo-settings/1",
@@ -175,11 +168,7 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
 
 
 def check_torque(unit: ServoUnit) -> None:
-    """Refuse a servo that holds or turns something.
-
-    Raises:
-        DeviceError: its torque is on.
-    """
+    """Raise DeviceError if the torque of the servo is on."""
     if unit.has_torque():
         raise DeviceError(
             f"{unit} has its torque on, and holds or turns something: "
@@ -188,11 +177,7 @@ def check_torque(unit: ServoUnit) -> None:
 
 
 def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple[ServoUnit, str]:
-    """Set one, and read it back; the servo as it answers now, and what was done.
-
-    Raises:
-        DeviceError: it keeps its count, or is not heard any more.
-    """
+    """Set one register and read it back; return the servo as it answers now, and the line for the user."""
     table, now = unit.table, unit
     if register == table.baud:
         unit.set_baud(table.bauds[needed])

@@ -137,7 +137,9 @@ def scan(
     intensity: bool = False,
     cluster: int = 1,
     every: int = 1,
-    stamp_at: Literal["step_0", "rear"] = "step_0",
+    stamp_at: Literal["step_0", "rear", "first_beam", "last_beam"] | None = None,
+    echo: Literal["first", "last"] | None = None,
+    mean_filter_off: bool = False,
     progress: Progress = no_progress,
 ) -> Scanned:
     """Record a full scan with the scanner of a build folder, and assemble the cloud next to the recording.
@@ -152,7 +154,10 @@ def scan(
         intensity: also record intensities.
         cluster: merge this many steps into one range, the smallest.
         every: use every Nth scan of the lidar.
-        stamp_at: beam that the lidar's timestamps refer to: step 0 (the specification) or the rear.
+        stamp_at: beam of the lidar's timestamps. Hokuyo: step_0 (the specification) or rear; SICK: first_beam or
+            last_beam. None chooses step_0, or for a SICK what its telegrams show.
+        echo: echo that a beam of a SICK reports, until its power is switched off.
+        mean_filter_off: switch a SICK's mean filter off, which smears a turning scan, until power-off.
         progress: progress callback.
 
     Raises:
@@ -183,6 +188,8 @@ def scan(
         cluster=cluster,
         every=every,
         stamp_at=stamp_at,
+        echo=echo,
+        mean_filter_off=mean_filter_off,
     )
     recorded = acquire(plan, progress)
     return Scanned(recorded, assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply")))

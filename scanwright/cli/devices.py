@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import AbstractContextManager, closing, suppress
+from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -28,6 +28,7 @@ from scanwright.cli.help import Commands
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command
 from scanwright.design.errors import ScanwrightError, notes_of, require
 from scanwright.design.findings import errors_in
+from scanwright.firmware_io.capture import capturing, replaying
 from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
@@ -56,7 +57,7 @@ def _viewer(
 
 @app.command(example="emulate out/ground_ahead")
 def emulate(
-    out: BuildFolder,
+    out: Annotated[Path | None, Argument(metavar="BUILD", help="Build folder of the scanner.")] = None,
     scene: Annotated[Path | None, Option(metavar="MESH", help="Surroundings [default: a furnished room].")] = None,
     unit_m: Annotated[float, Option(metavar="M", help="Length of one mesh unit; 0.001 for mm.")] = 1.0,
     at: Annotated[tuple[float, float, float], Option(metavar="X Y Z", help="Position in the scene, metres.")] = (
@@ -67,12 +68,24 @@ def emulate(
     noise_mm: Annotated[float | None, Option(min=0, metavar="SIGMA", help="Range noise [default: data sheet].")] = None,
     seed: Annotated[int, Option(min=0, metavar="N", help="Random seed.")] = 0,
     factory_servo: Annotated[bool, Option("--factory-servo", help="Servo with factory settings.")] = False,
+    replay: Annotated[
+        Path | None, Option(metavar="FILE", help="Emulate the devices of a `doctor --capture` instead.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run an emulated lidar and servo.
 
-    Runs until Ctrl-C. `scan`, `doctor` and `ros2` detect the emulated devices of the same build folder.
+    Runs until Ctrl-C. `scan`, `doctor` and `ros2` detect the emulated devices of the same build folder. Devices of a
+    capture have no build folder: name their ports in those commands.
     """
+    if (out is None) == (replay is None):
+        raise ScanwrightError("BUILD, --replay: choose one of them")
+    if replay is not None:
+        with suppress(KeyboardInterrupt), high_priority(), replaying(replay) as terminals:
+            show([f"{port} of the capture at {terminal}" for port, terminal in terminals.items()])
+            Event().wait()
+        return
+    assert out is not None
     from scanwright.cli.results.of_commands import Devices
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
@@ -115,7 +128,14 @@ def scan(
     intensity: Intensity = False,
     cluster: Annotated[int, Option(min=1, max=99, metavar="N", help="Merge N steps into the smallest range.")] = 1,
     every: Annotated[int, Option(min=1, max=10, metavar="N", help="Use every Nth scan of the lidar.")] = 1,
-    stamp_at: Annotated[Literal["step_0", "rear"], Option(help="Beam of the lidar's timestamps.")] = "step_0",
+    stamp_at: Annotated[
+        Literal["step_0", "rear", "first_beam", "last_beam"] | None,
+        Option(help="Beam of the lidar's timestamps: Hokuyo step_0, rear; SICK first_beam, last_beam."),
+    ] = None,
+    echo: Annotated[Literal["first", "last"] | None, Option(help="Echo that a SICK reports, until power-off.")] = None,
+    mean_filter_off: Annotated[
+        bool, Option("--mean-filter-off", help="Switch a SICK's mean filter off, until power-off.")
+    ] = False,
     dry_run: Annotated[bool, Option("--dry-run", help="Print the plan and exit.")] = False,
     live: Annotated[bool, Option("--live", help="Show the growing cloud in the browser.")] = False,
     foxglove: Annotated[bool, Option("--foxglove", help="Serve scans and points to Foxglove.")] = False,
@@ -146,6 +166,8 @@ def scan(
         cluster=cluster,
         every=every,
         stamp_at=stamp_at,
+        echo=echo,
+        mean_filter_off=mean_filter_off,
     )
     progress = ConsoleProgress()
     result = ScanResult(_devices_of(plan), plan.angles_path, plan.duration_s)
@@ -270,6 +292,9 @@ def doctor(
     servo_id: ServoId = None,
     fix: Annotated[bool, Option("--fix", help="Correct servo settings; saves the old ones.")] = False,
     restore: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
+    capture: Annotated[
+        Path | None, Option(metavar="FILE", help="Write the raw bytes of the devices to a file.")
+    ] = None,
     udev: Annotated[bool, Option("--udev", help="Print udev rules for the adapters and exit.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -292,15 +317,16 @@ def doctor(
         port, steps = diagnosis.fix(out, servo, servo_id)
         print_steps(port, steps) if not as_json else list(steps)
     findings = []
-    for finding in diagnosis.examine(out, lidar, servo, servo_id):
-        hint = finding.hint
-        if finding.code == diagnosis.SERVO_SETTING:
-            hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
-        if finding.code in host.CURED_BY_RULES:
-            hint += " (`scanwright doctor --udev` prints them)"
-        findings.append(replace(finding, hint=hint))
-        if not as_json:
-            print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
+    with nullcontext() if capture is None else capturing(capture):
+        for finding in diagnosis.examine(out, lidar, servo, servo_id):
+            hint = finding.hint
+            if finding.code == diagnosis.SERVO_SETTING:
+                hint = f"`{set_up_command(finding.subject, out, servo_id)}` sets it"
+            if finding.code in host.CURED_BY_RULES:
+                hint += " (`scanwright doctor --udev` prints them)"
+            findings.append(replace(finding, hint=hint))
+            if not as_json:
+                print(f"{finding.severity:8} {finding.message}{hint and f': {hint}'}", flush=True)
     if as_json:
         show_json(Diagnosis(findings))
     raise typer.Exit(1 if errors_in(findings) else 0)

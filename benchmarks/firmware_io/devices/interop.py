@@ -1,9 +1,11 @@
 """Other people's programs against the emulated devices: one row for each program and model.
 
-    python -m benchmarks.firmware_io.devices.interop [sdk=ULTRA_SIMPLE] [urg=SAMPLES] [ldlidar=SOURCES] [python=PYTHON]
+    python -m benchmarks.firmware_io.devices.interop [sdk=ULTRA_SIMPLE] [urg=SAMPLES] [ldlidar=SOURCES] [sick=FOLDER]
+        [sicktoolbox=EXAMPLES] [python=PYTHON]
 
 `sdk` is the program ultra_simple of rplidar_sdk, `urg` the folder samples/c of urg_library (both built), `ldlidar` the
-folder ldlidar_driver of ldlidar_stl_ros2 (compiled here, which needs g++), `python` an interpreter with the packages
+folder ldlidar_driver of ldlidar_stl_ros2 (compiled here, which needs g++), `sick` a checkout of sick_scan_xd with its
+shared library in build_linux, `sicktoolbox` a folder with its examples, `python` an interpreter with the packages
 rplidar-roboticia, pyrplidar, lds2d, ftservo-python-sdk, rustypot and dynamixel-sdk. Each lidar stands before a wall
 whose distance is known in every direction; what a program prints is compared with that. Each servo is moved by half a
 radian. A row fails if a program prints too little or something else.
@@ -63,6 +65,25 @@ with Lidar.open(sys.argv[3].replace(" ", "-"), sys.argv[1], int(sys.argv[2])) as
     lidar.start()
     for point in lidar.points():
         print(point.angle_deg, point.dist_mm, flush=True)
+"""
+_SICK_SCAN = """
+import numpy as np
+sys.path.append(sys.argv[1] + "/python/api")
+from sick_scan_api import *
+def show(_, message):
+    cloud = message.contents
+    rows = np.ctypeslib.as_array(cloud.data.buffer, (cloud.height * cloud.width, cloud.point_step))
+    x, y = rows.view(np.float32)[:, :2].T
+    for angle, mm in zip(np.degrees(np.arctan2(y, x)), 1000 * np.hypot(x, y)):
+        print("%.3f %.1f" % (angle, mm), flush=True)
+library = SickScanApiLoadLibrary([sys.argv[1] + "/build_linux/"], "libsick_scan_xd_shared_lib.so")
+handle = SickScanApiCreate(library)
+launch = "sick_tim_5xx.launch" if sys.argv[4].startswith("TiM") else "sick_lms_1xx.launch"
+words = (sys.argv[1] + "/launch/" + launch, "hostname:=" + sys.argv[2], "port:=" + sys.argv[3])
+SickScanApiInitByLaunchfile(library, handle, " ".join(words))
+callback = SickScanPointCloudMsgCallback(show)
+SickScanApiRegisterCartesianPointCloudMsg(library, handle, callback)
+time.sleep(60)
 """
 _FTSERVO = """
 from scservo_sdk import PortHandler, sms_sts
@@ -131,7 +152,7 @@ class Client:
     Attributes:
         name: of it.
         models: that it should run with.
-        command: its arguments, in which PORT, BAUD and MODEL stand for those of an emulator.
+        command: its arguments, in which PORT, HOST, TCP, BAUD and MODEL stand for those of an emulator.
         pattern: matches angle [deg] and distance [mm] in what it prints, or a distance straight ahead.
     """
 
@@ -173,6 +194,13 @@ def clients(paths: dict[str, str], folder: Path) -> Iterator[Client]:
         for name in ("get_distance", "get_distance_handshake", "sync_time_stamp"):
             pattern = ahead if name != "sync_time_stamp" else r"^()()\d+"
             yield Client(f"urg_library, {name}", usb, (str(Path(samples, name)), "-s", "PORT"), pattern)
+    if checkout := paths.get("sick"):
+        words = (sys.executable, "-c", "import sys, time" + _SICK_SCAN, checkout, "HOST", "TCP", "MODEL")
+        yield Client("sick_scan_xd", ("TiM551", "TiM561", "TiM571", "LMS111"), words)
+    if examples := paths.get("sicktoolbox"):
+        for name in ("lms2xx_simple_app", "lms2xx_set_variant"):
+            program = str(Path(examples, name))
+            yield Client(f"sicktoolbox, {name}", ("LMS 200",), (program, "PORT"), r"()()Num\. Values: \d+")
     if sources := paths.get("ldlidar"):
         (folder / "main.cpp").write_text(_LDLIDAR)
         includes = [f"-I{path}" for path in Path(sources, "include").iterdir()]
@@ -190,7 +218,8 @@ def result(client: Client, model: str, folder: Path) -> tuple[bool, str]:
     lidar, log = load_catalogue().get(model, Lidar), folder / "log"
     emulator = resolve_name(family_of(model).emulator)(lidar, _ranging, 0)
     with emulator, log.open("w") as out:
-        values = {"PORT": emulator.port, "BAUD": str(_baud(model)), "MODEL": model}
+        host, _, tcp = emulator.address.partition(":")
+        values = {"PORT": emulator.port, "HOST": host, "TCP": tcp, "BAUD": str(_baud(model)), "MODEL": model}
         command = ["stdbuf", "-oL", *(values.get(part, part) for part in client.command)]
         program = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, cwd=folder)
         with suppress(subprocess.TimeoutExpired):

@@ -1,27 +1,35 @@
 """Stated errors of beam times when the reader is held up.
 
     python -m benchmarks.firmware_io.devices.stalls [STALLS]
-    python -m benchmarks.firmware_io.devices.stalls --soak HOURS
+    python -m benchmarks.firmware_io.devices.stalls --soak HOURS [--only MODEL ...]
+    python -m benchmarks.firmware_io.devices.stalls --real MINUTES [--only MODEL]
 
 Each lidar streams to its driver on one virtual clock, and the driver is held up STALLS times (default 20, which are 520
 in all), for 0.05 to 10 s, in a read or between two. What comes meanwhile waits in a buffer of a pseudo-terminal's or of
 a serial port's size; what finds it full is lost. An adapter hands bytes over every 1 or 16 ms. Ranges tell when each
 beam was measured. A soak runs one lidar of each family for hours of that clock, with a stall every 20 s in the mean.
+`--real` reads one emulated lidar (default: LD19) on its pseudo-terminal in real time, beside eight busy processes.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
+import sys
 import time
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import Pipe, Process
+from multiprocessing.connection import Connection
 from pkgutil import resolve_name
 from unittest.mock import patch
 
 import numpy as np
 
+from scanwright.cli.console import high_priority
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
@@ -52,6 +60,7 @@ _TIMED = (sensor_line, dialogue, ldrobot, lms2xx, scip_dialogue, scip, cola, sic
 _M_S = 10.0  # by which the range grows
 _CYCLE_S = 0.63  # no whole number of turns
 _NEAREST_M = 1.0
+_BUSY = 8  # processes
 _SOAK_STALL_S = 20.0  # from stall to stall: 17 s in the mean, and 2 s of its own
 
 
@@ -224,22 +233,59 @@ class Judged:
 
 def judge(model: str, stalls: list[tuple[float, float]], buffer_bytes: int) -> Judged:
     """Run a lidar through its stalls, and keep sums only."""
-    found = Judged(0, 0, 0, 0, np.zeros(3, np.int64), 0.0, 0, set())
     with held_up(model, stalls, buffer_bytes) as (lidar, to_come):
-        last_ns = 0
-        for one, still in _turns(lidar, to_come):
-            off, stated = _errors_ms(model, one)
-            found.turns += 1
-            found.beams += off.size
-            found.within += [int(np.sum(off < k * stated)) for k in (1, 2, 3)]
-            found.worst_ms = max(found.worst_ms, float(off.max(initial=0.0)))
-            if np.any(off >= 3 * stated):
-                found.wrong.add(still)
-            if last_ns:
-                found.back += one.scan.stamp_ns < last_ns
-                found.missing += round((one.scan.stamp_ns - last_ns) / 1e9 * lidar.scan_rate_hz - 1)
-            last_ns = one.scan.stamp_ns
-        found.counted = lidar.dropped
+        return _judged(model, lidar, _turns(lidar, to_come))
+
+
+def judge_in_real_time(model: str, minutes: float) -> Judged:
+    """Read a lidar on its pseudo-terminal beside eight busy processes, and keep sums only."""
+    ours, theirs = Pipe()
+    sensor = Process(target=_sensor, args=(model, theirs), daemon=True)
+    sensor.start()
+    busy = [subprocess.Popen(["nice", "-n", "15", sys.executable, "-c", "while True: pass"]) for _ in range(_BUSY)]
+    try:
+        with high_priority(), open_lidar(ours.recv(), model) as lidar:  # as the command `scan` does
+            return _judged(model, lidar, _turns_for(lidar, minutes))
+    finally:
+        ours.send(None)
+        for one in busy:
+            one.kill()
+            one.wait()
+        sensor.join()
+
+
+def _sensor(model: str, ours: Connection) -> None:
+    """Emulate a lidar ahead of all other processes, if that is allowed: a real one has a processor of its own."""
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    with resolve_name(family_of(model).emulator)(load_catalogue().get(model, Lidar), _seen_at, 0) as emulator:
+        ours.send(emulator.port)
+        ours.recv()
+
+
+def _turns_for(lidar: LidarDriver, minutes: float) -> Iterator[tuple[TimedScan, int]]:
+    end_s = time.monotonic() + 60 * minutes
+    lidar.start()
+    while time.monotonic() < end_s:
+        yield lidar.read(), 0
+
+
+def _judged(model: str, lidar: LidarDriver, turns: Iterator[tuple[TimedScan, int]]) -> Judged:
+    found = Judged(0, 0, 0, 0, np.zeros(3, np.int64), 0.0, 0, set())
+    last_ns = 0
+    for one, still in turns:
+        off, stated = _errors_ms(model, one)
+        found.turns += 1
+        found.beams += off.size
+        found.within += [int(np.sum(off < k * stated)) for k in (1, 2, 3)]
+        found.worst_ms = max(found.worst_ms, float(off.max(initial=0.0)))
+        if np.any(off >= 3 * stated):
+            found.wrong.add(still)
+        if last_ns:
+            found.back += one.scan.stamp_ns < last_ns
+            found.missing += round((one.scan.stamp_ns - last_ns) / 1e9 * lidar.scan_rate_hz - 1)
+        last_ns = one.scan.stamp_ns
+    found.counted = lidar.dropped
     return found
 
 
@@ -254,6 +300,8 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("stalls", nargs="?", type=int, default=20)
     arguments.add_argument("--soak", type=float, metavar="HOURS")
+    arguments.add_argument("--real", type=float, metavar="MINUTES")
+    arguments.add_argument("--only", nargs="+", choices=SOAKED, default=SOAKED, metavar="MODEL")
     chosen = arguments.parse_args()
     print(
         "| lidar | buffer, latency | turns | missing, counted | within 1, 2, 3 times the stated error | worst | back |"
@@ -261,13 +309,18 @@ def main() -> None:
     print("| --- | --- | --- | --- | --- | --- | --- |", flush=True)
     wrong, count = 0, chosen.stalls if chosen.soak is None else round(chosen.soak * 3600 / _SOAK_STALL_S)
     runs = [(model, size) for model in MODELS for size in BUFFER_BYTES]
-    if chosen.soak is not None:
-        runs = [(model, BUFFER_BYTES[0]) for model in SOAKED]
+    if chosen.real is not None:
+        runs = [(chosen.only[0], BUFFER_BYTES[0])]
+    elif chosen.soak is not None:
+        runs = [(model, BUFFER_BYTES[0]) for model in chosen.only]
     for model, buffer_bytes in runs:
         rng = np.random.default_rng([count, MODELS.index(model), buffer_bytes])
         apart_s = (0.05, 2.0) if chosen.soak is None else (2.0, 60.0)
-        found = judge(model, random_stalls(rng, count, 1.0, apart_s), buffer_bytes)
-        latency_ms = 0 if model in NOT_GATHERED else LATENCY_MS[buffer_bytes]
+        if chosen.real is None:
+            found = judge(model, random_stalls(rng, count, 1.0, apart_s), buffer_bytes)
+        else:
+            found = judge_in_real_time(model, chosen.real)
+        latency_ms = 0 if model in NOT_GATHERED or chosen.real else LATENCY_MS[buffer_bytes]
         within = ", ".join(f"{100 * part / found.beams:.2f}" for part in found.within)
         print(
             f"| {model} | {buffer_bytes:,}, {latency_ms} ms | {found.turns:,} | "
@@ -275,6 +328,8 @@ def main() -> None:
             flush=True,
         )
         wrong += len(found.wrong)
+    if chosen.real is not None:
+        return
     total = count * len(runs)
     print(
         f"\nafter {total - wrong} of {total} stalls every beam was within three times its stated error, or was dropped"

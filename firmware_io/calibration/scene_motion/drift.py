@@ -26,19 +26,12 @@ _CHANCE = 1e-6  # of a false warning in a recording at rest
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drift:
-    """How a platform seems to have moved while it was scanning, in the fixed frame of the axis.
+    """How a platform seems to have moved while it was scanning, in the fixed frame of the axis."""
 
-    Attributes:
-        recording: number of the recording.
-        velocity_m_s: shape (3,).
-        turn_rad_s: shape (3,).
-        chi2: squared sigmas of all six.
-    """
-
-    recording: int
-    velocity_m_s: Float64[ndarray, " 3"]
-    turn_rad_s: Float64[ndarray, " 3"]
-    chi2: float
+    recording: int  # number of the recording
+    velocity_m_s: Float64[ndarray, " 3"]  # shape (3,)
+    turn_rad_s: Float64[ndarray, " 3"]  # shape (3,)
+    chi2: float  # squared sigmas of all six
 
     @property
     def sure(self) -> bool:

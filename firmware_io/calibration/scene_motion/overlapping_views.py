@@ -32,17 +32,11 @@ _TURN_RAD = 2 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class OverlappingViews:
-    """What two looks at one place, at two times, say of each other.
+    """What two looks at one place, at two times, say of each other."""
 
-    Attributes:
-        tested: beams that could be asked.
-        compared: those of them at whose place another beam looked, from half a turn or a whole one away.
-        seen_through: those whose place that other beam went through, to end well behind it.
-    """
-
-    tested: int
-    compared: int
-    seen_through: int
+    tested: int  # beams that could be asked
+    compared: int  # those of them at whose place another beam looked, from half a turn or a whole one away
+    seen_through: int  # those whose place that other beam went through, to end well behind it
 
 
 def overlapping_views(

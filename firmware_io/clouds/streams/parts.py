@@ -17,36 +17,22 @@ Again = Callable[[], Iterator[Cloud]]
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The clouds of a file, in parts.
+    """The clouds of a file, in parts."""
 
-    Attributes:
-        clouds: of the file, in its order.
-        notes: what is not read.
-    """
-
-    clouds: tuple[Again, ...]
-    notes: tuple[str, ...] = ()
+    clouds: tuple[Again, ...]  # of the file, in its order
+    notes: tuple[str, ...] = ()  # what is not read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudSurvey:
-    """All parts of a cloud, without its points.
+    """All parts of a cloud, without its points."""
 
-    Attributes:
-        head: columns, pose and start, and no point.
-        rows: with a point.
-        low_m: lowest corner in the world, shape (3,).
-        high_m: highest corner in the world, shape (3,).
-        limits: column -> smallest and largest finite value; (0, 0) if there is none.
-        integers: columns of integers from 0 to 65535.
-    """
-
-    head: Cloud
-    rows: int
-    low_m: Vector
-    high_m: Vector
-    limits: dict[str, tuple[float, float]]
-    integers: frozenset[str]
+    head: Cloud  # columns, pose and start, and no point
+    rows: int  # with a point
+    low_m: Vector  # lowest corner in the world, shape (3,)
+    high_m: Vector  # highest corner in the world, shape (3,)
+    limits: dict[str, tuple[float, float]]  # column -> smallest and largest finite value; (0, 0) if there is none
+    integers: frozenset[str]  # columns of integers from 0 to 65535
 
 
 def survey(parts: Iterable[Cloud]) -> CloudSurvey | None:

@@ -11,13 +11,7 @@ from scanwright.firmware_io.servo.bus.registers import ControlTable
 
 
 def wanted(table: ControlTable, memory: Memory, turns: int) -> Actuation:
-    """What the registers ask of the motor.
-
-    Args:
-        table: of the model.
-        memory: its registers.
-        turns: of the axis, when the servo last began to count.
-    """
+    """Return the actuation that the registers request; `turns`: of the axis when the servo began to count."""
     if not memory[table.torque.address]:
         return Actuation()
     speed, goal = memory[table.wheel_speed.address], memory[table.goal.address]
@@ -41,15 +35,7 @@ def wanted(table: ControlTable, memory: Memory, turns: int) -> Actuation:
 
 
 def show(table: ControlTable, memory: Memory, turns: int, motion: Motion, now_ns: int) -> None:
-    """Bring the registers of position, velocity, load and time up to date.
-
-    Args:
-        table: of the model.
-        memory: its registers.
-        turns: of the axis, when the servo last began to count.
-        motion: of the horn.
-        now_ns: when it moves so.
-    """
+    """Update the registers of position, velocity, load and time; `turns` as in `wanted`."""
     rate = round(motion.rate_rad_s / table.velocity.unit)
     milliseconds = now_ns // 1_000_000 % 32768
     memory[table.position.address] = count_of(table, memory, turns, motion.angle_rad)

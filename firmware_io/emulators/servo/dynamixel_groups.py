@@ -33,14 +33,7 @@ def fast_size(request: Request) -> int:
 
 
 def span_for(request: Request, servo_id: int, *, two: bool, bulk: bool) -> tuple[int, int] | None:
-    """Address and length that a sync or bulk read asks of one servo; None where it asks nothing of it.
-
-    Args:
-        request: to all.
-        servo_id: of the one.
-        two: whether in protocol 2.0; sync reads are known there only.
-        bulk: whether it knows bulk reads: in protocol 1.0 the MX do, and the AX know neither.
-    """
+    """Return address and length that a sync or bulk read requests of one servo, else None; AX have neither."""
     parameters = request.parameters
     if request.instruction in (SYNC_READ, FAST_SYNC_READ):
         return span(parameters, two=two) if two and servo_id in parameters[4:] else None
@@ -56,7 +49,7 @@ def span_for(request: Request, servo_id: int, *, two: bool, bulk: bool) -> tuple
 
 
 def write_for(request: Request, servo_id: int, *, two: bool) -> tuple[int, bytes] | None:
-    """Address and data that a sync or bulk write has for one servo; None where it has none."""
+    """Address and data that a sync or bulk write has for one servo; None if it has none."""
     parameters = request.parameters
     if request.instruction == SYNC_WRITE:
         (address, size), rest = span(parameters, two=two), parameters[4 if two else 2 :]

@@ -1,7 +1,7 @@
-"""A servo without its bus: control table, instructions, motion and protection, at a time that the caller gives.
+"""Emulated Dynamixel without its bus: control table, instructions, motion and protection at given times.
 
-Not published by the maker and therefore assumed: how long a restart takes, when the overload protection trips, and
-that an AX-12A reads 0 or 1023 in its dead sector, the end that is nearer.
+Assumed, as not published: duration of a restart, threshold of the overload protection, and that an AX-12A reads 0 or
+1023 in its dead sector, the nearer one.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class DynamixelMachine(ServoMachine):
         return (34, 32, 31) if self._two else (12, 13, 11)
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
-        """Carry out a request; error byte and data of the answer, None where there is none."""
+        """Carry out a request; error byte and data of the answer, None if there is none."""
         if request.id not in (self.id, BROADCAST):
             return None
         self._spoken_ns = now_ns
@@ -91,7 +91,7 @@ class DynamixelMachine(ServoMachine):
             self._act(now_ns)
 
     def _carry_out(self, request: Request, now_ns: int) -> tuple[int | None, bytes]:
-        """Error and data of the answer; error None where there is none."""
+        """Error and data of the answer; error None if there is none."""
         level, to_all = self.memory[68 if self._two else 16], request.id == BROADCAST
         parameters = request.parameters
         if not request.intact:

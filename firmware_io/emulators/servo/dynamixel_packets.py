@@ -1,7 +1,7 @@
 """Packets as a servo sees them: requests out of a byte stream, statuses into bytes.
 
-Written from the e-manual's pages protocol1 and protocol2, and not from the SDK that the driver uses, so that each
-checks the other.
+Written from the e-manual's pages protocol1 and protocol2, not from the SDK of the driver, so that each checks the
+other.
 """
 
 from __future__ import annotations
@@ -40,10 +40,9 @@ def status(protocol: str, servo_id: int, error: int, data: bytes) -> bytes:
 
 
 def fast_status(size: int, parts: Sequence[tuple[int, int, bytes]]) -> bytes:
-    """The bytes of the one status that servos give to a fast read together: each adds its part, and none is stuffed.
+    """Return the common status of a fast read: each servo adds its part, without stuffing.
 
-    A part (of id, error and data) is sent as error, id, data and the CRC of all that went before it. `size` is that of
-    the data of all servos that were asked, with 4 bytes for each: the length stands in front.
+    A part is error, id, data and the CRC of all before it. `size`: data of all servos, with 4 bytes for each.
     """
     packet = b"\xff\xff\xfd\x00" + bytes([BROADCAST]) + (size + 1).to_bytes(2, "little") + b"\x55"
     for servo_id, error, data in parts:

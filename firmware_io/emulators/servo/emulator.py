@@ -1,8 +1,7 @@
-"""The emulator of a servo, on a pseudo-terminal: programs cannot tell it from a real one.
+"""Emulator of a servo on a pseudo-terminal, with the timing of a real one.
 
-It answers in each protocol byte by byte with their timing: bytes take their time at the baud rate, the return delay is
-kept, a client at another speed is not understood. What it answers and how it turns is
-the `ServoMachine` of its family. Faults come on demand, by methods.
+Bytes take their time at the baud rate, the return delay is kept, another baud rate is not understood. The
+`ServoMachine` of its family answers and turns. Methods cause faults.
 """
 
 from __future__ import annotations
@@ -101,11 +100,7 @@ class ServoEmulator:
             self._folder.cleanup()
 
     def set_up(self, *, spins: bool | None) -> None:
-        """Give the servo the settings of one that is ready for a scan, before a program opens the port.
-
-        Args:
-            spins: whether it turns continuously (True) or goes to angles (False); None leaves the mode as it is.
-        """
+        """Give the servo the settings of one that is ready for a scan; `spins` None leaves the mode as it is."""
         for register, count in set_up_counts(self._servo.table, round(self._servo.baud), spins=spins).items():
             self.memory[register.address] = count
 

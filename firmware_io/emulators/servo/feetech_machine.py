@@ -1,8 +1,8 @@
-"""A Feetech STS3215 without its bus: memory table, instructions, motion and protection, at a given time.
+"""Emulated Feetech STS3215 without its bus: memory table, instructions, motion and protection at given times.
 
-Not published by the maker and therefore assumed: how long a restart takes, that a damaged request is not answered, that
-values beyond their bounds are not taken, and that an overload, which leaves the torque of register 34, ends when the
-torque is taken. A goal turns the torque on: the examples of the maker's SDK move a servo without writing register 40.
+Assumed, as not published: duration of a restart; no answer to a damaged request; values out of bounds are ignored; an
+overload leaves the torque of register 34 and ends when the torque is turned off. A goal turns the torque on: the
+maker's examples move a servo without writing register 40.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class FeetechMachine(ServoMachine):
         return [feetech_packets.status(*one) for one in answers]
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
-        """Carry out a request; status byte and data of the answer, None where there is none."""
+        """Carry out a request; status byte and data of the answer, None if there is none."""
         if request.id not in (self.id, BROADCAST) or not request.intact:
             return None
         parameters, to_all = request.parameters, request.id == BROADCAST

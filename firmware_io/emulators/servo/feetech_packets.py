@@ -1,6 +1,6 @@
 """Packets of the STS as the servo sees them: requests out of a byte stream, statuses into bytes.
 
-Written from the table of frames in Feetech's protocol manual, and not from the driver's, so that each checks the other.
+Written from Feetech's protocol manual, not from the driver, so that each checks the other.
 """
 
 from __future__ import annotations

@@ -43,9 +43,6 @@ class ServoMachine(ABC):
     """A servo with power and without its bus, at a time that the caller gives.
 
     Attributes:
-        table: what the driver knows of the model.
-        memory: the control table, as on the wire.
-        axis: the true motion of the horn.
         forgets_ns: the pause after which it forgets the beginning of a request that did not go on; assumed.
     """
 
@@ -54,9 +51,9 @@ class ServoMachine(ABC):
     def __init__(
         self, table: ControlTable, items: Iterable[TableItem], load: Load, time_ns: int, angle_rad: float
     ) -> None:
-        self.table = table
-        self.memory = Memory({item.address: item for item in items}, table.ram)
-        self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)
+        self.table = table  # what the driver knows of the model
+        self.memory = Memory({item.address: item for item in items}, table.ram)  # the control table, as on the wire
+        self.axis = HornMotion(plant_of(table.model), load, time_ns, angle_rad=angle_rad)  # the true motion of the horn
         self._rated_v = load_catalogue().get(table.model, Servo).rated_v
         self._supply = 1.0
         self._hot_degC = _USUAL_DEGC
@@ -96,7 +93,7 @@ class ServoMachine(ABC):
 
     @abstractmethod
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
-        """Carry out a request; error byte and data of the answer, None where there is none."""
+        """Carry out a request; error byte and data of the answer, None if there is none."""
 
     @abstractmethod
     def in_turn(self, request: Request) -> tuple[int, ...] | None:

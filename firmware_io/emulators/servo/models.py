@@ -11,18 +11,7 @@ from scanwright.firmware_io.servo.families import all_families, all_tables
 
 
 def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> ServoMachine:
-    """A servo with power.
-
-    Args:
-        model: name, as in the catalogue.
-        protocol: as its maker calls it; None for the one that the model has from the factory.
-        load: what hangs on the horn.
-        time_ns: now.
-        angle_rad: of the horn.
-
-    Raises:
-        DeviceError: there is no such emulator.
-    """
+    """Return an emulated servo with power; `protocol` None: that from the factory. DeviceError if there is none."""
     for family in all_families().values():
         for table in family.tables:
             if table.model == model and protocol in (None, table.protocol):

@@ -1,4 +1,4 @@
-"""A TiM or LMS1xx in software: requests in, answers out, turn after turn, at times that somebody else tells."""
+"""Emulator of a TiM or LMS1xx: requests, answers and scans at given times."""
 
 from __future__ import annotations
 
@@ -22,12 +22,14 @@ _BOOT_NS = 1_000_000_000  # [assumed]
 _HEAD = 100  # bytes of a telegram before its ranges
 # of the access levels, from the factory; telegram listing 8014631
 _PASSWORDS = {2: 0xB21ACE26, 3: 0xF4724744, 4: 0x81BE23AA}
+_CLIENT = 3  # the least level for writing and for starting; telegram listing 8014631
 # values of its filters, and those that leave the ranges as they are; telegram listing 8014631
 _FILTERS: dict[str, tuple[Kind, ...]] = {
     "FREchoFilter": ("u8",),
     "LFPmeanfilter": ("u8", "u16", "u8"),
     "LFPparticle": ("u8", "u16"),
 }
+_FIELDS = [f"{number:03}" for number in range(30)]  # of an LMS1xx; sick_scan_xd reads so many
 _FILTERS_OFF = {"FREchoFilter": [2], "LFPmeanfilter": [0, 10, 0], "LFPparticle": [0, 500]}
 _ACCESS_DENIED, _UNKNOWN_METHOD, _UNKNOWN_VARIABLE, _INVALID = 1, 2, 3, 5
 
@@ -45,48 +47,40 @@ class SickMachine:
     """The state of one sensor.
 
     Attributes:
-        lidar: which model.
-        ranging: what it sees.
-        began_ns: true time at which its clock showed `clock_us`.
-        clock_us: what it showed then.
-        rate_error: of its clock, 5e-5 is 50 ppm fast.
-        stamps_end: its scan time is that of the last beam's end, as a TiM's, not of the first beam.
-        status: second status byte of its scans: 2 dirt warning, 5 dirt error, 1 fault.
-        busy_until_ns: it says so until then.
-        silent_until_ns: it says nothing until then.
-        dialects: those that it understands; True is CoLa B.
-        run_tenth_h: how long it has run, tenths of an hour.
-        starts: how often it was switched on.
-        refusals: codes with which it refuses what it is asked next, one each.
-        filters: values that were set, by name.
-        scanning: what it tells scans; None where nobody asked.
+        stamps_end: its scan time is that of the last beam's end, not of the first beam; None for that of its model.
+        setting: scan rate, 0.01 Hz, and step, 1e-4 deg, that it reports; scans always have those of the catalogue.
     """
 
-    lidar: Lidar
-    ranging: Ranging
-    began_ns: int
-    clock_us: int = 0
-    rate_error: float = 0.0
-    stamps_end: bool = False
-    status: int = 0
-    busy_until_ns: int = 0
-    silent_until_ns: int = 0
-    dialects: tuple[bool, ...] = (True, False)
-    refusals: list[int] = field(default_factory=list)
-    filters: dict[str, list[float]] = field(default_factory=dict)
+    lidar: Lidar  # which model
+    ranging: Ranging  # its surroundings
+    began_ns: int  # true time at which its clock showed `clock_us`
+    clock_us: int = 0  # clock at that time
+    rate_error: float = 0.0  # of its clock, 5e-5 is 50 ppm fast
+    stamps_end: bool | None = None
+    status: int = 0  # second status byte of its scans: 2 dirt warning, 5 dirt error, 1 fault
+    busy_until_ns: int = 0  # reports busy until then
+    silent_until_ns: int = 0  # silent until then
+    dialects: tuple[bool, ...] = (True, False)  # dialects understood; True is CoLa B
+    refusals: list[int] = field(default_factory=list)  # error codes for the next requests, one each
+    filters: dict[str, list[float]] = field(default_factory=dict)  # values that were set, by name
+    without: tuple[str, ...] = ()  # variables that this firmware does not have
     serial_number: int = 18_030_000
-    run_tenth_h: int = 6641
-    starts: int = 597
-    scanning: _Scanning | None = None
+    run_tenth_h: int = 6641  # how long it has run, tenths of an hour
+    starts: int = 597  # number of starts
+    scanning: _Scanning | None = None  # client and next turn; None if not requested
     intensity: bool = False
     interval: int = 1
     measuring: bool = False
     _level: int = 0
     _telegrams: int = 0
-    _scan_rate: int = field(init=False)
+    setting: tuple[int, int] = (0, 0)
+    _output: list[int] = field(default_factory=lambda: [1, *[0] * 10, 1])
 
     def __post_init__(self) -> None:
-        self._scan_rate = round(self.lidar.scan_rate_hz * 100)
+        own = round(self.lidar.scan_rate_hz * 100), self._angles()[1]
+        self.setting = self.setting if any(self.setting) else own
+        if self.stamps_end is None:
+            self.stamps_end = self.lidar.name.startswith("TiM")  # captures of TiM55x and TiM56x; LMS100, LMS511
 
     @property
     def period_ns(self) -> float:
@@ -193,6 +187,8 @@ class SickMachine:
         answers = {b"sRN": "sRA", b"sWN": "sWA", b"sMN": "sAN", b"sEN": "sEA"}
         if word not in answers:
             return _refused(request, _UNKNOWN_METHOD)
+        if name in self.without:
+            return _refused(request, _UNKNOWN_VARIABLE)
         out = Writer(f"{answers[word]} {name}", binary=request.binary)
         match word, name:
             case b"sRN", "DeviceIdent":
@@ -204,22 +200,36 @@ class SickMachine:
             case b"sRN", "ODpwrc":
                 return out.number("u32", self.starts).telegram()
             case b"sRN", "SCdevicestate":
-                return out.number("u8", int(self.measuring and now_ns >= self.busy_until_ns)).telegram()
+                return out.number("u8", int(now_ns >= self.busy_until_ns)).telegram()
             case b"sRN", "FirmwareVersion":
                 return out.text("V1.00").telegram()
             case b"sRN", "LocationName":
                 return out.text("not defined").telegram()
             case b"sRN" | b"sWN", "FREchoFilter" | "LFPmeanfilter" | "LFPparticle":
                 return self._filter(request, name, values, out)
-            case b"sRN", "LMPoutputRange":
-                start, step = self._angles()
-                return out.number("u16", 1).number("u32", step).numbers("i32", [start, start + self._span]).telegram()
+            case b"sRN" | b"sWN", "LMPoutputRange":
+                return self._output_range(request, values, out)
+            case b"sRN", "LMDscandatacfg":
+                return out.numbers("u8", self._output[:11]).number("u16", self._output[11]).telegram()
+            case b"sWN", "EIHstCola":  # both dialects are understood all the same
+                values.number("u8")
+                return self._for_clients(request, out)
+            case b"sRN", "LIDinputstate":
+                return (
+                    out.number("u16", 0)
+                    .number("u32", self._us(now_ns))
+                    .numbers("u8", [0] * 4)
+                    .number("u16", 0)
+                    .telegram()
+                )
+            case b"sRN", _ if name[:5] == "field" and name[5:] in _FIELDS and self.lidar.name.startswith("LMS"):
+                return self._field(int(name[5:]), out)
             case b"sEN", "LIDinputstate" | "LIDoutputstate" | "LFErec":  # events, of which none happens
                 return out.number("u8", values.number("u8")).telegram()
             case b"sRN", "LMPscancfg":
-                start, step = self._angles()
-                out.number("u32", self._scan_rate).number("u16", 1).number("u32", step)
-                return out.numbers("i32", [start, start + self._span]).telegram()
+                return self._scan_setting(out, *self.setting)
+            case b"sMN", "mLMPsetscancfg" if self.lidar.name.startswith("LMS"):
+                return self._set_scan(request, values, out)
             case b"sMN", "SetAccessMode":
                 level = values.number("u8")
                 self._level = level if _PASSWORDS.get(level) == values.number("u32") else 0
@@ -241,14 +251,49 @@ class SickMachine:
         if request.word == b"sRN":
             for kind, value in zip(kinds, self.filters.get(name, _FILTERS_OFF[name]), strict=True):
                 out.number(kind, value)
-        elif not self._level:
+        elif self._level < _CLIENT:
             return _refused(request, _ACCESS_DENIED)
         else:
             self.filters[name] = [values.number(kind) for kind in kinds]
         return out.telegram()
 
+    def _for_clients(self, request: Telegram, out: Writer) -> Telegram:
+        """The answer, or its refusal below the level of an authorized client."""
+        return _refused(request, _ACCESS_DENIED) if self._level < _CLIENT else out.telegram()
+
+    def _output_range(self, request: Telegram, values: Reader, out: Writer) -> Telegram:
+        """Angles of the first and last beam that are sent; only the whole field can be set here."""
+        start, step = self._angles()
+        if request.word == b"sRN":
+            return out.number("u16", 1).number("u32", step).numbers("i32", [start, start + self._span]).telegram()
+        values.number("u16")
+        wanted = [values.number("u32"), *values.numbers("i32", 2)]
+        if max(abs(one - had) for one, had in zip(wanted, [step, start, start + self._span], strict=True)) > step:
+            return _refused(request, _INVALID)
+        return self._for_clients(request, out)
+
+    def _scan_setting(self, out: Writer, rate: int, step: int) -> Telegram:
+        start = self._angles()[0]
+        out.number("u32", rate).number("u16", 1).number("u32", step)
+        return out.numbers("i32", [start, start + self._span]).telegram()
+
+    def _set_scan(self, request: Telegram, values: Reader, out: Writer) -> Telegram:
+        """Set rate and step, if they are those of the catalogue; codes of LMS500 instructions 8013796."""
+        if self._level < _CLIENT:
+            return _refused(request, _ACCESS_DENIED)
+        rate, _, step = values.number("u32"), values.number("u16"), values.number("u32")
+        code = (rate != round(self.lidar.scan_rate_hz * 100)) + 2 * (abs(step - self._angles()[1]) > 1)
+        self.setting = self.setting if code else (rate, step)
+        return self._scan_setting(out.number("u8", code), *self.setting)
+
+    def _field(self, number: int, out: Writer) -> Telegram:
+        """An evaluation field without points, in the layout of sick_scan_xd's test server."""
+        start, step = self._angles()
+        out.number("f32", 1).number("f32", 0).number("u32", step).number("i32", start).numbers("u8", [2, number + 1])
+        return out.numbers("u16", [1, 0, 0, 0, 0, 1]).text(f"Field{number + 1:03}").number("u16", 0).telegram()
+
     def _method(self, request: Telegram, name: str, out: Writer) -> Telegram:
-        if not self._level:
+        if self._level < _CLIENT:
             return _refused(request, _ACCESS_DENIED)
         if name == "Run":  # it ends the login
             self._level = 0
@@ -257,10 +302,10 @@ class SickMachine:
         return out.number("u8", 0).telegram()
 
     def _configured(self, request: Telegram, values: Reader, out: Writer) -> Telegram:
-        if not self._level:
+        if self._level < _CLIENT:
             return _refused(request, _ACCESS_DENIED)
-        settings = values.numbers("u8", 11)
-        self.intensity, self.interval = bool(settings[2]), max(values.number("u16"), 1)
+        self._output = [*values.numbers("u8", 11), values.number("u16")]
+        self.intensity, self.interval = bool(self._output[2]), max(self._output[11], 1)
         return out.telegram()
 
 

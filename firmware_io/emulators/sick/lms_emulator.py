@@ -1,4 +1,7 @@
-"""An LMS 200 or LMS 291 in software. Written from documents; what nobody found described is marked [assumed]."""
+"""An LMS 200 or LMS 291 in software. Written from documents; what no document describes is marked [assumed].
+
+Source of modes, status (31) and configuration (74, 77): SickLMS2xx.cc of sicktoolbox.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,10 @@ from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 _NEVER_NS = 1 << 62  # 146 years
 _BOOT_NS = 1_000_000_000  # [assumed]; a real one takes up to a minute until its motor is steady
 _TURN_NS = 1e9 / 75  # of its mirror
-_MODES = (0x24, 0x25, 0x40, 0x41, 0x42, 0x48)  # of the command 0x20 that it knows
+_MODES = (0x24, 0x25, 0x40, 0x41, 0x42, 0x48)  # of the command 0x20 that it knows, without a password
+_INSTALLATION, _PASSWORD = 0, b"SICK_LMS"
+_CONFIGURATION = 34  # bytes
+_STATUS = 152  # bytes of its answer to 0x31
 _BAUDS = {0x40: 38_400, 0x41: 19_200, 0x42: 9600, 0x48: 500_000}  # by mode
 _HEAD = 8  # bytes of a telegram before its ranges
 _NO_RANGE = 0x1FFF  # code: too far
@@ -43,25 +49,22 @@ class LmsMachine:
     """The state of one sensor; times are true ones.
 
     Attributes:
-        lidar: of the catalogue.
-        ranging: what it sees.
-        began_ns: when it got its power.
-        millimetres: whether it tells ranges in them, up to 8 m, and not in centimetres.
         status: that its answers end with.
-        rate_error: its motor turns this part too fast.
     """
 
-    lidar: Lidar
-    ranging: Ranging
-    began_ns: int
-    millimetres: bool = True
+    lidar: Lidar  # of the catalogue
+    ranging: Ranging  # its surroundings
+    began_ns: int  # when it got its power
+    millimetres: bool = True  # unit of its ranges: millimetres (up to 8 m), else centimetres
     status: int = 0x10  # [assumed] bits without a meaning to us
-    rate_error: float = 1e-3
+    rate_error: float = 1e-3  # its motor turns this part too fast
 
     def __post_init__(self) -> None:
         self.scanning: object | None = None
         self.baud = 9600
-        self._step_centideg = 100
+        self.configuration = bytes([0, 0, 70, 0, 1, 0, int(self.millimetres), *[0] * (_CONFIGURATION - 7)])
+        self._mode = 0x25
+        self._field_deg, self._step_centideg = 180, 100
         self._number = 0
 
     @property
@@ -102,7 +105,8 @@ class LmsMachine:
 
     def next_packets(self) -> list[tuple[int, bytes]]:
         """The telegram of the next turns: beams between the degrees are measured in the turns after the first."""
-        bearing_rad = np.radians(np.arange(0, 18_001, self._step_centideg) / 100 - 90)
+        half_centideg = 50 * self._field_deg
+        bearing_rad = np.radians(np.arange(-half_centideg, half_centideg + 1, self._step_centideg) / 100)
         turn = np.arange(bearing_rad.size) % self.turns
         since_ns = (turn + (bearing_rad + np.pi / 2) / (2 * np.pi)) * _TURN_NS
         time_ns = self.began_ns + np.rint(self._number * self.period_ns + since_ns).astype(np.int64)
@@ -126,28 +130,57 @@ class LmsMachine:
     def power_cycle(self, now_ns: int) -> None:
         """At 9600 baud, silent for as long as it starts; its variant is gone."""
         self.began_ns = now_ns + _BOOT_NS
-        self.scanning, self.baud, self._step_centideg = None, 9600, 100
+        self.scanning, self.baud, self._mode = None, 9600, 0x25
+        self._field_deg, self._step_centideg = 180, 100
 
     def _answer(self, request: bytes, now_ns: int) -> bytes:
         match request[0]:
+            case 0x20 if request[1:2] == bytes([_INSTALLATION]):
+                known = request[2:] == _PASSWORD
+                self._mode = _INSTALLATION if known else self._mode
+                return bytes([0xA0, not known])
             case 0x20 if len(request) == 2 and request[1] in _MODES:
                 if request[1] in _BAUDS:
                     self.baud = _BAUDS[request[1]]
                 else:
+                    self._mode = request[1]
                     self.scanning = object() if request[1] == 0x24 else None
                     self._number = max(math.ceil((now_ns - self.began_ns) / self.period_ns), 0)
                 return b"\xa0\x00"
             case 0x31:
-                return b"\xb1" + b"V02.30 " + bytes(20)  # [assumed] what else it holds
+                return self._status()
+            case 0x32:
+                return b"\xb2"  # no errors
+            case 0x74:
+                return b"\xf4" + self.configuration
+            case 0x77 if len(request) == 1 + _CONFIGURATION:
+                if done := self._mode == _INSTALLATION:
+                    self.configuration = request[1:]
+                    self.millimetres = bool(self.configuration[6])
+                return bytes([0xF7, done]) + self.configuration
             case 0x3A:
                 return b"\xba" + self.lidar.name.replace(" ", "").encode() + b";30106;V02.30"
             case 0x3B if len(request) == 5:
                 angle_deg, step_centideg = struct.unpack("<HH", request[1:])
-                known = angle_deg == 180 and step_centideg in (50, 100)  # a quarter of a degree: within 100 deg only
+                known = (angle_deg in (100, 180) and step_centideg in (50, 100)) or (angle_deg, step_centideg) == (
+                    100,
+                    25,
+                )
                 if known:
-                    self._step_centideg = step_centideg
+                    self._field_deg, self._step_centideg = angle_deg, step_centideg
                 return b"\xbb" + struct.pack("<BHH", int(known), angle_deg, step_centideg)
         return b""
+
+    def _status(self) -> bytes:
+        """The answer to a request for the status; what else it holds is 0 [assumed]."""
+        status = bytearray(_STATUS)
+        status[0:8] = b"\xb1V02.30 "
+        status[8] = self._mode
+        status[107:111] = struct.pack("<HH", self._field_deg, self._step_centideg)
+        status[116:118] = (0x8000 + round(1e6 / self.baud)).to_bytes(2, "little")  # [assumed]
+        status[122], status[123] = self.configuration[6], 1
+        status[124:131] = b"V01.10 "
+        return bytes(status)
 
 
 def lms_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarLine[LmsMachine]:

@@ -1,6 +1,6 @@
-"""RPLIDARs in software: requests in, descriptors and streams out, from a motor that spins up and wanders.
+"""Emulator of RPLIDARs: requests, descriptors and streams, with a motor that spins up and wanders.
 
-Written from the maker's protocol manual and SDK; what no source describes is marked [assumed].
+Written from the maker's protocol manual and SDK; what they lack is marked [assumed].
 """
 
 from __future__ import annotations
@@ -39,21 +39,13 @@ _OFFSET_WITHIN_DEG = 0.1  # between two estimates of it; at edges there is none,
 
 @dataclass
 class SlamtecMachine:
-    """The state of one sensor; times are true ones.
+    """The state of one sensor; times are true ones."""
 
-    Attributes:
-        lidar: of the catalogue.
-        ranging: what it sees.
-        began_ns: when it got its power.
-        points_error: it measures this part faster than it states.
-        health: 0 good, 1 a warning, 2 a fault.
-    """
-
-    lidar: Lidar
-    ranging: Ranging
-    began_ns: int
-    points_error: float = 0.0
-    health: int = 0
+    lidar: Lidar  # of the catalogue
+    ranging: Ranging  # its surroundings
+    began_ns: int  # when it got its power
+    points_error: float = 0.0  # it measures this part faster than it states
+    health: int = 0  # 0 good, 1 a warning, 2 a fault
 
     def __post_init__(self) -> None:
         self.identity = IDENTITIES[self.lidar.name]

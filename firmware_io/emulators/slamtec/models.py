@@ -19,19 +19,12 @@ _RPM, _PWM = 600, 660  # [assumed]: the SDK's defaults
 
 @dataclass(frozen=True, slots=True)
 class ScanMode:
-    """One of its modes.
+    """One of its modes."""
 
-    Attributes:
-        name: as the sensor states it.
-        kind: type of its packets.
-        point_us: time between two points.
-        range_m: longest range.
-    """
-
-    name: str
-    kind: int
-    point_us: float
-    range_m: float
+    name: str  # as the sensor states it
+    kind: int  # type of its packets
+    point_us: float  # time between two points
+    range_m: float  # longest range
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,22 +32,16 @@ class SlamtecIdentity:
     """A model.
 
     Attributes:
-        model: byte of INFO; its upper half is the series.
-        baud: of its line.
         motor: what starts the motor: a scan, the duty cycle of an accessory board, or a speed command.
-        modes: by number; empty for firmware before 1.24, which does not answer GET_CONF.
-        typical: number of the mode that the maker's programs choose.
-        legacy: the mode of EXPRESS_SCAN with number 0.
-        firmware: major and minor version.
     """
 
-    model: int
-    baud: int
+    model: int  # byte of INFO; its upper half is the series
+    baud: int  # of its line
     motor: Literal["scan", "pwm", "rpm"]
-    modes: tuple[ScanMode, ...]
-    typical: int
-    legacy: ScanMode
-    firmware: tuple[int, int] = (1, 29)
+    modes: tuple[ScanMode, ...]  # by number; empty for firmware before 1.24, which does not answer GET_CONF
+    typical: int  # number of the mode that the maker's programs choose
+    legacy: ScanMode  # the mode of EXPRESS_SCAN with number 0
+    firmware: tuple[int, int] = (1, 29)  # major and minor version
 
     @property
     def usual(self) -> ScanMode:

@@ -1,7 +1,6 @@
-"""An LDROBOT lidar on a serial line: it talks from power-up on, and hears nothing, so nothing is started or stopped.
+"""LDROBOT lidar on a serial line. It sends from power-up and accepts no commands, so nothing is started or stopped.
 
-It tells neither its model nor a number. Points per second tell the LD06 and LD19 from the STL27L; whether it is the one
-or the other of the first two nobody can tell.
+It reports no model or serial number. Its points per second tell the STL27L from the LD06 and LD19, which are alike.
 """
 
 from __future__ import annotations
@@ -34,9 +33,9 @@ _STAMPS = 64  # packets over which the sensor's milliseconds are evened out
 
 
 class _PacketClock:
-    """The sensor's time of each packet, finer than its stamps: packets follow each other evenly.
+    """Sensor time of each packet, finer than its timestamps because packets are evenly spaced.
 
-    Times drift by what the mean over few stamps leaves unknown, so a line through arrivals needs those of many stamps.
+    Times drift by the error of the mean over few stamps, so a line through arrivals needs many.
     """
 
     def __init__(self, period_ms: float) -> None:
@@ -51,13 +50,7 @@ class _PacketClock:
         return len(self._begin) == _STAMPS
 
     def sensor_ns(self, stamp_ms: int, lost: int, arrival_ns: int) -> float:
-        """Time of the last point of a packet; NaN where the sensor's clock began anew.
-
-        Args:
-            stamp_ms: as it came.
-            lost: packets before it that did not come, by their angles.
-            arrival_ns: when it came.
-        """
+        """Return the time of a packet's last point, NaN if the clock restarted; `lost`: packets before it."""
         last_ms, last_ns = self._last
         step_ms = (stamp_ms - last_ms) % protocol.STAMP_WRAP_MS
         elapsed_ms = (arrival_ns - last_ns) / 1e6
@@ -76,7 +69,7 @@ class _PacketClock:
 class LdrobotLidar(LineDriver):
     """An LDROBOT lidar, which tells no serial number and no version."""
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Listen to it; without a model of the catalogue it is the first whose speed of measuring fits."""
         self.address = address
         self._bad_before = 0
@@ -118,12 +111,12 @@ class LdrobotLidar(LineDriver):
         return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
 
     def _find(self) -> None:
-        """Listen again where it was."""
+        """Open the same port again."""
         self._line.reopen()
         self._lidar = self._recognised(self.model)
 
     def _recognised(self, model: str | None) -> Lidar:
-        """Hear who talks, at whatever speed; the line is closed where nobody does."""
+        """Find the model and baud rate of the sensor that sends; close the line if none does."""
         products = [product for product in load_catalogue() if isinstance(product, Lidar) and product.name in _BAUDS]
         named = [product for product in products if model in (None, product.name)]
         self._bad_before = self.bad_packets
@@ -147,7 +140,7 @@ class LdrobotLidar(LineDriver):
             raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor answers; check power, cable and port")
 
     def _points_s(self) -> float | None:
-        """Points per second by angles and speed; None where nothing talks."""
+        """Points per second by angles and speed; None if nothing talks."""
         deadline_s = time.monotonic() + _FIRST_PACKETS_S
         rates: list[float] = []
         while len(rates) < _FIRST:

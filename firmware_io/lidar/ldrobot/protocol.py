@@ -29,23 +29,14 @@ _POINT = np.dtype([("range_mm", "<u2"), ("intensity", "u1")])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LdrobotPacket:
-    """What one packet tells.
+    """Content of one packet."""
 
-    Attributes:
-        speed_deg_s: of the motor.
-        angle_deg: of each point, clockwise from the front, 0 to 360, shape (12,).
-        step_deg: from one point to the next.
-        range_m: shape (12,), NaN where nothing came back.
-        intensity: shape (12,).
-        stamp_ms: the sensor's time.
-    """
-
-    speed_deg_s: int
-    angle_deg: Float64[ndarray, " 12"]
-    step_deg: float
-    range_m: Float32s
-    intensity: Float32s
-    stamp_ms: int
+    speed_deg_s: int  # of the motor
+    angle_deg: Float64[ndarray, " 12"]  # of each point, clockwise from the front, 0 to 360, shape (12,)
+    step_deg: float  # from one point to the next
+    range_m: Float32s  # shape (12,), NaN without a return
+    intensity: Float32s  # shape (12,)
+    stamp_ms: int  # the sensor's time
 
 
 def _table() -> bytes:
@@ -91,7 +82,7 @@ def packet(data: bytes) -> LdrobotPacket:
 
 
 class LdrobotSplitter:
-    """Cuts packets out of a stream, whatever is between them.
+    """Cuts packets out of a stream, and skips other bytes.
 
     Attributes:
         bad: packets that were lost to something else: one for each run of bytes that are none, and for each further 47.

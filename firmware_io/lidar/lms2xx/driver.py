@@ -1,8 +1,7 @@
-"""A SICK LMS 200 or LMS 291 on its serial line: a field of 180 deg, interlaced from two turns of its mirror.
+"""SICK LMS 200 or LMS 291 on its serial line, with a field of 180 deg.
 
-A telegram holds whole and half degrees, which it measures in two turns, one after the other: each is handed out as a
-scan of its own. It has no clock that it tells: telegrams follow each other evenly, and counting them is the clock.
-Written from documents; no sensor has been at the other end yet.
+A telegram holds whole and half degrees, measured in two consecutive turns; each turn becomes one scan. The sensor sends
+no timestamps: telegrams are evenly spaced, and their count is the clock. Written from documents, not tried on a sensor.
 """
 
 from __future__ import annotations
@@ -37,8 +36,8 @@ _PATIENCE = 8  # telegrams: a fifth of a second
 class LmsLidar(LineDriver):
     """An LMS 2xx, which tells no serial number."""
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
-        """Open it and stop its stream; `model` is a name of the catalogue, None for the one that it gives itself."""
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
+        """Open it and stop its stream; `model`: catalogue name, or None for the reported one."""
         self.address = address
         self._bad_before = self._bad_scans = 0
         self._splitter = protocol.LmsSplitter()
@@ -61,7 +60,7 @@ class LmsLidar(LineDriver):
 
     @property
     def bad_packets(self) -> int:
-        """Telegrams that were thrown away."""
+        """Telegrams dropped."""
         return self._bad_before + self._bad_scans + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
@@ -102,7 +101,7 @@ class LmsLidar(LineDriver):
         self._mode(protocol.ON_REQUEST)
 
     def _find(self) -> None:
-        """Open it again where it was."""
+        """Open the same port again."""
         self._line.reopen()
         before = self._baud_before
         # the plug was out, and it streams on, or the power was; to look for it at all four costs a second more
@@ -117,7 +116,7 @@ class LmsLidar(LineDriver):
             return bool(self._line.stream.read(_STREAM_S))
 
     def _recognise(self, model: str | None, bauds: tuple[int, ...]) -> None:
-        """Stop its stream, at one of these speeds, and hear who it is; the line is closed where no one answers."""
+        """Stop its stream at one of these baud rates and read its type; close the line if none answers."""
         self._bad_before += self._splitter.bad
         self._splitter = protocol.LmsSplitter()
         with self._line.closed_on_error():

@@ -1,12 +1,10 @@
-"""Telegrams of SICK's LMS 2xx, as pure functions of bytes; no port, no clock. Numbers are little-endian.
+"""Telegrams of SICK's LMS 2xx as pure functions of bytes. Numbers are little-endian.
 
     request   02  00  length  command values  crc          length: of command and values
     answer    06  02  80  length  command + 80  values  status  crc
 
-Written from documents: SICK's telegram listing as users of it cite it, and the frames and checksum of the program
-sicktoolbox. Nobody has compared it with a sensor here.
-
-Bytes that mean something else raise ProtocolError.
+Sources: SICK's telegram listing as its users cite it, and sicktoolbox; not compared with a sensor.
+Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -37,17 +35,11 @@ _FIRST_CODE = 0x1FF7  # what is not less is no range: too far, dazzled, too weak
 
 @dataclass(frozen=True, slots=True)
 class LmsTelegram:
-    """One checked telegram.
+    """One checked telegram."""
 
-    Attributes:
-        address: 0 to a sensor, 80 from one that stands alone.
-        command: what is asked or answered.
-        values: what follows it; of an answer the last byte is the sensor's status.
-    """
-
-    address: int
-    command: int
-    values: bytes
+    address: int  # 0 to a sensor, 80 from one that stands alone
+    command: int  # what is asked or answered
+    values: bytes  # what follows it; of an answer the last byte is the sensor's status
 
     @property
     def status(self) -> int:
@@ -57,15 +49,10 @@ class LmsTelegram:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LmsScan:
-    """The ranges of one telegram.
+    """The ranges of one telegram."""
 
-    Attributes:
-        range_m: NaN where nothing came back, shape (n,), in order of bearing.
-        status: of the sensor, see FATAL and POLLUTED.
-    """
-
-    range_m: Float32[ndarray, " n"]
-    status: int
+    range_m: Float32[ndarray, " n"]  # NaN without a return, shape (n,), in order of bearing
+    status: int  # of the sensor, see FATAL and POLLUTED
 
 
 def crc16(data: bytes) -> int:
@@ -90,7 +77,7 @@ def variant(angle_deg: int, step_centideg: int) -> bytes:
 
 
 def accepted_variant(reply: LmsTelegram) -> tuple[int, int] | None:
-    """Field [deg] and step [0.01 deg] that it has now; None where it refuses."""
+    """Field [deg] and step [0.01 deg] that it has now; None if it refuses."""
     if reply.command != VARIANT | ANSWER or len(reply.values) != 6:
         raise ProtocolError(f"LMS 2xx: {len(reply.values)} bytes about its variant, not 6")
     done, angle_deg, step_centideg, _ = struct.unpack("<BHHB", reply.values)
@@ -113,14 +100,10 @@ def scan(reply: LmsTelegram) -> LmsScan:
 
 
 class LmsSplitter:
-    """Cuts telegrams out of a stream, whatever is between them.
-
-    Attributes:
-        bad: runs of bytes that were nothing; what says only that a request came is none.
-    """
+    """Cuts telegrams out of a stream, and skips other bytes."""
 
     def __init__(self) -> None:
-        self.bad = 0
+        self.bad = 0  # runs of bytes that were nothing; what says only that a request came is none
         self._rest = b""
         self._lost = False
 
@@ -157,7 +140,7 @@ class LmsSplitter:
 
 
 def _announced(head: bytes) -> int | None:
-    """Bytes of the telegram that begins so, as far as it is known; None where none does."""
+    """Bytes of the telegram that begins so, as far as it is known; None if none does."""
     if head[0] != _STX:
         return None
     if len(head) < 4:

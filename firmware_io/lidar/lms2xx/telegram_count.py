@@ -17,18 +17,12 @@ class TelegramCount:
 
     Attributes:
         arrivals: the sensor's time, told by the count, on the host's clock.
-        lost: telegrams that are missing between those that came.
+        lost: missing telegrams between those received.
         pause_s: of the reader, after which the count cannot be trusted: it needs `resume`.
     """
 
     def __init__(self, period_ns: float, telegram_ns: int, patience: int) -> None:
-        """Nothing came yet.
-
-        Args:
-            period_ns: from telegram to telegram.
-            telegram_ns: that one takes on the line.
-            patience: telegrams after which one that is late is believed to be behind lost ones.
-        """
+        """`patience`: telegrams after which a late one is taken to follow lost ones."""
         self.lost = 0
         self._period_ns, self._telegram_ns, self._patience = period_ns, telegram_ns, patience
         self.pause_s = _PAUSE * max(period_ns, telegram_ns) / 1e9
@@ -62,10 +56,10 @@ class TelegramCount:
         return known
 
     def _numbers(self) -> list[int]:
-        """Of the telegrams that are held: each is one more than that before, more where some were lost between.
+        """Return the numbers of the held telegrams; gaps are lost ones.
 
-        Which number fits an arrival says the line; but one that comes late, with others close behind it, looks as if
-        some had been lost before it. As none comes early, the least that any of those behind it allows is right.
+        The line gives the number that fits an arrival. A late telegram with others close behind looks as if some were
+        lost before it. None comes early, so the smallest number that a later one allows is right.
         """
         least = [self._number + 1 + k for k in range(len(self._pending))]
         if not self._number:

@@ -1,7 +1,4 @@
-"""Questions to a SCIP lidar and what it answers, at whatever speed and in whatever version it listens.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Requests to a SCIP lidar and its replies, at any baud rate and in SCIP 1.1 or 2.0."""
 
 from __future__ import annotations
 
@@ -22,21 +19,17 @@ _FASTER_BAUDS = (250_000, 500_000, 750_000)  # SCIP 2.0, request SS
 
 
 class ScipDialogue:
-    """The talk with one sensor; it is opened with its laser put out.
-
-    Attributes:
-        line: that it goes over.
-    """
+    """Dialogue with one sensor; it is opened with its laser put out."""
 
     def __init__(self, address: str) -> None:
         """Open the port and put the laser out, whatever the sensor is doing."""
-        self.line = SensorLine(address, protocol.LONGEST_REPLY)
+        self.line = SensorLine(address, protocol.LONGEST_REPLY)  # to the sensor
         self._bad_before = 0
         self._begin()
 
     @property
     def bad(self) -> int:
-        """Replies that were thrown away: wrong sums, cut or merged lines."""
+        """Replies dropped: wrong sums, cut or merged lines."""
         return self._bad_before + self._splitter.bad
 
     def reopen(self, address: str) -> None:
@@ -46,12 +39,7 @@ class ScipDialogue:
         self._begin()
 
     def ask(self, request: bytes, timeout_s: float | None = None) -> protocol.Reply:
-        """The reply to a request.
-
-        Raises:
-            DeviceTimeoutError: none came.
-            DeviceError: the sensor is gone.
-        """
+        """Return the reply to a request; raises DeviceTimeoutError if none comes."""
         return self.ask_timed(request, timeout_s)[0]
 
     def ask_timed(self, request: bytes, timeout_s: float | None = None) -> tuple[protocol.Reply, int]:
@@ -78,12 +66,7 @@ class ScipDialogue:
         return self._waiting.popleft()
 
     def speed_up(self, bytes_s: float, without_speed: Callable[[], Iterable[str]]) -> None:
-        """Let a sensor on a real serial line talk fast enough for its scans, where sensor and adapter can.
-
-        Args:
-            bytes_s: of its scans.
-            without_speed: ports that are the sensors' own USB.
-        """
+        """Raise the baud rate for `bytes_s`, if sensor and adapter can; not on the ports `without_speed`."""
         port = self.line.serial
         if port is None or self.line.address in without_speed():
             return

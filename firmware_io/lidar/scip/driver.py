@@ -1,8 +1,8 @@
-"""A Hokuyo lidar on a serial port, USB or Ethernet: it scans on, and says what it saw and when that arrived.
+"""Hokuyo lidar on a serial port, USB or Ethernet.
 
 with ScipLidar("/dev/ttyACM0") as lidar:
     lidar.start(intensity=True)
-    scan = lidar.read().scan    # its times are the host's
+    scan = lidar.read().scan    # on the host's clock
 """
 
 from __future__ import annotations
@@ -30,9 +30,7 @@ class ScipLidar(LineDriver):
     """A SCIP lidar.
 
     Attributes:
-        parameters: steps, ranges, speed.
         sync: its clock against the host's when it was opened or found again; None from one that cannot tell.
-        dropped: scans that are missing between those that were read, by their stamps.
     """
 
     _clusters = True
@@ -41,7 +39,7 @@ class ScipLidar(LineDriver):
         self,
         address: str,
         _model: str | None = None,
-        stamp_at: StampAt = "step_0",
+        stamp_at: StampAt | None = None,
         *,
         search: Callable[[], Iterable[str]] = lidar_ports,
     ) -> None:
@@ -53,9 +51,9 @@ class ScipLidar(LineDriver):
             search: the ports where it may turn up after a re-plug, besides its own address.
         """
         self.address = address
-        self.dropped = 0
+        self.dropped = 0  # missing scans between those read, by their stamps
         self._search = search
-        self._stamp_at: StampAt = stamp_at
+        self._stamp_at = stamp_at
         self._bad_scans = 0
         self._counter = StampCounter()
         self._request = b""
@@ -63,7 +61,7 @@ class ScipLidar(LineDriver):
         self._dialogue = ScipDialogue(address)
         self._line = self._dialogue.line
         with self._line.closed_on_error():
-            self.parameters = parameters.parameters(self.information("PP"))
+            self.parameters = parameters.parameters(self.information("PP"))  # steps, ranges, speed
             version = self.information("VV")
             self.serial_number, self.firmware = version.get("SERI", ""), version.get("FIRM", "")
             self._begin_clock()
@@ -80,7 +78,7 @@ class ScipLidar(LineDriver):
 
     @property
     def bad_packets(self) -> int:
-        """Replies that were thrown away: wrong sums, cut or merged lines."""
+        """Replies dropped: wrong sums, cut or merged lines."""
         return self._bad_scans + self._dialogue.bad
 
     def information(self, command: str) -> dict[str, str]:
@@ -167,10 +165,9 @@ class ScipLidar(LineDriver):
         return synchronised(exchanges)
 
     def _begin_clock(self) -> None:
-        """Compare the clocks, and begin a fresh one that gives the times of the first beams.
+        """Compare the clocks and start a new one for the times of the first beams.
 
-        Nothing can arrive earlier than the end of the last step; a real serial line takes longer by its bytes' time,
-        which nobody declares here: all times are late by it.
+        Nothing arrives before the end of the last step. On a serial line all times are late by its bytes' duration.
         """
 
         def since_stamp_ns(step: int) -> int:

@@ -1,7 +1,4 @@
-"""What a Hokuyo is asked to measure, and the numbers that it tells, as pure functions of replies in SCIP 2.0.
-
-Bytes that mean something else raise ProtocolError.
-"""
+"""Measurement requests and replies of SCIP 2.0 as pure functions; invalid bytes raise ProtocolError."""
 
 from __future__ import annotations
 
@@ -16,21 +13,13 @@ _SCAN_ECHO = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?(?:;.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Which steps to measure and how to send them.
+    """Which steps to measure and how to send them."""
 
-    Attributes:
-        first_step: the first one.
-        last_step: the last one, included.
-        cluster: steps that share one value, the least range among them.
-        characters: 3 for 18 bit, 2 for 12 bit (ranges to 4095 mm).
-        intensity: a second value after each range.
-    """
-
-    first_step: int
-    last_step: int
-    cluster: int = 1
-    characters: int = 3
-    intensity: bool = False
+    first_step: int  # the first one
+    last_step: int  # the last one, included
+    cluster: int = 1  # steps that share one value, the least range among them
+    characters: int = 3  # 3 for 18 bit, 2 for 12 bit (ranges to 4095 mm)
+    intensity: bool = False  # a second value after each range
 
     def __post_init__(self) -> None:
         if not 0 <= self.first_step <= self.last_step <= 9999:
@@ -64,21 +53,13 @@ class Window:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """What a scan reply carries.
+    """What a scan reply carries."""
 
-    Attributes:
-        window: which steps.
-        remaining: scans still to come; 0 for the last one and where there is no end.
-        stamp_ms: the sensor's clock, 24 bit.
-        value: shape (n,), millimetres or error codes.
-        intensity: shape (n,) or (0,).
-    """
-
-    window: Window
-    remaining: int
-    stamp_ms: int
-    value: Integers
-    intensity: Integers
+    window: Window  # which steps
+    remaining: int  # scans still to come; 0 for the last one and where there is no end
+    stamp_ms: int  # the sensor's clock, 24 bit
+    value: Integers  # shape (n,), millimetres or error codes
+    intensity: Integers  # shape (n,) or (0,)
 
 
 def continuous(window: Window, *, skip: int = 0, count: int = 0) -> bytes:

@@ -1,7 +1,4 @@
-"""What Hokuyo lidars say of themselves, and what the small numbers among their ranges mean.
-
-Bytes that mean something else raise ProtocolError.
-"""
+"""Parameters of Hokuyo lidars, and error codes among their ranges; invalid values raise ProtocolError."""
 
 from __future__ import annotations
 
@@ -20,27 +17,16 @@ from scanwright.firmware_io.lidar.scip.protocol import Integers
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """A sensor's PP reply.
+    """A sensor's PP reply."""
 
-    Attributes:
-        model: name of the type, without the maker.
-        range_min_mm: smaller numbers are error codes.
-        range_max_mm: larger numbers are error codes.
-        steps_per_turn: steps that a full circle would have.
-        first_step: first one that is measured; step 0 is the sensor's own zero.
-        last_step: last one that is measured.
-        front_step: the one straight ahead.
-        rpm: turns per minute.
-    """
-
-    model: str
-    range_min_mm: int
-    range_max_mm: int
-    steps_per_turn: int
-    first_step: int
-    last_step: int
-    front_step: int
-    rpm: int
+    model: str  # name of the type, without the maker
+    range_min_mm: int  # smaller numbers are error codes
+    range_max_mm: int  # larger numbers are error codes
+    steps_per_turn: int  # steps that a full circle would have
+    first_step: int  # first one that is measured; step 0 is the sensor's own zero
+    last_step: int  # last one that is measured
+    front_step: int  # the one straight ahead
+    rpm: int  # turns per minute
 
     @property
     def scan_period_s(self) -> float:
@@ -62,7 +48,7 @@ class Parameters:
         """All measured steps."""
         return Window(first_step=self.first_step, last_step=self.last_step)
 
-    def since_stamp_s(self, step: float, stamp_at: StampAt) -> float:
+    def since_stamp_s(self, step: float, stamp_at: StampAt | None) -> float:
         """Time from the moment that a stamp means to a step.
 
         The specification puts the stamp at step 0 (p. 12); drivers put it where the beam points backward, as other
@@ -96,6 +82,6 @@ def parameters(fields: Mapping[str, str]) -> Parameters:
 
 
 def ranges_m(value: Integers, of: Parameters) -> Float32s:
-    """Ranges of numbers as sent, shape (n,); NaN where they are error codes."""
+    """Ranges of numbers as sent, shape (n,); NaN if they are error codes."""
     valid = (value >= of.range_min_mm) & (value <= of.range_max_mm)
     return np.where(valid, value / 1e3, np.nan).astype(np.float32)

@@ -1,16 +1,13 @@
-"""SCIP 2.0, the language of Hokuyo lidars (specification C-42-03320B), as pure functions of bytes; no port, no clock.
+"""SCIP 2.0, the protocol of Hokuyo lidars (specification C-42-03320B), as pure functions of bytes.
 
     request   VV LF      GD 0044 0725 01 LF      MD 0000 1080 01 0 00 LF
     reply     echo LF  status sum LF  [line sum LF] ...  LF
 
-Text lines (VV, PP, II) are `KEY:text;` and their sum leaves out the semicolon; data lines are 64 characters of
-0x30..0x6F, the last one shorter, and may hold semicolons: which of the two a reply has, its echo says. The sum is six
-bits wide, and blind to the upper two of each byte, so lengths and characters are checked as strictly as it is.
-The echo has no sum at all: who asked compares it with what he asked.
-
-A sensor that wakes up in SCIP 1.1 answers with a status of one character and no sums; `SCIP_2` steps it up.
-
-Bytes that mean something else raise ProtocolError.
+Text lines (VV, PP, II) are `KEY:text;`, and their sum excludes the semicolon. Data lines have 64 characters of
+0x30..0x6F, the last one fewer, and can contain semicolons; the echo shows which kind a reply has. The sum has six bits
+and ignores the upper two of each byte, so lengths and characters are checked too. The echo has no sum: compare it with
+the request. In SCIP 1.1 the status has one character and there are no sums; `SCIP_2` switches to 2.0.
+Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -52,17 +49,11 @@ STATUS = {
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """One checked reply.
+    """One checked reply."""
 
-    Attributes:
-        echo: the request it answers; in a scan, the last two digits count down.
-        status: two characters, one in SCIP 1.1.
-        lines: text without semicolon and sum, or data without sum.
-    """
-
-    echo: bytes
-    status: str
-    lines: tuple[bytes, ...]
+    echo: bytes  # the request it answers; in a scan, the last two digits count down
+    status: str  # two characters, one in SCIP 1.1
+    lines: tuple[bytes, ...]  # text without semicolon and sum, or data without sum
 
     @property
     def command(self) -> bytes:
@@ -142,14 +133,10 @@ def parse(block: bytes) -> Reply:
 
 
 class Splitter:
-    """Cuts a stream into replies, and finds the next one after garbage, cut lines and merged lines.
-
-    Attributes:
-        bad: replies that were thrown away.
-    """
+    """Cuts a stream into replies, and finds the next one after garbage, cut lines and merged lines."""
 
     def __init__(self) -> None:
-        self.bad = 0
+        self.bad = 0  # replies dropped
         self._pending = b""
 
     def feed(self, received: bytes) -> list[Reply]:

@@ -13,35 +13,19 @@ from scanwright.firmware_io.samples import Scan
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RawScan:
-    """One scan as it came.
+    """One scan as it came."""
 
-    Attributes:
-        stamp_ms: sensor time, unwrapped.
-        restarts: how often the sensor's clock began anew since the lidar was opened: stamps compare within one only.
-        arrival_ns: time.monotonic_ns() when the last byte came.
-        first_step: step of the first value.
-        cluster: steps per value.
-        range_m: shape (n,), NaN where nothing was measured.
-        intensity: shape (n,), or (0,) where none was asked for.
-    """
-
-    stamp_ms: int
-    restarts: int
-    arrival_ns: int
-    first_step: int
-    cluster: int
-    range_m: Float32[ndarray, " n"]
-    intensity: Float32[ndarray, " m"]
+    stamp_ms: int  # sensor time, unwrapped
+    restarts: int  # how often the sensor's clock began anew since the lidar was opened: stamps compare within one only
+    arrival_ns: int  # time.monotonic_ns() when the last byte came
+    first_step: int  # step of the first value
+    cluster: int  # steps per value
+    range_m: Float32[ndarray, " n"]  # shape (n,), NaN without a return
+    intensity: Float32[ndarray, " m"]  # shape (n,), or (0,) where none was asked for
 
 
 def to_laser_scan(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:
-    """The LaserScan of a raw one.
-
-    Args:
-        raw: as it came; where steps share a value, its bearing and time are those of their middle.
-        of: the sensor's parameters.
-        stamp_ns: time of step `raw.first_step`.
-    """
+    """Return the LaserScan of a raw scan whose first step has the time `stamp_ns`."""
     middle = (raw.cluster - 1) / 2
     return Scan(
         stamp_ns=stamp_ns + round(middle * of.step_s * 1e9),

@@ -1,15 +1,12 @@
-"""CoLa, the language of SICK lidars, in both dialects, as pure functions of bytes; no port, no clock.
+"""CoLa, the protocol of SICK lidars, in both dialects as pure functions of bytes.
 
     CoLa A    02  sRN DeviceIdent  03                      numbers are upper-case hex, separated by one space
     CoLa B    02 02 02 02  length  sRN DeviceIdent  xor    numbers are big-endian, length and xor of the payload only
 
-What is said is the same in both: a word of three letters, a name, and values in a fixed order of types. `Writer` and
-`values.Reader` put them down and take them up in either dialect. CoLa A has no checksum: what is not hex where a number
-stands, and a telegram that ends early, is all that tells a broken one.
-
+The content is the same: a word of three letters, a name, and values in a fixed order of types, which `Writer` and
+`values.Reader` encode and decode. CoLa A has no checksum: only invalid hex or a short telegram shows damage.
 Sources: SICK LMS4000 manual 8023198 (framing), TiM781 manual 8024232 (error codes), LMS500 instructions 8013796.
-
-Bytes that mean something else raise ProtocolError.
+Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -59,19 +56,14 @@ ERRORS = {  # telegram listing 8014631, codes of sFA
 
 @dataclass(frozen=True, slots=True)
 class Telegram:
-    """One checked telegram.
+    """One checked telegram."""
 
-    Attributes:
-        payload: from the first letter of its word to the last byte of its values.
-        binary: CoLa B.
-    """
-
-    payload: bytes
-    binary: bool
+    payload: bytes  # from the first letter of its word to the last byte of its values
+    binary: bool  # CoLa B
 
     @property
     def word(self) -> bytes:
-        """SRN read, sWN write, sMN method, sEN event; sRA, sWA, sAN, sEA their answers; sSN data, sFA error."""
+        """Read sRN, write sWN, method sMN, event sEN; their answers sRA, sWA, sAN, sEA; data sSN, error sFA."""
         return self.payload[:3]
 
     @property
@@ -85,11 +77,7 @@ class Telegram:
 
 
 def framed(telegram: Telegram) -> bytes:
-    """The bytes on the line.
-
-    Raises:
-        ValueError: a payload of CoLa A holds a byte that frames it.
-    """
+    """Return the bytes to send; raises ValueError if a CoLa A payload contains 02 or 03."""
     payload = telegram.payload
     if telegram.binary:
         return _START_B + struct.pack(">I", len(payload)) + payload + bytes([reduce(xor, payload, 0)])
@@ -99,7 +87,7 @@ def framed(telegram: Telegram) -> bytes:
 
 
 def error_code(telegram: Telegram) -> int:
-    """The number of an sFA; some firmware writes a space before it, some does not, and it has one byte or two."""
+    """Return the number of an sFA: one or two bytes, with or without a space before it."""
     rest = telegram.payload[3:]
     if telegram.binary:
         rest = rest[1:] if rest[:1] == b" " else rest
@@ -115,7 +103,7 @@ def error_words(code: int) -> str:
 
 
 class Writer:
-    """A telegram in the making: word and name, then values."""
+    """Encoder of a telegram: word and name, then values."""
 
     def __init__(self, command: str, *, binary: bool) -> None:
         """`command` is word and name: "sRN DeviceIdent"."""
@@ -123,11 +111,7 @@ class Writer:
         self._parts = [command.encode("ascii")]
 
     def number(self, kind: Kind, value: float) -> Writer:
-        """One number.
-
-        Raises:
-            ValueError: it does not fit its type.
-        """
+        """Append one number; raises ValueError if it does not fit its type."""
         try:
             packed = struct.pack(FORMAT[kind], value)
         except (struct.error, OverflowError) as error:
@@ -139,22 +123,22 @@ class Writer:
         return self
 
     def numbers(self, kind: Kind, values: list[int]) -> Writer:
-        """Several of one type."""
+        """Append several numbers of one type."""
         for value in values:
             self.number(kind, value)
         return self
 
     def name(self, text: str) -> Writer:
-        """A name of fixed length, as of a channel."""
+        """Append a name of fixed length, as of a channel."""
         self._parts.append(text.encode("ascii"))
         return self
 
     def text(self, text: str) -> Writer:
-        """A text of any length, its length before it."""
+        """Append a text, preceded by its length."""
         return self.number("u16", len(text)).name(text)
 
     def telegram(self) -> Telegram:
-        """What was put down."""
+        """Return the telegram."""
         command, *values = self._parts
         if not values:
             return Telegram(command, self._binary)
@@ -163,14 +147,10 @@ class Writer:
 
 
 class TelegramSplitter:
-    """Cuts a stream into telegrams of both dialects, and finds the next one after garbage.
-
-    Attributes:
-        bad: telegrams and runs of garbage that were thrown away.
-    """
+    """Cuts a stream into telegrams of both dialects, and finds the next one after garbage."""
 
     def __init__(self) -> None:
-        self.bad = 0
+        self.bad = 0  # telegrams and runs of garbage dropped
         self._buffer = b""
         self._lost = False
 
@@ -198,7 +178,7 @@ class TelegramSplitter:
 
 
 def _first(buffer: bytes) -> tuple[int, Telegram | None, bool]:
-    """How many bytes are done with, 0 to wait for more, the telegram that they are, and if they are a broken one."""
+    """Return the number of bytes to consume (0: wait), their telegram if any, and whether they are a damaged one."""
     start = buffer.find(_STX)
     if start:
         return (start if start > 0 else len(buffer)), None, False

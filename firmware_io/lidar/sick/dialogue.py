@@ -1,7 +1,4 @@
-"""Questions to a SICK lidar in the dialect of CoLa that it understands, and what it answers or refuses.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Requests to a SICK lidar in its dialect of CoLa, and its answers; failures raise DeviceError."""
 
 from __future__ import annotations
 
@@ -34,63 +31,49 @@ _ANSWERS = {b"sRN": b"sRA", b"sWN": b"sWA", b"sMN": b"sAN", b"sEN": b"sEA"}
 
 
 class RefusedError(DeviceError):
-    """The sensor answered sFA.
-
-    Attributes:
-        code: its number, see `cola.ERRORS`.
-    """
+    """The sensor answered sFA."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
-        self.code = code
+        self.code = code  # its number, see `cola.ERRORS`
 
     @property
     def unknown(self) -> bool:
-        """Whether it does not know what it was asked for."""
+        """Whether the sensor does not know the requested name."""
         return self.code in _UNKNOWN
 
     @property
     def untimely(self) -> bool:
-        """Whether it is in no state to do that."""
+        """Whether its state does not allow the request."""
         return self.code == _CONDITION
 
 
 class ColaDialogue:
-    """The talk with one sensor; it is opened with its telegrams stopped.
-
-    Attributes:
-        line: that it goes over.
-    """
+    """Dialogue with one sensor; it is opened with its telegrams stopped."""
 
     def __init__(self, address: str) -> None:
         """Open the port, find the dialect, and stop its telegrams."""
-        self.line = SensorLine(address, LONGEST)
+        self.line = SensorLine(address, LONGEST)  # to the sensor
         self._bad_before = 0
         self._begin()
 
     @property
     def bad(self) -> int:
-        """Telegrams that were thrown away."""
+        """Telegrams dropped."""
         return self._bad_before + self._splitter.bad
 
     def reopen(self) -> None:
-        """Begin anew; raises as opening does."""
+        """Open the line again; raises as opening does."""
         self._bad_before = self.bad
         self.line.reopen()
         self._begin()
 
     def writer(self, command: str) -> Writer:
-        """A request in the making: word and name."""
+        """Begin a request: word and name."""
         return Writer(command, binary=self._binary)
 
     def ask(self, out: Writer) -> Reader:
-        """The values of the answer; a busy method is asked again.
-
-        Raises:
-            RefusedError: it is an sFA.
-            DeviceTimeoutError: none came.
-            DeviceError: the sensor is gone.
-        """
+        """Return the values of the answer; repeats a busy method. An sFA raises RefusedError."""
         request = out.telegram()
         name = request.name.decode()
         deadline_s = time.monotonic() + _ANSWER_S
@@ -104,7 +87,7 @@ class ColaDialogue:
             time.sleep(POLL_S / 2)
 
     def insist(self, out: Writer, expect: int) -> None:
-        """Ask, and take no other first value for an answer."""
+        """Send a request whose answer must begin with `expect`."""
         name = out.telegram().name.decode()
         got = self.checked(name, self.ask(out).number, "u8")
         if got != expect:
@@ -112,18 +95,14 @@ class ColaDialogue:
             raise DeviceError(f"{self.line.name}: {name} answered {got}, not {expect}: {what}")
 
     def checked(self, name: str, take: Callable[..., T], *of: object) -> T:
-        """What is taken from an answer.
-
-        Raises:
-            ProtocolError: it is not there, or none; with the names of sensor and request.
-        """
+        """Return `take(*of)`; a ProtocolError gets the names of sensor and request."""
         try:
             return take(*of)
         except ProtocolError as error:
             raise ProtocolError(f"{self.line.name}: {name}: {error}") from error
 
     def next(self, deadline_s: float) -> tuple[Telegram, int]:
-        """What it says next and when that came; raises as `SensorLine.hear` does."""
+        """Return the next telegram and its arrival; raises as `SensorLine.hear`."""
         if not self._waiting:
             telegrams, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
             self._waiting.extend((reply, arrival_ns) for reply in telegrams)

@@ -1,7 +1,4 @@
-"""A SICK lidar of the TiM5xx, TiM7xx or LMS1xx that speaks CoLa A or B, over TCP.
-
-Written from documents; no sensor has been at the other end yet.
-"""
+"""SICK TiM5xx, TiM7xx or LMS1xx over TCP in CoLa A or B. Written from documents, not tried on a sensor."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.lidar.arrival_line import QUARTZ_RATE, ArrivalLine
 from scanwright.firmware_io.lidar.device_clock import TICK_NS, StampCounter
-from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
+from scanwright.firmware_io.lidar.lidar import Echo, StampAt, TimedScan
 from scanwright.firmware_io.lidar.sensor_line import LineDriver
 from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
@@ -25,22 +22,31 @@ from scanwright.firmware_io.samples import Scan
 _READY_S = 30.0  # a motor that was off takes ten seconds
 _CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
 _ECHOES = {0: "first echo", 1: "all echoes", 2: "last echo"}  # of FREchoFilter; telegram listing 8014631
+SICK_STAMPS: tuple[StampAt, ...] = ("first_beam", "last_beam")
 _STLMS_READY = 7  # state of STlms; telegram listing 8014631
 
 
 class SickLidar(LineDriver):
-    """A SICK lidar.
+    """A SICK lidar."""
 
-    Attributes:
-        dropped: telegrams that are missing between those that were read, by their counter.
-    """
+    def __init__(self, address: str, model: str | None = None, stamp_at: StampAt | None = None) -> None:
+        """Open it.
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
-        """Open it; without a model of the catalogue it is the one that it calls itself, if the catalogue has that."""
+        Args:
+            address: where it is.
+            model: name in the catalogue; None for the name that it reports, if the catalogue has that.
+            stamp_at: beam of its scan time. None decides by its telegrams: the first beam, unless one was sent sooner
+                after its scan time than a scan takes. Captures: LMS100 23 ms and LMS511 41 ms, longer than their scans
+                (15 and 21 ms); TiM55x 3.8 ms, TiM56x 4.9 and 5.1 ms, shorter (50 ms).
+        """
         self.address = address
-        self.dropped = 0
+        self.dropped = 0  # missing telegrams between those read, by their counter
+        self._stamp_at: StampAt | None = stamp_at
+        self._stamps_last = stamp_at == "last_beam"
         self._measuring = False
         self._bad_scans = 0
+        self._wanted_echo: int | None = None
+        self._mean_filter_off = False
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
         self._dialogue = ColaDialogue(address)
         self._line = self._dialogue.line
@@ -59,11 +65,11 @@ class SickLidar(LineDriver):
 
     @property
     def bad_packets(self) -> int:
-        """Telegrams that were thrown away."""
+        """Telegrams dropped."""
         return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
-        """Return the hours that it has run, how often it was switched on, and its filters, as far as it tells them."""
+        """Return operating hours, number of starts and filters, as far as the sensor reports them."""
         hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
         age = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
         switched = [] if starts is None else [f"it was switched on {starts:,} times"]
@@ -72,12 +78,22 @@ class SickLidar(LineDriver):
         means = {None: [], 0: ["mean filter: off"]}
         return (*age, *switched, *echoes, *means.get(averaged, [f"mean filter: {averaged} scans"]))
 
+    def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
+        """Set filters at the next start; a sensor without them refuses then."""
+        self._wanted_echo = None if echo is None else {"first": 0, "last": 2}[echo]
+        self._mean_filter_off = mean_filter_off
+
     def _begin(self, intensity: bool, skip: int) -> None:
-        """At the rate and resolution of the catalogue."""
+        """Start at the rate and resolution of the catalogue."""
         self._login()
         set_rate(self._dialogue, self._lidar)
+        if self._wanted_echo is not None:
+            self._dialogue.ask(self._dialogue.writer("sWN FREchoFilter").number("u8", self._wanted_echo))
+        if self._mean_filter_off:
+            off = self._dialogue.writer("sWN LFPmeanfilter").number("u8", 0).number("u16", 2).number("u8", 0)
+            self._dialogue.ask(off)
         averaged = self._averaged_scans()
-        smeared = f"its mean filter averages {averaged} scans, which smears a turning scan: switch it off in SOPAS"
+        smeared = f"its mean filter averages {averaged} scans, which smears a turning scan: use --mean-filter-off"
         self._warning = smeared if averaged else ""
         # channels, intensity, its resolution, unit, encoders, position, name, comment, time of day
         wanted = self._dialogue.writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
@@ -101,7 +117,7 @@ class SickLidar(LineDriver):
                 self._bad_scans += 1
 
     def _halt(self) -> None:
-        """Stop the telegrams, and what `start` lit; a laser that cannot be put out stays on."""
+        """Stop the telegrams, and the laser if `start` switched it on and it can be switched off."""
         self._dialogue.ask(self._dialogue.writer("sEN LMDscandata").number("u8", 0))
         if not self._measuring:
             return
@@ -127,7 +143,7 @@ class SickLidar(LineDriver):
         ).strip()
 
     def _serial_number(self) -> str:
-        """Empty from a sensor that does not tell it."""
+        """Empty if the sensor does not report it."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer("sRN SerialNumber"))
         except RefusedError:
@@ -135,17 +151,17 @@ class SickLidar(LineDriver):
         return self._dialogue.checked("SerialNumber", reply.text).strip()
 
     def _counter(self, name: str) -> int | None:
-        """Return a count; None from a sensor that does not count this, or tells it to others only."""
+        """Return a counter; None if the sensor does not have it or refuses it."""
         values = self._values(name, "u32")
         return values[0] if values else None
 
     def _averaged_scans(self) -> int | None:
-        """Return of how many scans the mean filter makes one, 0 if it is off; None from a sensor without it."""
+        """Return how many scans the mean filter averages, 0 if it is off; None without such a filter."""
         values = self._values("LFPmeanfilter", "u8", "u16")
         return values[0] and values[1] if values else None
 
     def _values(self, name: str, *kinds: Kind) -> list[int]:
-        """Return the first values of a variable; none from a sensor that refuses to tell it."""
+        """Return the first values of a variable; none if the sensor refuses."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
         except RefusedError:
@@ -157,7 +173,7 @@ class SickLidar(LineDriver):
         self._dialogue.insist(out, 1)
 
     def _wait_until_ready(self, patience_s: float) -> None:
-        """A sensor that starts its motor, or is busy with somebody else, is asked again and again."""
+        """Wait for a sensor that starts its motor or serves another client."""
         deadline_s = time.monotonic() + patience_s
         while not self._ready():
             if time.monotonic() > deadline_s:
@@ -165,7 +181,7 @@ class SickLidar(LineDriver):
             time.sleep(POLL_S)
 
     def _ready(self) -> bool:
-        """Asked as the TiM knows it, then as the LMS does."""
+        """Read the device state as the TiM has it, else as the LMS has it."""
         try:
             state = self._dialogue.ask(self._dialogue.writer("sRN SCdevicestate"))
         except RefusedError as refused:
@@ -176,7 +192,7 @@ class SickLidar(LineDriver):
         return self._dialogue.checked("SCdevicestate", state.number, "u8") == 1
 
     def _forget(self) -> None:
-        """What comes next is of another run of the sensor."""
+        """Forget clock and counter: the next telegram is of another run."""
         self._stamps.restart()
         self._count: int | None = None
         self._clock: ArrivalLine | None = None
@@ -204,7 +220,7 @@ class SickLidar(LineDriver):
         shown = scan.channel("RSSI1")
         intensity = shown.raw * shown.scale + shown.offset if shown else np.empty(0)
         turn = Scan(
-            stamp_ns=self._clock.host_ns(1e3 * sent_us) - round(scan.first_beam_before_sent_us * 1e3),
+            stamp_ns=self._clock.host_ns(1e3 * sent_us) - round(self._first_beam_before_sent_us(scan) * 1e3),
             angle_min_rad=float(np.radians(start_deg)),
             angle_increment_rad=self._step_rad(step_deg),
             time_increment_s=scan.beam_us / 1e6,
@@ -216,6 +232,18 @@ class SickLidar(LineDriver):
         )
         dirty = "its window is dirty, but it still measures: clean it" if scan.status & DIRT_WARNING else ""
         return TimedScan(turn, arrival_ns, self._clock.uncertainty_ns, dirty)
+
+    def _first_beam_before_sent_us(self, scan: ScanData) -> float:
+        """Return the time from first beam to sending; DeviceError if the requested `first_beam` is impossible."""
+        after_us, took_us = scan.sent_after_us, scan.wide[0].raw.size * scan.beam_us
+        if after_us < took_us:
+            if self._stamp_at == "first_beam":
+                raise DeviceError(
+                    f"{self._name}: stamp_at = 'first_beam': it sends {after_us / 1e3:.1f} ms after the scan time, but "
+                    f"a scan takes {took_us / 1e3:.1f} ms; use last_beam"
+                )
+            self._stamps_last = True
+        return after_us + took_us if self._stamps_last else after_us
 
     def _step_rad(self, step_deg: float) -> float:
         """A step of a third of a degree is sent as 0.3333: 0.027 deg are missing at the end of 811 beams."""

@@ -1,9 +1,7 @@
-"""LMDscandata, the telegram that holds a scan: all its channels, encoders, times of the sensor and its state.
+"""LMDscandata, the telegram of a scan: channels, encoders, times and state of the sensor.
 
-Layout: SICK TiM5xx technical information 8015883; LMS4000 manual 8023198 for the binary form. What follows the 8-bit
-channels (position, name, comment, time of day, event) is not read.
-
-Bytes that mean something else raise ProtocolError.
+Layout: SICK TiM5xx technical information 8015883; LMS4000 manual 8023198 for CoLa B. What follows the 8-bit channels
+(position, name, comment, time of day, event) is not read. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -32,23 +30,14 @@ DIRT = 0x04  # bit of the device status
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """One number per beam.
+    """One number per beam."""
 
-    Attributes:
-        name: DIST1 range of the first echo, RSSI1 its intensity, ...
-        scale: of the numbers; mm for DIST.
-        offset: added to the scaled numbers.
-        start: angle of the first beam, 1e-4 deg, 90 deg straight ahead, counter-clockwise from above.
-        step: from beam to beam, 1e-4 deg.
-        raw: as they came, shape (n,).
-    """
-
-    name: str
-    scale: float
-    offset: float
-    start: int
-    step: int
-    raw: ndarray
+    name: str  # DIST1 range of the first echo, RSSI1 its intensity,
+    scale: float  # of the numbers; mm for DIST
+    offset: float  # added to the scaled numbers
+    start: int  # angle of the first beam, 1e-4 deg, 90 deg straight ahead, counter-clockwise from above
+    step: int  # from beam to beam, 1e-4 deg
+    raw: ndarray  # as they came, shape (n,)
 
     @property
     def bearing_deg(self) -> tuple[float, float]:
@@ -56,42 +45,27 @@ class Channel:
         return self.start * _ANGLE_UNIT_DEG - _FRONT_DEG, self.step * _ANGLE_UNIT_DEG
 
     def range_m(self) -> Float32[ndarray, " n"]:
-        """Ranges of a DIST channel, NaN where nothing came back (0), shape (n,)."""
+        """Ranges of a DIST channel, NaN without a return (0), shape (n,)."""
         range_mm = self.raw * self.scale + self.offset
         return np.where(self.raw == 0, np.nan, range_mm / 1e3).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanData:
-    """One scan as the sensor sent it.
-
-    Attributes:
-        serial_number: of the sensor.
-        status: second byte of its state: bits FAULT, DIRT_WARNING, DIRT (with FAULT).
-        telegram_count: of the telegrams, 16 bits.
-        scan_count: of the turns, 16 bits.
-        scan_us: time since power-up of the scan, 32 bits.
-        sent_us: time since power-up when the telegram was sent, 32 bits.
-        layer: angle of the scan plane, 1/200 deg or as its model says; 0 for one plane.
-        scan_rate_hz: turns per second.
-        measuring_rate_hz: beams per second, all around.
-        encoders: position and speed of each.
-        wide: channels of 16 bits.
-        narrow: channels of 8 bits.
-    """
+    """One scan as the sensor sent it."""
 
     serial_number: int
-    status: int
-    telegram_count: int
-    scan_count: int
-    scan_us: int
-    sent_us: int
-    layer: int
-    scan_rate_hz: float
-    measuring_rate_hz: float
-    encoders: tuple[tuple[int, int], ...]
-    wide: tuple[Channel, ...]
-    narrow: tuple[Channel, ...]
+    status: int  # second byte of its state: bits FAULT, DIRT_WARNING, DIRT (with FAULT)
+    telegram_count: int  # of the telegrams, 16 bits
+    scan_count: int  # of the turns, 16 bits
+    scan_us: int  # time since power-up of the scan, 32 bits
+    sent_us: int  # time since power-up when the telegram was sent, 32 bits
+    layer: int  # angle of the scan plane, 1/200 deg or as its model says; 0 for one plane
+    scan_rate_hz: float  # turns per second
+    measuring_rate_hz: float  # beams per second, all around
+    encoders: tuple[tuple[int, int], ...]  # position and speed of each
+    wide: tuple[Channel, ...]  # channels of 16 bits
+    narrow: tuple[Channel, ...]  # channels of 8 bits
 
     def channel(self, name: str) -> Channel | None:
         """A channel by its name."""
@@ -103,16 +77,9 @@ class ScanData:
         return self.wide[0].step * _ANGLE_UNIT_DEG / 360 / self.scan_rate_hz * 1e6
 
     @property
-    def first_beam_before_sent_us(self) -> float:
-        """From the first beam to the sending of the telegram.
-
-        Documents do not say which moment of the scan its time means, and captures differ: an LMS100 sends 23 ms after
-        it, longer than its scan takes, so there it is the first beam; a TiM55x sends 4 ms after it, in which it can
-        measure no scan of 50 ms, so there it is the end of the last beam.
-        """
-        after_us = (self.sent_us - self.scan_us) % WRAP_US
-        took_us = self.wide[0].raw.size * self.beam_us
-        return after_us if after_us > took_us / 2 else after_us + took_us
+    def sent_after_us(self) -> float:
+        """From the time of the scan to the sending of the telegram."""
+        return (self.sent_us - self.scan_us) % WRAP_US
 
 
 def scan_data(telegram: Telegram) -> ScanData:
@@ -144,11 +111,7 @@ def scan_data(telegram: Telegram) -> ScanData:
 
 
 def telegram_of(scan: ScanData, *, binary: bool) -> Telegram:
-    """The event that holds a scan: what `scan_data` takes up.
-
-    Raises:
-        ValueError: a number does not fit its place.
-    """
+    """Return the event that holds a scan; raises ValueError if a number does not fit."""
     out = Writer("sSN LMDscandata", binary=binary).numbers("u16", [1, 1]).number("u32", scan.serial_number)
     out.numbers("u8", [0, scan.status]).numbers("u16", [scan.telegram_count, scan.scan_count])
     out.numbers("u32", [scan.scan_us, scan.sent_us]).numbers("u8", [0, 0, 0, 0]).number("i16", scan.layer)

@@ -1,7 +1,4 @@
-"""Rate, resolution and field of a SICK lidar that has a choice: set to those of the catalogue.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Set rate, resolution and field of a SICK lidar that has a choice to those of the catalogue."""
 
 from __future__ import annotations
 

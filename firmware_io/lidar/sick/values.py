@@ -1,7 +1,4 @@
-"""The values of a CoLa telegram, taken up one after the other in either dialect; no port, no clock.
-
-Bytes that mean something else raise ProtocolError.
-"""
+"""Values of a CoLa telegram, decoded one by one in either dialect; invalid bytes raise ProtocolError."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ _TOKEN = re.compile(rb"[0-9A-F]{1,8}|[+-][0-9]{1,10}")
 
 
 class Reader:
-    """Takes up the values of a telegram, one after the other."""
+    """Decodes the values of a telegram in order."""
 
     def __init__(self, values: bytes, binary: bool) -> None:
         self._values, self._binary, self._at = values, binary, 0

@@ -1,7 +1,4 @@
-"""Questions to an RPLIDAR, what it answers, and which of its modes it streams best in.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""Requests to an RPLIDAR, its answers, and the choice of its scan mode; failures raise DeviceError."""
 
 from __future__ import annotations
 
@@ -22,15 +19,11 @@ Answer = TypeVar("Answer")
 
 
 class SlamtecDialogue:
-    """The talk with one sensor.
-
-    Attributes:
-        line: that it goes over.
-    """
+    """Dialogue with one sensor."""
 
     def __init__(self, address: str) -> None:
         """Open the line."""
-        self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))
+        self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))  # to the sensor
         self._replies = protocol.ReplySplitter()
         self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
 

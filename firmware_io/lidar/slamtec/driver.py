@@ -1,6 +1,6 @@
-"""An RPLIDAR on its serial line: asked who it is, its motor started, its typical mode streamed.
+"""RPLIDAR on its serial line: it is identified, its motor started, its typical mode streamed.
 
-It has no clock of its own in these modes: its points follow each other evenly, and counting them is the clock.
+These modes have no timestamps: points are evenly spaced, and their count is the clock.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _RPM = 600  # the SDK's default
 class SlamtecLidar(LineDriver):
     """An RPLIDAR."""
 
-    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt = "step_0") -> None:
+    def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop what it does; `model` is a name of the catalogue, None for whatever answers."""
         self.address = address
         self._bad_before = 0
@@ -50,7 +50,7 @@ class SlamtecLidar(LineDriver):
 
     @property
     def bad_packets(self) -> int:
-        """Packets that were thrown away."""
+        """Packets dropped."""
         return self._bad_before + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
@@ -97,7 +97,7 @@ class SlamtecLidar(LineDriver):
         self._turn_motor(on=False)
 
     def _find(self) -> None:
-        """Open it again where it was."""
+        """Open the same port again."""
         self._line.reopen()
         self._recognise(self.model)
 

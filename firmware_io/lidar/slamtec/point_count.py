@@ -23,33 +23,21 @@ class PointCount:
 
     Attributes:
         arrivals: the sensor's time, by the count, on the host's clock.
-        broken: an unknown number of points was lost; what comes next needs a new count.
     """
 
     def __init__(self, kind: int, point_ns: float, baud: int) -> None:
-        """Begin before the first point.
-
-        Args:
-            kind: type of the packets.
-            point_ns: between two points, as the sensor states it.
-            baud: of its line.
-        """
+        """`kind`: type of the packets; `point_ns`: between two points, as the sensor states it."""
         self._kind, self._point_ns = kind, point_ns
         packet_ns = round(protocol.SIZES[kind] * 10 / baud * 1e9)
         self.arrivals = ArrivalLine(smallest_delay_ns=packet_ns, rate_max=_RATE_MAX, grain_ns=point_ns)
-        self.broken = False
+        self.broken = False  # an unknown number of points was lost; what comes next needs a new count
         self._before: protocol.SlamtecPacket | None = None
         self._points = 0
         self._spans_deg: deque[float] = deque(maxlen=_EVEN)  # of the last capsules
         self._fastest_deg = 0.0  # span at the highest even speed
 
     def placed(self, packets: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> list[Points]:
-        """The points that are known now, up to where the count breaks.
-
-        Args:
-            packets: that came together, at least one, each with how many bytes were passed over before it.
-            arrival_ns: when they came.
-        """
+        """Return the points known now, up to a break; `packets` come with the bytes skipped before each."""
         if self.arrivals.is_behind:
             self.broken = True
             return []
@@ -103,11 +91,11 @@ class PointCount:
         return points
 
     def _lost(self, span_deg: float, after_garbage: bool, arrival_ns: int) -> int:
-        """How many capsules were lost between two starts; `broken` is set if that is unknown.
+        """Return how many capsules were lost between two starts; sets `broken` if unknown.
 
-        At full speed the span shows it, but for whole turns. A capsule that is half a turn late has more lost ones
-        before it; one that is too early for lost ones has none: the motor changes its speed. While it spins up, or is
-        braked, capsules whose bytes follow each other have lost none between them.
+        At full speed the span shows it, except for whole turns. A capsule half a turn late follows lost ones; one too
+        early follows none: the motor changes its speed. While it spins up, capsules with contiguous bytes have lost
+        none.
         """
         if len(self._spans_deg) < _EVEN or max(self._spans_deg) > (1 + _UNEVEN) * min(self._spans_deg):
             self.broken = after_garbage

@@ -1,10 +1,8 @@
-"""Protocol of Slamtec lidars: pure functions of bytes. Numbers are little-endian, angles grow clockwise.
+"""Protocol of Slamtec lidars as pure functions of bytes. Numbers are little-endian, angles grow clockwise.
 
-A request is A5 and a command; a payload is preceded by its length and followed by the exclusive or of all. A reply
-begins with a descriptor: A5 5A, length (30 bits) with the mode in its two highest bits, and a type. After its first
-descriptor a stream has none: nodes of 5 bytes, capsules of 84, or ultra capsules of 132.
-
-Bytes that mean something else raise ProtocolError.
+A request is A5 and a command, with a payload also its length and the xor of all. A reply begins with a descriptor:
+A5 5A, length (30 bits) and mode (2 bits), type. A stream has one descriptor, then nodes of 5 bytes, capsules of 84 or
+ultra capsules of 132. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -78,20 +76,15 @@ class SlamtecPacket:
     """One packet of a stream.
 
     Attributes:
-        start_deg: clockwise from the front.
-        first: whether the stream begins, or of a node, whether a turn does.
-        range_m: shape (n,), NaN without a return.
-        quality: shape (n,), 0 in capsules, which have none.
         offset_deg: by how much each point lies before its place between this start and the next, shape (n,).
-        words: of an ultra capsule, shape (32,); None for the others.
     """
 
-    start_deg: float
-    first: bool
-    range_m: Float32s
-    quality: Float32s
+    start_deg: float  # clockwise from the front
+    first: bool  # whether the stream begins, or of a node, whether a turn does
+    range_m: Float32s  # shape (n,), NaN without a return
+    quality: Float32s  # shape (n,), 0 in capsules, which have none
     offset_deg: Float64[ndarray, " n"]
-    words: Int64[ndarray, " cabins"] | None = None
+    words: Int64[ndarray, " cabins"] | None = None  # of an ultra capsule, shape (32,); None for the others
 
     def before(self, after: SlamtecPacket) -> SlamtecPacket:
         """Return this packet as the next one completes it: an ultra capsule's last range refers to the next first."""
@@ -184,7 +177,7 @@ _READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: cap
 
 
 class ReplySplitter:
-    """Cuts replies out of what comes before a stream begins, whatever is between them."""
+    """Cuts replies out of what comes before a stream begins, and skips other bytes."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -210,14 +203,10 @@ class ReplySplitter:
 
 
 class SlamtecSplitter:
-    """Cuts the packets of one type out of a stream, whatever is between them.
-
-    Attributes:
-        bad: packets that were lost to something else.
-    """
+    """Cuts the packets of one type out of a stream, and skips other bytes."""
 
     def __init__(self, kind: int) -> None:
-        self.bad = 0
+        self.bad = 0  # packets that were lost to something else
         self._size, self._read = SIZES[kind], _READ[kind]
         self._rest = b""
         self._passed = 0
@@ -252,10 +241,9 @@ class SlamtecSplitter:
 
 
 def _ultra(start_deg: float, words: Int64[ndarray, " cabins"], next_word: int, *, first: bool) -> SlamtecPacket:
-    """Decode the words of an ultra capsule: a major range of 12 bits, and two of 10 bits that are predicted.
+    """Decode an ultra capsule: a major range of 12 bits, and two of 10 bits predicted from it and from the next word's.
 
-    The first refers to the major range of its word, the second to that of the next; the angle is corrected for the
-    parallax of triangulation (facts of rplidar_sdk 2.1, handler_capsules.cpp).
+    The angle is corrected for the parallax of triangulation (rplidar_sdk 2.1, handler_capsules.cpp).
     """
     major = np.append(words, next_word) & 0xFFF
     bits = np.searchsorted(_SCALE_COUNT, major, side="right") - 1

@@ -35,10 +35,10 @@ def usual_speed_rad_s(log: JointLog) -> float:
 
 
 def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
-    """Return which positions lie far off their neighbours, and by how much [rad], shape (n,) each.
+    """Return which positions are far off their neighbours, and by how much [rad], shape (n,) each.
 
-    The neighbours of a position of an axis that turns lie on both sides of it, so that their median is near; and it
-    lies on the line through the two before or the two after it, as it does where the axis turns back or stops.
+    A good position is near the median of its neighbours, or on the line through the two before or after it (turning
+    points).
     """
     count = position_rad.size
     wrong, off = np.zeros(count, bool), np.zeros(count)

@@ -101,10 +101,7 @@ def _drift(scans: Stamps, angles: Stamps, speed_rad_s: float) -> Iterator[Findin
 
 
 def _trend_s(scans: Stamps, angles: Stamps) -> float:
-    """Return by how much the delays of scans and angles move apart during the recording; 0 if chance explains it.
-
-    The mean of the delays and the least of them must change alike: a stall of the network changes the mean alone.
-    """
+    """Return how far delays of scans and angles drift apart; mean and least must agree, or it is chance or a stall."""
     begin_ns, end_ns = int(scans.receive_ns.min()), int(scans.receive_ns.max())
     means, sigmas, least = [], [], []
     for stamps in (scans, angles):

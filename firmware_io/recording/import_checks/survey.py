@@ -1,4 +1,4 @@
-"""First pass over somebody's bag: times, headers and angles of all usable messages.
+"""First pass over a foreign bag: times, headers and angles of all usable messages.
 
 Input that cannot be used raises RecordingError.
 """
@@ -23,29 +23,17 @@ from scanwright.firmware_io.recording.import_checks.headers import Headers, head
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BagSurvey:
-    """Scans and angles of a bag; arrays of scans have one entry per usable scan, those of angles one per usable angle.
+    """Scans and angles of a bag; arrays have one entry per usable scan, or per usable angle."""
 
-    Attributes:
-        scan_stamps: times of the scans.
-        headers: of the scans.
-        endless: scans without a longest range.
-        echoes: most echoes of a ray that are kept.
-        angle_stamps: times of the angles.
-        angle: in its unit.
-        turned: the angles come from quaternions, in radians.
-        angle_note: what a person must know of the angles; empty if nothing.
-        left_out: reason -> number of messages.
-    """
-
-    scan_stamps: Stamps
-    headers: Headers
-    endless: int
-    echoes: int
-    angle_stamps: Stamps
-    angle: Floats
-    turned: bool
-    angle_note: str
-    left_out: Counter[str]
+    scan_stamps: Stamps  # times of the scans
+    headers: Headers  # of the scans
+    endless: int  # scans without a longest range
+    echoes: int  # most echoes of a ray that are kept
+    angle_stamps: Stamps  # times of the angles
+    angle: Floats  # in its unit
+    turned: bool  # the angles come from quaternions, in radians
+    angle_note: str  # what a person should know of the angles; empty if nothing
+    left_out: Counter[str]  # reason -> number of messages
 
 
 def survey_bag(

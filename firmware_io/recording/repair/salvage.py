@@ -125,7 +125,7 @@ def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None)
 
 
 def unpacked_at(data: memoryview, begin: int, end: int, packing: str) -> tuple[bytes, int]:
-    """What was packed, and where it ends in the file; nothing and 0 where it is damaged."""
+    """What was packed, and where it ends in the file; nothing and 0 if it is damaged."""
     if data[begin : begin + len(_PACKED[packing])].tobytes() != _PACKED[packing]:
         return b"", 0
     if not packing:

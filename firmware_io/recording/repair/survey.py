@@ -54,7 +54,7 @@ class RepairSummary:
     missing_ns: list[tuple[int, int]] = field(default_factory=list)
 
     def misses(self, before_ns: int, after_ns: int) -> None:
-        """Bytes are lost between messages of these times; 0 where one is not known."""
+        """Bytes are lost between messages of these times; 0 if one is not known."""
         if before_ns and after_ns - before_ns >= _LEAST_GAP_NS:
             self.missing_ns.append((before_ns, after_ns))
 

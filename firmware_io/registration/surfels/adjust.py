@@ -43,16 +43,14 @@ class Adjusted:
     """A pose, and how well it is known.
 
     Attributes:
-        T_a_b: shape (4, 4).
         covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (6, 6).
-        pieces: how many pieces of surface hold it.
-        scale: by how much the pieces disagree more than the noise of their beams explains, at least 1; it is in
-            the covariance.
+        scale: by how much the pieces disagree more than the noise of their beams explains, at least 1; it is in the
+            covariance.
     """
 
-    T_a_b: Pose
+    T_a_b: Pose  # shape (4, 4)
     covariance: Float64[ndarray, "6 6"]
-    pieces: int
+    pieces: int  # how many pieces of surface hold it
     scale: float
 
 

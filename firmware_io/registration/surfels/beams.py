@@ -33,39 +33,30 @@ class Beams:
     """The measurements of one stand.
 
     Attributes:
-        points_m: in the frame of the stand, shape (n, 3).
-        voxels_m: means of small voxels, shape (k, 3).
-        counts: points of each voxel, shape (k,).
-        eye_m: origin of the beams, shape (3,).
         joint_rad: angle of the axis at each beam, shape (n,); empty if the calibration is taken as exact.
         frame: columns x and y of the rotation frame in that of the stand, at joint 0, shape (3, 2).
         covariance: of the laser's tilt about them [rad] and its offset along them [m], shape (4, 4), of the scanner
             that made all clouds; None if the calibration is taken as exact.
     """
 
-    points_m: Float32[ndarray, "n 3"]
-    voxels_m: Float64[ndarray, "k 3"]
-    counts: Int64[ndarray, " k"]
-    eye_m: Float64[ndarray, " 3"]
+    points_m: Float32[ndarray, "n 3"]  # in the frame of the stand, shape (n, 3)
+    voxels_m: Float64[ndarray, "k 3"]  # means of small voxels, shape (k, 3)
+    counts: Int64[ndarray, " k"]  # points of each voxel, shape (k,)
+    eye_m: Float64[ndarray, " 3"]  # origin of the beams, shape (3,)
     joint_rad: Float32[ndarray, " joints"]
     frame: Float64[ndarray, "3 2"]
     covariance: Float64[ndarray, "4 4"] | None
 
 
 class BeamRun(NamedTuple):
-    """A run of the beams of one stand, as the compiled sum takes it; the first four fields are those of `Beams`.
-
-    Attributes:
-        T: pose of the stand in the frame of the pieces, shape (4, 4).
-        moves: whether that pose is unknown.
-    """
+    """A run of the beams of one stand, as the compiled sum takes it; the first four fields are those of `Beams`."""
 
     points_m: Float32s
     eye_m: Floats
     joint_rad: Float32s
     frame: Floats
-    T: Floats
-    moves: bool
+    T: Floats  # pose of the stand in the frame of the pieces, shape (4, 4)
+    moves: bool  # whether that pose is unknown
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

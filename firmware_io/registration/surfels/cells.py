@@ -26,21 +26,13 @@ _BITS = 21  # of a cell along each axis: three of them fit an int64
 
 
 class Cells(NamedTuple):
-    """Pieces of surface in the frame of the first stand, in the order in which a beam is tested against them.
+    """Pieces of surface in the frame of the first stand, in the order in which a beam is tested against them."""
 
-    Attributes:
-        low_m: lowest corner of the cube, shape (n, 3).
-        edge_m: its edge, shape (n,).
-        centre_m: a point of the plane, shape (n, 3).
-        axes: rows are two directions in the plane and its normal, shape (n, 3, 3).
-        reach_m: how far off its plane a beam of a piece may end.
-    """
-
-    low_m: Floats
-    edge_m: Floats
-    centre_m: Floats
-    axes: Floats
-    reach_m: float
+    low_m: Floats  # lowest corner of the cube, shape (n, 3)
+    edge_m: Floats  # its edge, shape (n,)
+    centre_m: Floats  # a point of the plane, shape (n, 3)
+    axes: Floats  # rows are two directions in the plane and its normal, shape (n, 3, 3)
+    reach_m: float  # how far off its plane a beam of a piece may end
 
     @property
     def number(self) -> int:
@@ -64,19 +56,12 @@ class Cells(NamedTuple):
 
 
 class Lookup(NamedTuple):
-    """The pieces that a point may belong to, by small cubes.
+    """The pieces that a point may belong to, by small cubes."""
 
-    Attributes:
-        edge_m: of the cubes that are looked up.
-        keys: numbers of those that have a piece near, ascending, shape (k,).
-        first: where the pieces of each begin in `cells`, shape (k + 1,).
-        cells: numbers of pieces, ascending within a cube.
-    """
-
-    edge_m: float
-    keys: Ints
-    first: Ints
-    cells: Ints
+    edge_m: float  # of the cubes that are looked up
+    keys: Ints  # numbers of those that have a piece near, ascending, shape (k,)
+    first: Ints  # where the pieces of each begin in `cells`, shape (k + 1,)
+    cells: Ints  # numbers of pieces, ascending within a cube
 
 
 def find_cells(

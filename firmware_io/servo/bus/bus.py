@@ -1,7 +1,7 @@
-"""Transactions with the servos on one serial port, whatever packets they speak in.
+"""Transactions with the servos on one serial port, in any packet format.
 
-An adapter that echoes is found on opening, and exactly what was sent is taken off what comes. An answer must be as long
-as was asked for. Whatever goes wrong is a `DeviceError`; what asking again can mend is asked again.
+An echoing adapter is detected on opening; its echo is removed. An answer must have the requested length. Failures raise
+`DeviceError`; those that a retry can cure are retried.
 """
 
 from __future__ import annotations
@@ -26,34 +26,24 @@ class ServoAnswer:
     """One status packet.
 
     Attributes:
-        data: parameters.
-        conditions: fault bits of the servo, or in protocol 2.0 one that says there are some; 0 when it is well.
         sampled_ns: `time.monotonic_ns()` when the servo took its values: the middle of the transaction, without the
             bytes' own time on the wire and without the return delay.
-        bound_ns: the sampling lies within this of `sampled_ns`.
     """
 
-    data: bytes
-    conditions: int
+    data: bytes  # parameters
+    conditions: int  # fault bits of the servo, or in protocol 2.0 one that says there are some; 0 when it is well
     sampled_ns: int
-    bound_ns: int
+    bound_ns: int  # the sampling lies within this of `sampled_ns`
 
 
 class ServoBus:
-    """The servos behind one port, which nobody else can open meanwhile.
-
-    Attributes:
-        port: name of the port.
-        packets: how they are packed; may be changed.
-        lost_replies: count of answers that were damaged or did not come, and were asked for again.
-        return_delay_ns: what the servo waits between request and answer.
-    """
+    """The servos behind one port, which is locked."""
 
     def __init__(self, port: str, packets: PacketFormat, baud: int = 57600) -> None:
-        self.port = port
-        self.packets = packets
-        self.return_delay_ns = 0.0
-        self.lost_replies = 0
+        self.port = port  # name of the port
+        self.packets = packets  # how they are packed; may be changed
+        self.return_delay_ns = 0.0  # what the servo waits between request and answer
+        self.lost_replies = 0  # count of answers that were damaged or did not come, and were asked for again
         self._line = SerialLine(port, baud)
 
     def listen(self, seconds: float) -> bytes:
@@ -72,7 +62,7 @@ class ServoBus:
         return int(self._line.port.baudrate)
 
     def set_baud(self, baud: int) -> bool:
-        """Send at another speed from now on; False where the adapter cannot."""
+        """Send at another speed from now on; False if the adapter cannot."""
         with self._port_errors():
             try:
                 self._line.port.baudrate = baud
@@ -99,13 +89,7 @@ class ServoBus:
             self._line.port.set_low_latency_mode(True)
 
     def read(self, servo_id: int, register: Register) -> ServoAnswer:
-        """The bytes of a register or a block.
-
-        Raises:
-            DeviceTimeoutError: nothing came, three times, or the port is gone.
-            ProtocolError: what came was damaged, three times.
-            DeviceError: the servo refuses.
-        """
+        """Read a register or a block; DeviceTimeoutError or ProtocolError after three tries, else DeviceError."""
         request = self.packets.reading(servo_id, register.address, register.size)
         return self._ask(servo_id, request, register.size, reads=True)
 

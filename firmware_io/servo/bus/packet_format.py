@@ -13,48 +13,33 @@ NO_ANSWER = "no answer: check its power and cable; another program may have set 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One answer of a servo, as it came.
-
-    Attributes:
-        id: of the servo.
-        error: its error byte.
-        data: parameters, without stuffing.
-        length: in bytes, on the wire.
-    """
+    """One answer of a servo, as it came."""
 
     id: int
-    error: int
-    data: bytes
-    length: int
+    error: int  # its error byte
+    data: bytes  # parameters, without stuffing
+    length: int  # in bytes, on the wire
 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What an error byte means.
+    """What an error byte means."""
 
-    Attributes:
-        conditions: bits of it that tell of the servo, not of the request; 0 when it is well.
-        damaged: the request arrived damaged.
-        refusal: why the servo does not do what it was told; None where it does.
-    """
-
-    conditions: int = 0
-    damaged: bool = False
-    refusal: str | None = None
+    conditions: int = 0  # bits of it that tell of the servo, not of the request; 0 when it is well
+    damaged: bool = False  # the request arrived damaged
+    refusal: str | None = None  # why the servo does not do what it was told; None if it does
 
 
 class PacketFormat(ABC):
     """How the servos of a family pack what is said on their bus; packets hold an instruction and its parameters.
 
     Attributes:
-        protocol: as the maker calls it: "2.0".
-        overhead: bytes of a reading, request and answer, around its values.
         everyone: number that all answer to; without one, the number that they have from the factory.
         address_bytes: of an address, and of a size.
     """
 
-    protocol: str
-    overhead: int
+    protocol: str  # as the maker calls it: "2.0"
+    overhead: int  # bytes of a reading, request and answer, around its values
     everyone = 254
     address_bytes = 1
 
@@ -68,12 +53,7 @@ class PacketFormat(ABC):
 
     @abstractmethod
     def receive(self, line: SerialLine) -> Status:
-        """The next status of any servo.
-
-        Raises:
-            DeviceTimeoutError: the line's deadline passed.
-            ProtocolError: what came is damaged.
-        """
+        """Return the next status of any servo; raises DeviceTimeoutError, or ProtocolError if damaged."""
 
     @abstractmethod
     def meaning(self, error: int) -> Meaning:

@@ -1,7 +1,7 @@
-"""Control tables of servos: where each value stands, how it is coded, what one count is worth.
+"""Control tables of servos: address, coding and unit of each value.
 
-Units are SI: radians, radians per second, volts. Angles are counter-clockwise as one looks at the horn, 0 at the
-encoder's centre. Load is a fraction of the rated (stall) torque, or of the duty where that is all a servo tells.
+Units are SI: radians, radians per second, volts. Angles are counter-clockwise seen towards the horn, 0 at the encoder's
+centre. Load is a fraction of the stall torque, or of the duty if the servo reports only that.
 """
 
 from __future__ import annotations
@@ -49,11 +49,7 @@ class Register:
         return (-(1 << bits - 1), (1 << bits - 1) - 1) if self.sign == "twos" else (0, (1 << bits) - 1)
 
     def encode(self, value: float) -> bytes:
-        """The bytes of a value in SI units, rounded to a count.
-
-        Raises:
-            DeviceError: it does not fit; nothing is masked or clipped.
-        """
+        """Return the bytes of a value in SI units; DeviceError if it does not fit."""
         low, high = self.bounds
         if not low - 0.5 < value / self.unit < high + 0.5:
             least, most = sorted((low * self.unit, high * self.unit))
@@ -86,8 +82,8 @@ class ControlTable:
         ram: first address that is not kept without power; below it torque must be off to write.
         centre: count of the encoder's centre, angle 0.
         last: highest count of one turn, or of the range that the sensor covers.
-        measures_turn: False where the position sensor has a dead sector.
-        speed_loop: False where "speed" in wheel mode is a share of the supply voltage, and no speed is measured.
+        measures_turn: False if the position sensor has a dead sector.
+        speed_loop: False if "speed" in wheel mode is a share of the supply voltage, and no speed is measured.
         wheel: settings of continuous rotation.
         joint: settings of going to an angle.
         neutral: settings that would turn or shift the angles' zero, with the value that does not.
@@ -137,7 +133,7 @@ class ControlTable:
     modes: dict[int, str] = field(default_factory=dict)
 
     def is_permanent(self, register: Register) -> bool:
-        """Whether a register outlasts the power (EEPROM): such a register is written only if a person agrees."""
+        """Whether a register is permanent (EEPROM): such a register is written only if a person agrees."""
         return register.address < self.ram
 
     def mode(self, *, spins: bool) -> tuple[Setting, ...]:
@@ -160,11 +156,7 @@ class ControlTable:
         return self.baud, self.baud_count(1_000_000)
 
     def baud_count(self, baud: int) -> int:
-        """The count of a speed.
-
-        Raises:
-            DeviceError: the servo does not know it.
-        """
+        """Return the count of a baud rate; DeviceError if the servo does not have it."""
         for count, known in self.bauds.items():
             if known == baud:
                 return count

@@ -17,12 +17,8 @@ class SerialLine:
     """An open port, with what packet handlers ask of one to read an answer; those names are the Dynamixel SDK's.
 
     Attributes:
-        port: of pyserial.
         wait_s: how long an answer may take beyond the time of its bytes: twice the USB latency timer of up to 16 ms,
             the return delay, a busy host.
-        echoes: whether the adapter returns what it sends.
-        deadline_s: until when to wait, on the monotonic clock.
-        sent: the last request.
         began_ns: when it was written.
         ended_ns: when the last byte came.
     """
@@ -30,12 +26,12 @@ class SerialLine:
     wait_s = 0.050
 
     def __init__(self, port: str, baud: int) -> None:
-        self.port = open_serial_port(port, baud, _SLICE_S)
+        self.port = open_serial_port(port, baud, _SLICE_S)  # of pyserial
         self.is_using = False  # which the SDK clears after reading
-        self.echoes = False
-        self.deadline_s = 0.0
+        self.echoes = False  # whether the adapter returns what it sends
+        self.deadline_s = 0.0  # until when to wait, on the monotonic clock
         self.began_ns = self.ended_ns = 0
-        self.sent = b""
+        self.sent = b""  # the last request
         self._echo_due = False
         self._late_bytes = 0
 

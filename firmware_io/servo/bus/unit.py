@@ -1,7 +1,4 @@
-"""One servo on a bus, by its registers: values, settings that outlast the power, speed.
-
-A device that is gone, silent or refuses raises DeviceError.
-"""
+"""One servo on a bus, by its registers; failures raise DeviceError."""
 
 from __future__ import annotations
 
@@ -18,19 +15,12 @@ PING_S = 0.05  # a servo answers within a millisecond; USB adapters gather bytes
 
 @dataclass(frozen=True, slots=True)
 class ServoUnit:
-    """One servo that answers.
+    """One servo that answers."""
 
-    Attributes:
-        bus: that it is on.
-        table: of its model.
-        id: its number on the bus.
-        was_mute: it answered nothing but pings before.
-    """
-
-    bus: ServoBus
-    table: ControlTable
-    id: int
-    was_mute: bool = False
+    bus: ServoBus  # that it is on
+    table: ControlTable  # of its model
+    id: int  # its number on the bus
+    was_mute: bool = False  # it answered nothing but pings before
 
     def __str__(self) -> str:
         return f"{self.bus.port}: servo {self.id}"
@@ -65,14 +55,14 @@ class ServoUnit:
         return self.bus.write_packet(self.id, torque, torque.encode(0)), self.bus.packets.acknowledged(self.id)
 
     def reported_fault(self, answer: ServoAnswer) -> str | None:
-        """What the servo reports of itself with an answer, in words; None where it is well."""
+        """What the servo reports of itself with an answer, in words; None if it is well."""
         if not answer.conditions:
             return None
         fault = self.table.hardware_error
         return self.table.names(answer.conditions if fault is None else self.count(fault))
 
     def set_permanent(self, register: Register, count: int) -> int:
-        """Set an entry that outlasts the power, torque being off; its count before. Written if it differs: it wears."""
+        """Set an entry that is permanent, torque being off; its count before. Written if it differs: it wears."""
         was = self.count(register)
         if was != count:
             self._unlock(True)
@@ -126,7 +116,7 @@ class ServoUnit:
         return renamed
 
     def answer_everything(self) -> None:
-        """Set it to answer everything; this outlasts the power if `ControlTable.is_permanent` says so."""
+        """Set it to answer everything; this is permanent if `ControlTable.is_permanent` says so."""
         level = self.table.status_return
         with_answer = level.encode(self.table.answers_all)
         try:

@@ -1,14 +1,12 @@
 """Packets of the protocols 1.0 and 2.0, through the packet handlers of the official SDK.
 
-The SDK packs requests and unpacks answers, and nothing else, because of its faults (measured with version 4.1.0):
+Only its packing and unpacking are used, because of its faults (measured with version 4.1.0):
 
-- its readers index past the end of a short status, and give 0 for no data: `ServoBus` wants the length it asked for;
-- it waits by the wall clock, at full load, and for ever while garbage flows: `SerialLine` waits on the monotonic clock,
-  asleep, and past the deadline gives nothing more;
-- it leaves the port "in use" after an exception: it never sends;
-- it takes the echo of a protocol 1.0 request for the answer: `SerialLine` has taken it off;
-- it does not stuff protocol 2.0 requests, and unstuffs answers in place, so that FF FD FD loses a byte after the first
-  FF FF FD FD: both are done here, outside of it.
+- its readers index past a short status, and return 0 for no data: `ServoBus` checks the length;
+- it waits by the wall clock, busy, and forever during garbage: `SerialLine` waits asleep on the monotonic clock;
+- it leaves the port "in use" after an exception: it never sends here;
+- it takes the echo of a protocol 1.0 request for the answer: `SerialLine` removes it;
+- it does not stuff protocol 2.0 requests, and unstuffs FF FF FD FD FF FF FD FD wrongly: both are done here.
 """
 
 from __future__ import annotations
@@ -102,12 +100,7 @@ PROTOCOL_1, PROTOCOL_2 = Protocol1(), Protocol2()
 
 
 def _checked(packet: list[int], result: int) -> bytes:
-    """What the SDK has received.
-
-    Raises:
-        DeviceTimeoutError: nothing.
-        ProtocolError: something else.
-    """
+    """Return what the SDK received; raises DeviceTimeoutError or ProtocolError."""
     if result == COMM_RX_TIMEOUT:
         raise DeviceTimeoutError(NO_ANSWER)
     if result != COMM_SUCCESS:

@@ -1,13 +1,8 @@
 """Packets of Feetech's STS and SMS servos: FF FF, id, length, instruction or status, parameters, sum.
 
-The maker's SDK (`ftservo-python-sdk` 2.0.1, MIT) is a copy of the Dynamixel one for protocol 1.0 with its faults: it
-waits by the wall clock at full load, for ever while garbage flows, and keeps its port "in use" after an exception. What
-is left of it once these are worked around is this page, so this page stands here.
-
-The frame and its sum are those of Dynamixel's protocol 1.0, so each family answers the other's pings; the status byte,
-the registers and the signs are not. A servo that gets a damaged request says nothing.
-
-Bytes that mean something else raise ProtocolError.
+The maker's SDK (`ftservo-python-sdk` 2.0.1) copies the Dynamixel one with its faults, so it is not used. Frame and sum
+are those of Dynamixel's protocol 1.0, so each family answers the other's pings; status byte, registers and signs
+differ. A damaged request gets no answer. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations

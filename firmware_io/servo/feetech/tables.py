@@ -1,11 +1,9 @@
 """Control table of the Feetech STS3215.
 
-Sources are Feetech's memory table of the STS and SMS, its SDK (`sms_sts`) and the motor tables of LeRobot, which agree
-on every register here. Numbers below zero are a size with a bit for the sign. Speeds count in steps a second, which is
-so where bit 2 of register 18 ("phase") is set, as it is from the factory. Counts grow clockwise as one looks at the
-horn: one user's word, so look whether yours turns counter-clockwise at a rate above 0.
-
-Writes below address 40 outlast the power only while `lock` is 0. There is no watchdog.
+Sources: Feetech's memory table of the STS and SMS, its SDK (`sms_sts`) and LeRobot's motor tables, which agree.
+Negative numbers have a sign bit. Speeds are steps per second if bit 2 of register 18 ("phase") is set, as from the
+factory. Counts grow clockwise seen towards the horn according to one user: check yours. Writes below address 40 are
+permanent only while `lock` is 0. There is no watchdog.
 """
 
 from __future__ import annotations

@@ -102,8 +102,8 @@ def test_captured_scans():
     assert np.isnan(range_m[0])
     np.testing.assert_array_equal(range_m[1:], np.float32(np.arange(1, 541) / 1e3))
     # LMS100: sent 22.988 ms after its time, that of the first beam. TiM55x: 3.797 ms, of a scan of 50.2 ms.
-    assert lms.first_beam_before_sent_us == 22988
-    assert tim.first_beam_before_sent_us == pytest.approx(3797 + 271 * 1e6 / 15 / 360)
+    assert (lms.sent_after_us, tim.sent_after_us) == (22988, 3797)
+    assert tim.wide[0].raw.size * tim.beam_us == pytest.approx(271 * 1e6 / 15 / 360)
 
 
 def test_offsets_of_the_binary_scan():

@@ -217,7 +217,7 @@ def test_a_port_where_something_else_or_nothing_talks(monkeypatch):
 
 
 def test_what_it_cannot_is_said():
-    assert not family_of("LD19").stamp_choice
+    assert not family_of("LD19").stamp_choices
     with ldrobot_emulator(lidar("LD19"), Ranging()) as emulator:
         with pytest.raises(DeviceError, match="stamp_at"):
             open_lidar(emulator.port, "LD19", "rear")

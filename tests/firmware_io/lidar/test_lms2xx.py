@@ -33,6 +33,34 @@ def test_requests_are_those_that_are_published(ours, published):
     assert write_telegram(ours[4:-2], address=0) == ours  # the emulator's sum is another program
 
 
+# What the example programs of sicktoolbox ask beyond our driver: command and values, and how the answer begins.
+OTHER_REQUESTS = [
+    ("74", "F4 00 00 46 00 01 00 01"),
+    ("32", "B2"),
+    ("77" + "00" * 34, "F7 00 00 00 46 00 01 00 01"),  # not in installation mode
+    ("20 00" + b"SICK_XXX".hex(), "A0 01"),
+    ("20 00" + b"SICK_LMS".hex(), "A0 00"),
+    ("77 00 00 46 00 01 00 00" + "00" * 27, "F7 01 00 00 46 00 01 00 00"),
+    ("20 25", "A0 00"),
+    ("74", "F4 00 00 46 00 01 00 00"),
+    ("3B 64 00 19 00", "BB 01 64 00 19 00"),
+    ("3B B4 00 19 00", "BB 00 B4 00 19 00"),
+    ("31", "B1" + b"V02.30 ".hex() + "25"),
+]
+
+
+def test_an_emulator_answers_what_other_programs_ask():
+    machine = VirtualLine("LMS 200", Wall()).machine
+    for request, begins in OTHER_REQUESTS:
+        asked = write_telegram(bytes.fromhex(request), address=0)
+        answer, _ = machine.hear(asked, machine.began_ns + 1)
+        assert answer[:3] == b"\x06\x02\x80"
+        assert answer[5:].startswith(bytes.fromhex(begins)), request
+    status = answer[5:]
+    assert (len(status), status[107:111], status[122]) == (155, bytes([100, 0, 25, 0]), 0)
+    assert not machine.millimetres
+
+
 def telegrams(ranges, kind=0x4000, status=0x10):
     payload = b"\xb0" + (len(ranges) | kind).to_bytes(2, "little") + np.array(ranges, "<u2").tobytes()
     return write_telegram(payload + bytes([status]))

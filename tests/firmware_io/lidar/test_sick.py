@@ -11,8 +11,10 @@ from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeou
 from scanwright.firmware_io.emulators.sick.cola_emulator import SickMachine, sick_emulator
 from scanwright.firmware_io.lidar.families import open_lidar
 from scanwright.firmware_io.lidar.sick import driver
+from scanwright.firmware_io.lidar.sick.cola import Telegram
 from scanwright.firmware_io.lidar.sick.dialogue import RefusedError
 from scanwright.firmware_io.lidar.sick.driver import SickLidar
+from scanwright.firmware_io.lidar.sick.scan_data import scan_data
 
 MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151")
 
@@ -65,8 +67,8 @@ def test_a_sensor_says_which_model_it_is(model):
         assert (lidar.model, lidar.scan_rate_hz) == (model, load_catalogue().get(model, Lidar).scan_rate_hz)
 
 
-@pytest.mark.parametrize("stamps_end", [False, True], ids=["stamps as LMS", "stamps as TiM"])
-def test_first_beams_get_their_true_times(stamps_end):
+@pytest.mark.parametrize(("stamps_end", "stamp_at"), [(False, None), (True, None), (True, "last_beam")])
+def test_first_beams_get_their_true_times(stamps_end, stamp_at):
     true_ns = []
 
     def timed(time_ns, bearing_rad):
@@ -76,7 +78,7 @@ def test_first_beams_get_their_true_times(stamps_end):
         return range_m, level
 
     state = {"rate_error": 5e-5, "clock_us": (1 << 32) - 300_000, "stamps_end": stamps_end}
-    with emulator(ranging=timed, **state) as sensor, SickLidar(sensor.address) as lidar:
+    with emulator(ranging=timed, **state) as sensor, SickLidar(sensor.address, None, stamp_at) as lidar:
         lidar.start()
         read = [lidar.read() for _ in range(40)]  # its clock wraps meanwhile
     meant_ns = [true_ns[round(100 * (float(each.scan.range_m[0]) - 1))] for each in read]
@@ -206,6 +208,74 @@ def test_a_mean_filter_is_reported_and_a_scan_warns_of_it():
         assert lidar.condition()[2:] == ("echo filter: first echo", "mean filter: 3 scans")
         lidar.start()
         assert lidar.read().warning.startswith("its mean filter averages 3 scans, which smears a turning scan")
+        assert sensor.machine.filters == {"LFPmeanfilter": [1, 3, 0], "FREchoFilter": [0]}  # nothing was set
+
+
+def test_filters_are_set_on_request_and_again_after_a_power_cycle():
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
+        stored = {"LFPmeanfilter": [1, 3, 0], "FREchoFilter": [0]}
+        sensor.machine.filters = dict(stored)
+        lidar.set_filters("last", mean_filter_off=True)
+        lidar.start()
+        assert lidar.read().warning == ""
+        assert sensor.machine.filters == {"LFPmeanfilter": [0, 2, 0], "FREchoFilter": [2]}
+        sensor.power_cycle()
+        sensor.machine.filters = dict(stored)  # what its flash memory holds
+        lidar.reconnect(30.0)
+        assert lidar.read().warning == ""
+        assert sensor.machine.filters["FREchoFilter"] == [2]
+        lidar.stop()
+        sensor.machine.without = ("FREchoFilter",)
+        with pytest.raises(RefusedError, match="FREchoFilter: error 3: unknown variable"):
+            lidar.start()
+
+
+# Beam of the scan time and headers of LMDscandata in public captures, from the version to the channel.
+CAPTURES = {
+    "LMS100": ("first_beam", "1 1 A037B9 0 0 C1C3 C1C6 8B621C37 8B627603 0 0 7 0 0 1388 168 0 1 DIST1", "1388 21D"),
+    "LMS511": ("first_beam", "0 1 1374C54 0 0 0 3F0E 2BF460C 2BFE48F 0 0 3F 0 0 9C4 21C 0 1 DIST1", "683 475"),
+    "TiM55x": ("last_beam", "1 1 107375C 0 0 E784 E789 3D611E4A 3D612D1F 0 0 1 0 0 5DC 36 0 1 DIST1", "2710 10F"),
+    "TiM56x": ("last_beam", "1 1 1291B11 0 0 AED5 AED7 FDB36397 FDB3779F 0 0 1 0 0 5DC A2 0 1 DIST1", "D05 32B"),
+    "TiM56x again": ("last_beam", "1 1 1078AAA 0 0 BFD BFF CFACE0D CFAE156 0 0 1 0 0 5DC A2 0 1 DIST1", "D05 32B"),
+}
+
+
+@pytest.mark.parametrize("name", CAPTURES)
+def test_captures_show_which_beam_their_scan_time_is_of(name):
+    stamped, head, tail = CAPTURES[name]
+    count = int(tail.split()[1], 16)
+    text = f"sSN LMDscandata {head} 3F800000 00000000 FFF92230 {tail}" + " 5" * count + " 0" * 6
+    scan = scan_data(Telegram(text.encode(), binary=False))
+    took_us = count * scan.beam_us
+    with emulator() as sensor, SickLidar(sensor.address) as lidar:
+        before_us = lidar._first_beam_before_sent_us(scan)
+        assert before_us == pytest.approx(scan.sent_after_us + took_us * (stamped == "last_beam"))
+        assert before_us >= took_us
+        if stamped == "last_beam":
+            lidar._stamp_at = "first_beam"
+            with pytest.raises(DeviceError, match=r"a scan takes 50.* ms; use last_beam"):
+                lidar._first_beam_before_sent_us(scan)
+
+
+def test_only_a_sick_has_its_stamps_and_filters():
+    with emulator() as sensor:
+        with pytest.raises(DeviceError, match=r"stamp_at = 'rear': LMS111 .*: use first_beam or last_beam"):
+            open_lidar(sensor.address, "LMS111", "rear")
+        with open_lidar(sensor.address, "LMS111", "first_beam") as lidar:
+            lidar.start()
+            check(lidar.read().scan, "LMS111")
+
+
+def test_a_sensor_with_a_choice_is_set_to_the_rate_of_the_catalogue():
+    with emulator(setting=(2500, 2500)) as sensor, SickLidar(sensor.address) as lidar:
+        lidar.start()
+        assert sensor.machine.setting == (5000, 5000)
+        lidar.stop()
+        lidar._lidar = lidar._lidar.model_copy(update={"scan_rate_hz": 75.0})
+        with pytest.raises(
+            DeviceError, match=r"75 Hz in steps of 0\.5 deg: it rejects its scan frequency; is it a LMS"
+        ):
+            lidar.start()
 
 
 def test_skipped_turns_are_not_missing():
@@ -224,6 +294,8 @@ def test_what_speaks_no_cola_is_told():
 
 # What sick_scan_xd 3.9 sends to a TiM5xx and an LMS1xx beyond our driver, in the layout of telegram listing 8014631.
 OTHER_REQUESTS = [
+    ("sRN SCdevicestate", "sRA SCdevicestate 1"),
+    ("sWN EIHstCola 1", "sFA 1"),
     ("sRN FirmwareVersion", "sRA FirmwareVersion 5 V1.00"),
     ("sRN LocationName", "sRA LocationName B not defined"),
     ("sEN LIDinputstate 0", "sEA LIDinputstate 0"),
@@ -231,19 +303,37 @@ OTHER_REQUESTS = [
     ("sEN LFErec 0", "sEA LFErec 0"),
     ("sRN LFPmeanfilter", "sRA LFPmeanfilter 0 A 0"),
     ("sWN LFPmeanfilter 1 3 0", "sFA 1"),
+    ("sMN SetAccessMode 2 B21ACE26", "sAN SetAccessMode 1"),
+    ("sWN LFPmeanfilter 1 3 0", "sFA 1"),
     ("sMN SetAccessMode 3 F4724744", "sAN SetAccessMode 1"),
     ("sWN LFPmeanfilter 1 3 0", "sWA LFPmeanfilter"),
     ("sRN LFPmeanfilter", "sRA LFPmeanfilter 1 3 0"),
     ("sWN FREchoFilter 0", "sWA FREchoFilter"),
     ("sRN FREchoFilter", "sRA FREchoFilter 0"),
     ("sRN LMPoutputRange", "sRA LMPoutputRange 1 D05 FFF92230 225510"),
+    ("sWN LMPoutputRange 1 D05 FFF92230 225510", "sWA LMPoutputRange"),
+    ("sWN LMPoutputRange 1 D05 0 225510", "sFA 5"),
+    ("sWN EIHstCola 1", "sWA EIHstCola"),
+    ("sWN LMDscandatacfg 1 0 1 1 0 0 0 0 0 0 1 1", "sWA LMDscandatacfg"),
+    ("sRN LMDscandatacfg", "sRA LMDscandatacfg 1 0 1 1 0 0 0 0 0 0 1 1"),
     ("sRN field000", "sFA 3"),
+    ("sMN mLMPsetscancfg 5DC 1 D05 FFF92230 225510", "sFA 2"),
+]
+OF_AN_LMS = [
+    ("sRN field000", "sRA field000 3F800000 00000000 1388 FFF92230 2 1 1 0 0 0 0 1 8 Field001 0"),
+    ("sRN field030", "sFA 3"),
+    ("sRN LIDinputstate", "sRA LIDinputstate 0 F4240 0 0 0 0 0"),
+    ("sMN mLMPsetscancfg 1388 1 1388 FFF92230 225510", "sFA 1"),
+    ("sMN SetAccessMode 3 F4724744", "sAN SetAccessMode 1"),
+    ("sMN mLMPsetscancfg 1388 1 1388 FFF92230 225510", "sAN mLMPsetscancfg 0 1388 1 1388 FFF92230 225510"),
+    ("sMN mLMPsetscancfg 9C4 1 9C4 FFF92230 225510", "sAN mLMPsetscancfg 3 1388 1 1388 FFF92230 225510"),
 ]
 
 
-def test_an_emulator_answers_what_other_programs_ask():
+@pytest.mark.parametrize(("model", "dialogue"), [("TiM571", OTHER_REQUESTS), ("LMS111", OF_AN_LMS)])
+def test_an_emulator_answers_what_other_programs_ask(model, dialogue):
     """The range of a TiM571: from -45 to 225 deg, in steps of a third of a degree cut to 0.3333."""
-    machine = SickMachine(load_catalogue().get("TiM571", Lidar), look, 0)
-    for request, answer in OTHER_REQUESTS:
+    machine = SickMachine(load_catalogue().get(model, Lidar), look, 0)
+    for request, answer in dialogue:
         got, rest = machine.hear(b"\x02" + request.encode() + b"\x03", 1_000_000_000)
         assert (got, rest) == (b"\x02" + answer.encode() + b"\x03", b""), request

@@ -1,0 +1,151 @@
+"""Capture of the raw bytes of devices, and replay of a capture as devices.
+
+A line of a capture is: time [ns, time.monotonic_ns], port, `<` (from the device) or `>` (to it), bytes in hex.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TextIO
+
+from scanwright.design.errors import DeviceError
+
+_WAIT_S = 0.1  # until the end of a replay is noticed
+_files: list[TextIO] = []
+_lock = threading.Lock()
+
+
+@contextmanager
+def capturing(path: Path) -> Iterator[None]:
+    """Write all bytes that devices exchange during the body to a new file; DeviceError if it cannot be created."""
+    try:
+        file = path.open("x", encoding="ascii")
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot write: {error.strerror}") from error
+    with file:
+        _files.append(file)
+        try:
+            yield
+        finally:
+            _files.remove(file)
+
+
+def captured(port: str, direction: str, data: bytes) -> bytes:
+    """Return the bytes, and write them to a running capture."""
+    if data and _files:
+        with _lock:
+            for file in _files:
+                file.write(f"{time.monotonic_ns()} {port} {direction} {data.hex()}\n")
+    return data
+
+
+@dataclass
+class _Device:
+    """A device that repeats what a capture holds: after each request, the bytes that followed it, at their times."""
+
+    unasked: list[tuple[int, bytes]] = field(default_factory=list)  # delay [ns] and bytes before any request
+    replies: dict[bytes, deque[list[tuple[int, bytes]]]] = field(default_factory=dict)  # the same, by request
+    due: deque[tuple[int, bytes]] = field(default_factory=deque)  # time [ns] and bytes that will be sent
+    received: bytes = b""
+    asked: bool = False
+
+    def hear(self, data: bytes, now_ns: int) -> None:
+        """Take a part of a request; bytes that begin no request of the capture are dropped."""
+        self.received += data
+        while self.received:
+            known = [one for one in self.replies if self.received.startswith(one)]
+            if known:
+                request = max(known, key=len)
+                self.received, self.asked = self.received[len(request) :], True
+                left = self.replies[request]
+                reply = left.popleft() if len(left) > 1 else left[0]  # the last one again and again
+                self.due = deque((now_ns + delay_ns, sent) for delay_ns, sent in reply)
+            elif any(one.startswith(self.received) for one in self.replies):
+                return
+            else:
+                self.received = self.received[1:]
+
+    def send(self, now_ns: int) -> bytes:
+        """Return what is due; a device that sends without a request starts again at the end."""
+        if not (self.due or self.asked):
+            self.due = deque((now_ns + delay_ns, sent) for delay_ns, sent in self.unasked)
+        ready = b""
+        while self.due and self.due[0][0] <= now_ns:
+            ready += self.due.popleft()[1]
+        return ready
+
+
+def _devices(path: Path) -> dict[str, _Device]:
+    devices: dict[str, _Device] = {}
+    replies: dict[str, tuple[int, list[tuple[int, bytes]]]] = {}  # of the last request: its time, and what followed
+    number = 0
+    try:
+        for line in path.read_text("ascii").splitlines():
+            number += 1
+            when, port, direction, text = line.split(" ")
+            time_ns, data = int(when), bytes.fromhex(text)
+            if port not in devices:
+                devices[port] = _Device()
+                replies[port] = time_ns, devices[port].unasked
+            if direction == ">":
+                replies[port] = time_ns, []
+                devices[port].replies.setdefault(data, deque()).append(replies[port][1])
+            elif direction == "<":
+                began_ns, reply = replies[port]
+                reply.append((time_ns - began_ns, data))
+            else:
+                raise ValueError(direction)
+    except OSError as error:
+        raise DeviceError(f"{path}: cannot read: {error.strerror}") from error
+    except ValueError as error:
+        raise DeviceError(f"{path}: line {number}: not a line of a capture") from error
+    return devices
+
+
+@contextmanager
+def replaying(path: Path) -> Iterator[dict[str, str]]:
+    """Emulate the devices of a capture during the body, each on a pseudo-terminal.
+
+    Yields:
+        Port in the capture -> path of the pseudo-terminal.
+
+    Raises:
+        DeviceError: the file cannot be read, or is no capture.
+    """
+    import tty  # POSIX only, while captures are imported everywhere
+
+    devices = _devices(path)
+    terminals = [os.openpty() for _ in devices]
+    masters = {master: device for (master, _), device in zip(terminals, devices.values(), strict=True)}
+    for master, slave in terminals:  # which stay open, so that programs can come and go
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+    ended = threading.Event()
+
+    def serve() -> None:
+        while not ended.is_set():
+            times_ns = [device.due[0][0] for device in masters.values() if device.due]
+            wait_s = min((min(times_ns, default=1 << 62) - time.monotonic_ns()) / 1e9, _WAIT_S)
+            for master in select.select(list(masters), [], [], max(wait_s, 0.0))[0]:
+                masters[master].hear(os.read(master, 4096), time.monotonic_ns())
+            for master, device in masters.items():
+                with suppress(BlockingIOError):  # nobody reads
+                    os.write(master, device.send(time.monotonic_ns()))
+
+    thread = threading.Thread(target=serve, name="replay")
+    thread.start()
+    try:
+        yield {port: os.ttyname(slave) for port, (_, slave) in zip(devices, terminals, strict=True)}
+    finally:
+        ended.set()
+        thread.join()
+        for descriptor in (one for pair in terminals for one in pair):
+            os.close(descriptor)
