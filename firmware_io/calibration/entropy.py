@@ -126,12 +126,13 @@ def _between(
     point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], one: Bool[ndarray, " n"], width_m: float
 ) -> _Crispness:
     """Entropy of the pairs across."""
-    halves = np.flatnonzero(one), np.flatnonzero(~one)
     weight = weight / np.where(one, weight[one].sum(), weight[~one].sum())
-    trees = [cKDTree(point[half]) for half in halves]
+    trees = [cKDTree(point[half]) for half in (one, ~one)]
     pairs = trees[0].sparse_distance_matrix(trees[1], _REACH * width_m, output_type="ndarray")
-    i, j = halves[0][pairs["i"]], halves[1][pairs["j"]]
+    i, j = pairs["i"], pairs["j"]
     near = np.exp(-(pairs["v"] ** 2) / (4 * width_m**2))
-    total = max(float(near @ (weight[i] * weight[j])), 1e-300)
-    share = np.bincount(i, near * weight[j], len(one)) + np.bincount(j, near * weight[i], len(one))
+    share = np.empty(len(one))
+    share[one] = np.bincount(i, near * weight[~one][j], trees[0].n)
+    share[~one] = np.bincount(j, near * weight[one][i], trees[1].n)
+    total = max(float(share[one] @ weight[one]), 1e-300)
     return _Crispness(-float(np.log(total)), weight, share / total)

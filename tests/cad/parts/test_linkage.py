@@ -262,8 +262,9 @@ def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, a
     scanner = scanner_for(*at, lidar=name)
     p, lidar = placement_of(scanner).linkage, scanner.lidar
     assert p.screw_travel > 1.5
-    part, low = (alignment_linkage(p), p.seat - 9.0)
-    if p.ears is not None:
+    if p.ears is None:
+        part, low = alignment_linkage(p), p.seat - 9.0
+    else:
         part, low = sub_plate(scanner, p.stack, p.stack.sub_plate), p.seat - 4.5
     mesh = checked_mesh(part, "part")
     body = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
