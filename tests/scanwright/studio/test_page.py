@@ -89,8 +89,8 @@ def until(true, seconds=60.0, meanwhile=lambda: None):
 
 
 def shown(browser, address, width, height, **options):
-    """The page at half the resolution of its layout, drawn ten times a second: by the processor here."""
-    return browser.open(address, width, height, frame_ms=100, device_scale_factor=0.5, **options)
+    """The page at half the resolution of its layout, drawn three times a second: by the processor here."""
+    return browser.open(address, width, height, frame_ms=300, device_scale_factor=0.5, **options)
 
 
 def enter(page, number, value):
