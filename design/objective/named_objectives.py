@@ -68,8 +68,7 @@ def objective_of(loaded: LoadedTask, field: Field) -> Objective:
     Raises:
         TaskError: the objective cannot be loaded, or is `required` and a region states no density.
     """
-    name = loaded.task.density.objective
-    entry = objectives(name)[name]
+    entry = objectives(loaded.task.density.objective)[loaded.task.density.objective]
     try:
         make: Callable[[Field, LoadedTask], Objective] = entry.load()
     except Exception as error:  # import of an installed package: it can raise anything

@@ -30,7 +30,7 @@ from scanwright.firmware_io.calibration.scans import Scans
 
 _SAMPLE = 15_000  # points of each side
 _REACH = 4.0  # widths: pairs farther apart add nothing
-_SPACINGS = 0.5  # of the points, in a kernel: of their grid exp(-10) is left
+_SPACINGS = 0.5  # of the points, in a scan or from scan to scan, in a kernel: of their grid exp(-10) is left
 _SURE = 3.0  # sampling errors: less is no change
 _LEAST = 0.01  # nats: walls thicker by 1 %, which no one can see
 _PROBE = 3.0  # how far to either side of the result to look, in limits of each parameter
@@ -77,7 +77,8 @@ def witness(
 
     # The same weights for all, or their own change would pass for one of the cloud
     weight = _areas(mount, estimated, few)
-    width_m = max(3 * noise_m, 0.03, _SPACINGS * _spacing_m(beams, float(np.average(few.range_m, weights=weight))))
+    range_m, scans = float(np.average(few.range_m, weights=weight)), Scans.of(beams)
+    width_m = max(3 * noise_m, 0.03, _SPACINGS * range_m * max(scans.gap_rad, scans.step_rad))
 
     def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
@@ -88,12 +89,6 @@ def witness(
     around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, estimated, k, after.entropy) for k in MOUNT}
     spread = (after.share - before.share) * after.weight
     return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
-
-
-def _spacing_m(beams: ReturnedBeams, range_m: float) -> float:
-    """How far points lie apart at a range, in a scan or from scan to scan, whichever is more."""
-    scans = Scans.of(beams)
-    return range_m * max(scans.gap_rad, scans.step_rad)
 
 
 def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:
