@@ -174,6 +174,10 @@ NOT_OURS = (  # the page server's own drawing library says so
     "THREE.Clock: This module has been deprecated",
     "glDrawElementsInstanced: Vertex shader input type does not match",  # of one frame, when it changes tiles
 )
+SLOW_FRAMES = """
+window.requestAnimationFrame = (step) => setTimeout(() => step(performance.now()), %d);
+window.cancelAnimationFrame = clearTimeout;
+"""
 AT_HOME = ("file://", "data:", "blob:", "about:", "http://127.0.0.1:", "ws://127.0.0.1:")
 
 
@@ -188,9 +192,14 @@ class Browser:
         self.chromium = chromium
         self.complaints = []
 
-    def open(self, address, width=1400, height=900, **options):
-        """A page of its own, with nothing kept from another one, once it has loaded; options as Playwright has them."""
+    def open(self, address, width=1400, height=900, frame_ms=None, **options):
+        """A page of its own, with nothing kept from another one, once it has loaded; options as Playwright has them.
+
+        `frame_ms` is for a page that draws all the time, which would take a core for as long as it is open.
+        """
         page = self.chromium.new_context(viewport={"width": width, "height": height}, **options).new_page()
+        if frame_ms:
+            page.add_init_script(SLOW_FRAMES % frame_ms)
         page.set_default_timeout(60_000)  # for a machine that has much else to do
         page.on("console", lambda said: self._said(said.type, said.text))
         page.on("pageerror", lambda error: self.complaints.append(str(error)))

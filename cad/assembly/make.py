@@ -41,8 +41,10 @@ def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
     made = {name: spec.make() for name, spec in parts.items() if wanted(spec)}
     bought = {name: spec.make() for name, spec in bodies.items() if wanted(spec)}
     assembly = Assembly(layout, parts, bodies, made, bought)
-    require_room_on_bed(assembly)
-    return assembly if last is None or not wanted(last) else _balanced(assembly)
+    if last is not None and wanted(last):
+        assembly = _balanced(assembly)
+    require_room_on_bed(assembly)  # it makes meshes, which the balanced assembly would not keep
+    return assembly
 
 
 def _balanced(assembly: Assembly) -> Assembly:

@@ -21,7 +21,7 @@ from scanwright.design.sphere.directions import equal_angle_grid
 from scanwright.design.sphere.painting import MAP, VALUE
 from scanwright.design.sphere.regions import Field, field_of
 from scanwright.design.sphere.total_weight import RELATIVE_ERROR, total_weight
-from scanwright.design.task.objective_names import SHIPPED_OBJECTIVES, objectives
+from scanwright.design.task.objective_names import objectives
 from scanwright.design.task.shapes import Region
 from scanwright.design.task.task import LoadedTask
 
@@ -68,8 +68,7 @@ def objective_of(loaded: LoadedTask, field: Field) -> Objective:
     Raises:
         TaskError: the objective cannot be loaded, or is `required` and a region states no density.
     """
-    name = loaded.task.density.objective
-    entry = SHIPPED_OBJECTIVES.get(name) or objectives()[name]
+    entry = objectives(loaded.task.density.objective)[loaded.task.density.objective]
     try:
         make: Callable[[Field, LoadedTask], Objective] = entry.load()
     except Exception as error:  # import of an installed package: it can raise anything

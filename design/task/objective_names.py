@@ -13,6 +13,8 @@ SHIPPED_OBJECTIVES = {
 }
 
 
-def objectives() -> dict[str, EntryPoint]:
-    """Return all objectives by name; a shipped one takes precedence over an installed one of the same name."""
+def objectives(wanted: str) -> dict[str, EntryPoint]:
+    """Return the shipped objectives by name, and if it is none of these the installed ones too: that takes 20 ms."""
+    if wanted in SHIPPED_OBJECTIVES:
+        return SHIPPED_OBJECTIVES
     return {entry.name: entry for entry in entry_points(group=GROUP)} | SHIPPED_OBJECTIVES

@@ -83,7 +83,7 @@ class DensityRules(Record):
     @field_validator("objective")
     @classmethod
     def _is_an_objective(cls, name: str) -> str:
-        if name not in SHIPPED_OBJECTIVES and name not in (known := objectives()):
+        if name not in (known := objectives(name)):
             raise ValueError(f"no objective of that name{suggest(name, known)}")
         return name
 

@@ -30,7 +30,7 @@ from scanwright.firmware_io.calibration.scans import Scans
 
 _SAMPLE = 15_000  # points of each side
 _REACH = 4.0  # widths: pairs farther apart add nothing
-_SPACINGS = 0.5  # of the points, in a kernel: of their grid exp(-10) is left
+_SPACINGS = 0.5  # of the points, in a scan or from scan to scan, in a kernel: of their grid exp(-10) is left
 _SURE = 3.0  # sampling errors: less is no change
 _LEAST = 0.01  # nats: walls thicker by 1 %, which no one can see
 _PROBE = 3.0  # how far to either side of the result to look, in limits of each parameter
@@ -73,7 +73,8 @@ def witness(
 
     # The same weights for all, or their own change would pass for one of the cloud
     weight = _areas(mount, estimated, few)
-    width_m = max(3 * noise_m, 0.03, _SPACINGS * _spacing_m(beams, float(np.average(few.range_m, weights=weight))))
+    range_m, scans = float(np.average(few.range_m, weights=weight)), Scans.of(beams)
+    width_m = max(3 * noise_m, 0.03, _SPACINGS * range_m * max(scans.gap_rad, scans.step_rad))
 
     def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
@@ -84,12 +85,6 @@ def witness(
     around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, estimated, k, after.entropy) for k in MOUNT}
     spread = (after.share - before.share) * after.weight
     return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
-
-
-def _spacing_m(beams: ReturnedBeams, range_m: float) -> float:
-    """How far points lie apart at a range, in a scan or from scan to scan, whichever is more."""
-    scans = Scans.of(beams)
-    return range_m * max(scans.gap_rad, scans.step_rad)
 
 
 def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:
@@ -122,12 +117,13 @@ def _between(
     point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], one: Bool[ndarray, " n"], width_m: float
 ) -> _Crispness:
     """Entropy of the pairs across."""
-    halves = np.flatnonzero(one), np.flatnonzero(~one)
     weight = weight / np.where(one, weight[one].sum(), weight[~one].sum())
-    trees = [cKDTree(point[half]) for half in halves]
+    trees = [cKDTree(point[half]) for half in (one, ~one)]
     pairs = trees[0].sparse_distance_matrix(trees[1], _REACH * width_m, output_type="ndarray")
-    i, j = halves[0][pairs["i"]], halves[1][pairs["j"]]
+    i, j = pairs["i"], pairs["j"]
     near = np.exp(-(pairs["v"] ** 2) / (4 * width_m**2))
-    total = max(float(near @ (weight[i] * weight[j])), 1e-300)
-    share = np.bincount(i, near * weight[j], len(one)) + np.bincount(j, near * weight[i], len(one))
+    share = np.empty(len(one))
+    share[one] = np.bincount(i, near * weight[~one][j], trees[0].n)
+    share[~one] = np.bincount(j, near * weight[one][i], trees[1].n)
+    total = max(float(share[one] @ weight[one]), 1e-300)
     return _Crispness(-float(np.log(total)), weight, share / total)

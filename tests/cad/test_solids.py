@@ -6,7 +6,7 @@ from scanners import scanner_at
 from scipy.spatial import ConvexHull
 
 from scanwright.cad import solids
-from scanwright.cad.parts.all_parts import laid_out
+from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.parts.mounts.base_mount import base_mount
 
 
@@ -26,7 +26,7 @@ def test_a_hull_of_two_squares_that_are_hardly_askew(twist, seed):
 @pytest.mark.parametrize("axis_deg", [(0.01, -0.01), (180.01, 0.01)])
 def test_a_deck_that_is_out_of_square_by_a_hundredth_of_a_degree_gets_its_mount(axis_deg):
     """Both angles alike, so that opposite corners of the pad are at one height: quadrilaterals that are nearly flat."""
-    mount = base_mount(laid_out(scanner_at((*axis_deg, -55.4, -59.4))))
-    beside = base_mount(laid_out(scanner_at((axis_deg[0], 1.3 * axis_deg[1], -55.4, -59.4))))
+    mount = base_mount(placement_of(scanner_at((*axis_deg, -55.4, -59.4))))
+    beside = base_mount(placement_of(scanner_at((axis_deg[0], 1.3 * axis_deg[1], -55.4, -59.4))))
     assert mount.isValid()
     assert mount.Volume() == pytest.approx(beside.Volume(), rel=1e-4)

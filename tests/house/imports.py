@@ -34,35 +34,33 @@ def modules(root=ROOT, floors=FLOORS):
 
 
 @functools.cache
+def trees(root=ROOT, floors=FLOORS):
+    """The syntax tree of every module, by its name."""
+    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules(root, floors).items()}
+
+
+@functools.cache
 def imports(root=ROOT, floors=FLOORS):
     """All imports of all modules, of the house and of libraries; those of the house name the module, not the name."""
-    known = modules(root, floors)
-    return [one for name, path in known.items() for one in _imports(name, path, known)]
+    known = trees(root, floors)
+    return [one for name, tree in known.items() for one in _imports(name, tree, "module", known)]
 
 
-def _imports(name, path, known):
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    typing = {
-        id(inside)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and getattr(node.test, "id", None) == "TYPE_CHECKING"
-        for inside in ast.walk(node)
-    }
-    inner = {
-        id(inside)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        for inside in ast.walk(node)
-    }
-    for node in ast.walk(tree):
-        where = "typing" if id(node) in typing else "function" if id(node) in inner else "module"
-        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            for alias in node.names:
-                full = f"{node.module}.{alias.name}"
-                yield Import(name, full if full in known else node.module, where)
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                yield Import(name, alias.name, where)
+def _imports(name, node, where, known):
+    if isinstance(node, ast.If) and getattr(node.test, "id", None) == "TYPE_CHECKING":
+        where = "typing"
+    elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and where == "module":
+        where = "function"
+    elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        for alias in node.names:
+            full = f"{node.module}.{alias.name}"
+            yield Import(name, full if full in known else node.module, where)
+    elif isinstance(node, ast.Import):
+        for alias in node.names:
+            yield Import(name, alias.name, where)
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr):  # most of all nodes, and none of them imports
+            yield from _imports(name, child, where, known)
 
 
 def loaded_by(module, every):

@@ -11,7 +11,7 @@ import networkx as nx
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from imports import FLOORS, PACKAGE, ROOT, imports, loaded_by, modules
+from imports import FLOORS, PACKAGE, ROOT, imports, loaded_by, modules, trees
 
 MOST = 12
 HEAVY = {
@@ -60,7 +60,7 @@ def test_no_folder_holds_more_than_a_dozen_modules():
 def test_every_room_says_in_one_line_what_one_finds_there():
     for name, path in modules().items():
         if path.name == "__init__.py":
-            told = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+            told = ast.get_docstring(trees()[name])
             assert told and len(told.splitlines()[0]) <= 117, name
 
 
@@ -90,8 +90,8 @@ def test_an_import_inside_a_function_keeps_a_heavy_library_out_of_the_start():
 
 def test_no_class_stands_for_two_things():
     places = defaultdict(list)
-    for name, path in modules().items():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+    for name, tree in trees().items():
+        for node in tree.body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(name)
     assert {name: where for name, where in places.items() if len(where) > 1} == {}

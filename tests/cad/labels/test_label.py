@@ -16,7 +16,7 @@ from scanwright.cad.labels.flats import flat_at, flats_of
 from scanwright.cad.labels.glyphs import letters, text_width
 from scanwright.cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
 from scanwright.cad.labels.visibility import room_before
-from scanwright.cad.parts.all_parts import laid_out
+from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.solids import box, upright
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
@@ -58,7 +58,7 @@ def test_scanners_whose_parts_may_differ_have_labels_that_do(made):
     scanners = [made.scanner, swept(-10.0, 10.0), swept(-90.0, 90.0)]
     assert len({digest_of(scanner) for scanner in scanners}) == 3
     assert digest_of(swept(-10.0, 10.0, period_s=9.0)) == digest_of(scanners[1])
-    bars = [laid_out(scanner).counterweight for scanner in scanners[1:]]
+    bars = [placement_of(scanner).counterweight for scanner in scanners[1:]]
     assert [isinstance(bar, LeftOut) for bar in bars] == [True, False]  # the narrow one keeps the gears on a flank
 
 

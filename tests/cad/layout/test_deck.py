@@ -8,8 +8,7 @@ from quick_tests import samples
 
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
-from scanwright.cad.layout.placement import drive_of
-from scanwright.cad.parts.all_parts import laid_out
+from scanwright.cad.layout.placement import drive_of, placement_of
 from scanwright.cad.parts.mounts.base_mount import base_mount
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -53,11 +52,10 @@ DAILY = [MOUNTS[k] for k in (0, 4, 8, 9)]  # every axis, and every deck, once
 def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count, alpha_rot, beta_rot):
     scanner = scanner_for(alpha_rot, beta_rot, deck)
     stack = drive_of(scanner).stack
-    layout = laid_out(scanner)
-    where = layout.deck
-    mesh = checked_mesh(base_mount(layout), "base_mount")
+    place = placement_of(scanner)
+    mesh = checked_mesh(base_mount(place), "base_mount")
     turn = scanner.angles.T_world_rot(0.0)[:3, :3]
-    world = mesh.vertices @ turn.T + np.array(where.t_world_rot)
+    world = mesh.vertices @ turn.T + np.array(place.deck.t_world_rot)
     assert np.abs(world[:, 2]).min() < 1e-6
     face = world[np.abs(world[:, 2]) < 1e-3, :2]
     radius = SCREW_HOLE[deck.screw] / 2

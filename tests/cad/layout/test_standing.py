@@ -8,6 +8,7 @@ from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
 from scanwright.cad.layout.cables.fixed import fixed_cables_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS
+from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.deck_holes import Rectangle
 
@@ -17,6 +18,11 @@ LAID = [
     ((0, 19, 84, 41), {"sensor": "URG-04LX", "slip_ring": CAPSULE}),
     ((0, 0, 0, 0), {}),  # upright on the deck
 ]
+
+
+@pytest.fixture(scope="module")
+def ground_ahead():
+    return laid_out(scanner_at(GROUND_AHEAD))
 
 
 @pytest.mark.parametrize(("setting", "products"), LAID, ids=["cage", "arms", "belt", "deck"])
@@ -40,10 +46,9 @@ def test_every_cable_leaves_its_device_and_keeps_its_bend(setting, products):
     assert apart > sum(lead.diameter for lead in leads) / 2
 
 
-def test_on_the_foot_each_lies_between_two_slots():
-    layout = laid_out(scanner_at(GROUND_AHEAD))
-    deck = layout.deck
-    for lead in layout.cables:
+def test_on_the_foot_each_lies_between_two_slots(ground_ahead):
+    deck = ground_ahead.deck
+    for lead in ground_ahead.cables:
         points = (lead.path.points(0.5) - np.array(deck.centre)) @ deck.rotation()
         inside = []
         for seat in deck.ties:
@@ -54,21 +59,20 @@ def test_on_the_foot_each_lies_between_two_slots():
         assert inside.count(True) == 1
 
 
-def test_what_the_catalogue_does_not_tell_is_not_laid():
-    layout = laid_out(scanner_at(GROUND_AHEAD))
-    scanner = layout.scanner
+def test_what_the_catalogue_does_not_tell_is_not_laid(ground_ahead):
+    scanner = ground_ahead.scanner
     silent = replace(scanner, servo=scanner.servo.model_copy(update={"cable_out": None}))
-    assert [lead.name for lead in fixed_cables_of(replace(layout, scanner=silent), ())] == ["stator_leads"]
+    assert [lead.name for lead in fixed_cables_of(replace(ground_ahead, scanner=silent), ())] == ["stator_leads"]
 
 
-def test_a_cable_that_cannot_bend_has_no_way():
-    layout = laid_out(scanner_at(GROUND_AHEAD))
-    stiff = layout.scanner.servo.model_copy(update={"cable_bend_radius_mm": 40.0})
-    (lead, _) = fixed_cables_of(replace(layout, scanner=replace(layout.scanner, servo=stiff)), ())
+def test_a_cable_that_cannot_bend_has_no_way(ground_ahead):
+    scanner = ground_ahead.scanner
+    stiff = scanner.servo.model_copy(update={"cable_bend_radius_mm": 40.0})
+    (lead, _) = fixed_cables_of(replace(ground_ahead, scanner=replace(scanner, servo=stiff)), ())
     assert lead.path is None and lead.mass_g == 0
 
 
 def test_no_slot_of_the_foot_is_where_a_screw_of_the_deck_is():
     scanner = replace(scanner_at(GROUND_AHEAD), deck=Rectangle(shape="rectangle", size_mm=(80.0, 20.0), screw="M4"))
-    seats = laid_out(scanner).deck.ties
+    seats = placement_of(scanner).deck.ties
     assert {round(np.degrees(seat.azimuth)) % 180 for seat in seats} == {90}

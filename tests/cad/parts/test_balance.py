@@ -19,10 +19,10 @@ from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.inertia import of_line, of_solid
 from scanwright.cad.layout.cables.leads import SAMPLE
 from scanwright.cad.layout.loads import RUBS_NM
+from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.layout.rotor.counterweight import SAW, SECTIONS, TRIM, Counterweight
 from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, torque_nm
 from scanwright.cad.layout.rotor.linkage import Ear, neck_corners
-from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
 from scanwright.studio.view.scanner_bodies import make_bodies
@@ -36,7 +36,7 @@ def scanner_for(*angles, sensor="UTM-30LX", servo="MX-64R"):
 
 
 def found_for(scanner):
-    return laid_out(scanner).counterweight
+    return placement_of(scanner).counterweight
 
 
 @pytest.fixture(scope="module", params=SHIPPED, ids=["ground_ahead", "rolling"])

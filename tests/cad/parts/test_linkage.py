@@ -28,7 +28,6 @@ from scanwright.cad.layout.envelope import (
     slot_ends,
 )
 from scanwright.cad.layout.placement import drive_of, placement_of
-from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
 from scanwright.cad.parts.linkage.sub_plate import sub_plate
 from scanwright.cad.parts.mounts.base_mount import base_mount
@@ -111,13 +110,13 @@ SKINS = {  # where one stood, of 10 to 420 mm2
 @pytest.mark.parametrize("where", SKINS)
 def test_no_skin_stays_between_what_is_cut(where):
     scanner = scanner_for(*SKINS[where])
-    walls = thin_walls(draft_linkage(laid_out(scanner).linkage), scanner.printer.min_wall_mm)
+    walls = thin_walls(draft_linkage(placement_of(scanner).linkage), scanner.printer.min_wall_mm)
     assert walls.area_mm2 < 5.0, f"{where}: {walls.thinnest_mm:.2f} mm at {walls.at}"
 
 
 def test_a_lying_plate_is_thick_at_its_foot():
     """A bracket, not a board: measured through the plate, beside its screws, below and above its middle."""
-    p = laid_out(scanner_for(0, 80)).linkage
+    p = placement_of(scanner_for(0, 80)).linkage
     drawn = draft_linkage(p)
     body = trimesh.Trimesh(drawn.vertices @ p.stack.R(), drawn.faces, process=False)
     down = np.sign(p.stack.R()[2, 0])  # along x, where the hub is
@@ -261,10 +260,11 @@ SLOTTED = [("RPLIDAR S2", (5, 0)), ("RPLIDAR A1", (60, 60)), ("RPLIDAR S1", (-80
 @pytest.mark.parametrize(("name", "at"), samples(SLOTTED, SLOTTED[:2]))
 def test_slots_take_another_pitch_and_still_hold_the_lidar_in_the_middle(name, at):
     scanner = scanner_for(*at, lidar=name)
-    p, lidar = laid_out(scanner).linkage, scanner.lidar
+    p, lidar = placement_of(scanner).linkage, scanner.lidar
     assert p.screw_travel > 1.5
-    part, low = (alignment_linkage(p), p.seat - 9.0)
-    if p.ears is not None:
+    if p.ears is None:
+        part, low = alignment_linkage(p), p.seat - 9.0
+    else:
         part, low = sub_plate(scanner, p.stack, p.stack.sub_plate), p.seat - 4.5
     mesh = checked_mesh(part, "part")
     body = manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
@@ -289,7 +289,7 @@ def test_a_lidar_whose_holes_somebody_verified_gets_round_ones():
     lidar = measured.lidar.model_copy()
     lidar._provenance = lidar.provenance() | {"holes": Provenance(source="calliper", verified=True)}
     verified = replace(measured, lidar=lidar)
-    assert (laid_out(measured).linkage.screw_travel > 0, laid_out(verified).linkage.screw_travel) == (True, 0)
+    assert (placement_of(measured).linkage.screw_travel > 0, placement_of(verified).linkage.screw_travel) == (True, 0)
     assert digest_of(measured) != digest_of(verified)
 
 

@@ -15,7 +15,7 @@ from scanwright.cad.checks.products import module_checks
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import LIDAR
-from scanwright.cad.parts.all_parts import laid_out
+from scanwright.cad.layout.placement import placement_of
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import NO_MODULES, Modules
@@ -45,7 +45,7 @@ def on_tripod(parts_of):
 def test_what_is_not_asked_for_is_told_as_left_out_and_changes_nothing_that_is_made(name):
     asked, without = (scanner_for(GROUND_AHEAD, Modules(**{name: value})) for value in (True, False))
     assert without.modules == NO_MODULES
-    specs = [laid_out(scanner) for scanner in (asked, without)]
+    specs = [placement_of(scanner) for scanner in (asked, without)]
     assert digest_of(asked) != digest_of(without)
     assert specs[0].linkage == specs[1].linkage and specs[0].stack == specs[1].stack
 
@@ -60,7 +60,7 @@ def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod, parts_of):
 
 
 def test_the_world_begins_where_the_tripod_does(on_tripod):
-    deck, plain = on_tripod.layout.deck, laid_out(scanner_for(GROUND_AHEAD, NO_MODULES)).deck
+    deck, plain = on_tripod.layout.deck, placement_of(scanner_for(GROUND_AHEAD, NO_MODULES)).deck
     assert deck.tripod.thickness == 8.0
     np.testing.assert_allclose(np.subtract(deck.t_world_rot, plain.t_world_rot), [0, 0, 8.0], atol=1e-6)
     turn = on_tripod.layout.scanner.angles.T_world_rot(0.0)[:3, :3]
@@ -107,9 +107,9 @@ def test_the_nut_is_bought_and_the_screw_of_the_tripod_is_not(on_tripod):
 
 
 def test_an_upright_axis_gets_its_mount_for_the_tripod():
-    assert laid_out(scanner_for(UPRIGHT, NO_MODULES)).deck.flat
-    layout = laid_out(scanner_for(UPRIGHT, Modules(tripod_foot=True)))
-    assert not layout.deck.flat and math.isclose(layout.deck.normal[2], 1.0)
+    assert placement_of(scanner_for(UPRIGHT, NO_MODULES)).deck.flat
+    deck = placement_of(scanner_for(UPRIGHT, Modules(tripod_foot=True))).deck
+    assert not deck.flat and math.isclose(deck.normal[2], 1.0)
 
 
 def on_bed_of(scanner, bed_mm):

@@ -89,8 +89,8 @@ def until(true, seconds=60.0, meanwhile=lambda: None):
 
 
 def shown(browser, address, width, height, **options):
-    """The page at half the resolution of its layout: the picture is drawn on the processor here."""
-    return browser.open(address, width, height, device_scale_factor=0.5, **options)
+    """The page at half the resolution of its layout, drawn three times a second: by the processor here."""
+    return browser.open(address, width, height, frame_ms=300, device_scale_factor=0.5, **options)
 
 
 def enter(page, number, value):
@@ -354,7 +354,7 @@ def test_on_a_phone_the_panel_is_a_sheet_that_fingers_can_use(studio, browser):
 def test_every_change_can_be_undone_and_done_again(studio, browser):
     studio, gate = studio
     c = studio.controls
-    page = browser.open(gate.address, width=1000, height=700)
+    page = shown(browser, gate.address, 1000, 700)
     page.get_by_text("exact").wait_for()
     c.look.value, c.weight.value = "hidden", 1.0  # what is not drawn costs no time
     studio._paint(())
