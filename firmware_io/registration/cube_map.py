@@ -67,7 +67,7 @@ def _centres(side: int, du_rad: float, dv_rad: float) -> Float64[ndarray, "cells
     middle = (np.arange(side) + 0.5) / side * np.pi / 2 - np.pi / 4
     u, v = np.meshgrid(np.tan(middle + du_rad), np.tan(middle + dv_rad))
     faces = [np.roll([np.full_like(u, end), u, v], axis, 0) for axis in range(3) for end in (1.0, -1.0)]
-    return np.ascontiguousarray(np.moveaxis(faces, 1, -1).reshape(-1, 3))
+    return np.ascontiguousarray(np.moveaxis(np.array(faces), 1, -1).reshape(-1, 3))
 
 
 @njit(cache=True)
