@@ -18,7 +18,7 @@ from scanwright.cad.files.prices import EACH_USD
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.layout.joints import LENGTHS, shank_mm
 from scanwright.cad.layout.placement import placement_of
-from scanwright.cad.parts.all_parts import parts_of
+from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.angles import Angles
@@ -271,7 +271,7 @@ def test_the_time_to_print_is_that_of_the_plates(rows, made):
     assert sum(float(h) for _, h in plates) == pytest.approx(hours, abs=0.5 * len(plates) + 0.5)
 
 
-def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
+def test_a_profile_with_inserts_gets_their_seats_and_lists_them(parts_of):
     scanner = scanner_at(TILTED, printer="fdm-0.4-insert")
     assembly = parts_of(scanner)
     rounds = {name: rounds_of(solid) for name, solid in assembly.made.items()}
@@ -281,7 +281,7 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(made, parts_of):
     assert not held and cage.count == 4
     seats = [hole for hole in rounds["slip_ring_adapter"] if hole.hole and hole.diameter == 4.0]
     assert len(seats) == 4 and min(hole.length for hole in seats) > INSERT_LENGTH
-    by_threads = {(joint.part, joint.onto) for joint in made.result.assembly.layout.joints}
+    by_threads = {(joint.part, joint.onto) for joint in laid_out(scanner_at(TILTED)).joints}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
     items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 4)]
