@@ -105,13 +105,22 @@ def on_planes(
     regions = planes_of(loaded)
     if not regions:
         return ()
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-    beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
-    free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
-    beams = beams[free & ~problem.field.masked_at(beams)]
+    beams = free_beams(problem, angles_rad, shadow)
     spots = _spots(problem if shadow is None else problem.behind(shadow), angles_rad)
     reach_m = loaded.lidar.practical_range_m
     return tuple(on_plane(region, beams, problem, spots, reach_m) for region in regions)
+
+
+def free_beams(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Float[ndarray, "n 3"]:
+    """Return the beams of one full scan that no mask and no part blocks, unit vectors of the world, shape (n, 3).
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+    """
+    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
+    free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
+    return beams[free & ~problem.field.masked_at(beams)]
 
 
 def _spots(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 4"]:

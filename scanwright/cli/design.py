@@ -35,22 +35,18 @@ def optimise(
         from scanwright.design.evaluation.landscape_picture import landscape_picture
 
         picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
-    from scanwright.design.evaluation.coverage import hidden_lines
-    from scanwright.design.evaluation.metres import on_planes
+    from scanwright.design.evaluation.expected_cloud import expected_cloud
 
-    planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
+    cloud = expected_cloud(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        from scanwright.cli.results.angles import Optimised, PlaneResult
+        from scanwright.cli.results.angles import Optimised
 
-        plane_facts = [PlaneResult(**plane.facts()) for plane in planes]
-        show_json(Optimised(**optimum.facts(), planes=plane_facts, warnings=optimum.asked.warnings()))
+        show_json(Optimised(**optimum.facts(), **cloud.facts(), warnings=optimum.asked.warnings()))
     else:
-        scan = (f"one full scan, {plane.words()}" for plane in planes)
         show(
             [
                 *optimum.lines(verbosity() is Verbosity.VERBOSE),
-                *scan,
-                *hidden_lines(optimum.asked),
+                *cloud.lines(),
                 *(f"warning: {warning}" for warning in optimum.asked.warnings()),
             ]
         )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from scanwright.design.evaluation.as_built import Seen
 from scanwright.design.evaluation.comparison import ComparisonRow
 from scanwright.design.evaluation.evaluation import Lever
+from scanwright.design.evaluation.expected_cloud import ExpectedError
 from scanwright.design.evaluation.gaps import BlindCone
 from scanwright.design.evaluation.poles import PoleChances
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.objective.holes import BlindSpot
 
@@ -172,6 +174,8 @@ class Optimised:
         evaluated: number of values of J that it computed.
         seconds: run time of the search.
         left_out: skipped work, with the reason.
+        expected_error: error of a point to expect.
+        wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
         planes: points on ground, walls and ceilings of the task.
         warnings: limits of the task that can surprise.
     """
@@ -190,6 +194,8 @@ class Optimised:
     evaluated: int
     seconds: float
     left_out: list[LeftOut]
+    expected_error: ExpectedError
+    wide_gap: Finding | None
     planes: list[PlaneResult]
     warnings: list[str]
 
@@ -236,13 +242,15 @@ class Evaluated:
         crossing_deg: mean angle at which lines cross there; null if there is no double coverage.
         half_turn_misses: share that half a turn misses of what a full turn sees; null for a sweep.
         J_rises_1_deg_off: angle -> rise of J if it is 1 deg off.
+        expected_error: error of a point to expect.
+        wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
+        planes: points on ground, walls and ceilings of the task.
         lever: offset of the optical centre that the figures are for; null if it is on the axis.
         empty_cap: largest cone without a beam, of a sweep.
         interlaced_period_s: period for which the lines of the next turn fall between those of this one.
         pole: probability of hitting a pole (`--pole`).
         lowest_points_per_m2: lowest density on the scene mesh of the task.
         median_points_per_m2: median density on it, by area.
-        planes: points on ground, walls and ceilings of the task.
         as_built: view with the parts, of a build folder.
     """
 
@@ -266,13 +274,15 @@ class Evaluated:
     crossing_deg: float | None
     half_turn_misses: float | None
     J_rises_1_deg_off: dict[str, float]
+    expected_error: ExpectedError
+    wide_gap: Finding | None
+    planes: list[PlaneResult]
     lever: Lever | None = None
     empty_cap: BlindCone | None = None
     interlaced_period_s: float | None = None
     pole: PoleChances | None = None
     lowest_points_per_m2: float | None = None
     median_points_per_m2: float | None = None
-    planes: list[PlaneResult] = field(default_factory=list)
     as_built: WithParts | None = None
 
 
