@@ -90,7 +90,7 @@ class ExpectedCloud:
         return {
             "expected_error": asdict(self.error),
             "wide_gap": None if self.gap is None else asdict(self.gap),
-            "planes": [plane.facts() for plane in self.planes],
+            "planes": [asdict(plane) for plane in self.planes],
         }
 
 

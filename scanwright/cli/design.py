@@ -19,11 +19,7 @@ app = Commands("Design")
 
 
 @app.command(example="optimise ground_ahead", no="J differs from a count of simulated beams")
-def optimise(
-    task: TaskFile,
-    picture: Annotated[Path | None, Option(metavar="FILE.png", help="Plot of the objective.")] = None,
-    as_json: AsJson = False,
-) -> None:
+def optimise(task: TaskFile, as_json: AsJson = False) -> None:
     """Find the best mounting angles for a task.
 
     Searches all angles within the task's ranges and prints the ten best distinct mounts.
@@ -31,10 +27,6 @@ def optimise(
     from scanwright import api
 
     optimum = api.optimise(task, progress=ConsoleProgress())
-    if picture is not None:
-        from scanwright.design.evaluation.landscape_picture import landscape_picture
-
-        picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
     from scanwright.design.evaluation.expected_cloud import expected_cloud
 
     cloud = expected_cloud(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
@@ -50,8 +42,6 @@ def optimise(
                 *(f"warning: {warning}" for warning in optimum.asked.warnings()),
             ]
         )
-        if picture is not None:
-            print(f"wrote {picture}")
         hint(f"next: `scanwright build {task}`")
 
 

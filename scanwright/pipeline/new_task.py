@@ -42,7 +42,7 @@ ANGLES = r"""
 #          |                 /   \                   | \                  /   \                    | \
 #          S                S     >                  S  >                S                         S
 #
-# A pair [from, to] is searched, one value fixes the angle. With these ranges nothing is left out.
+# A pair [from, to] is searched, one value fixes the angle.
 """
 
 

@@ -9,6 +9,7 @@ from scanwright.design.evaluation.comparison import ComparisonRow
 from scanwright.design.evaluation.evaluation import Lever
 from scanwright.design.evaluation.expected_cloud import ExpectedError
 from scanwright.design.evaluation.gaps import BlindCone
+from scanwright.design.evaluation.metres import PlaneFigures
 from scanwright.design.evaluation.poles import PoleChances
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
@@ -129,33 +130,6 @@ class SeenGain(GainResult):
 
 
 @dataclass(frozen=True, slots=True)
-class PlaneResult:
-    """Points of one full scan on a region that is a plane.
-
-    Attributes:
-        region: the region in words.
-        range_m: practical range of the lidar.
-        beyond_range: share of the area beyond this range.
-        points: number of points.
-        points_per_m2: mean number of points per square metre.
-        at_m: distance that `gap_cm` is for.
-        gap_cm: diameter of the largest disc without a point; null if there are no points.
-        gap_off_axis_cm: the same without the blind cones around the axis.
-        twice_cm: diameter of the smallest disc that gets two points at any place.
-    """
-
-    region: str
-    range_m: float
-    beyond_range: float
-    points: int
-    points_per_m2: float
-    at_m: float | None
-    gap_cm: float | None
-    gap_off_axis_cm: float | None
-    twice_cm: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class Optimised:
     """The best mounting angles of a task.
 
@@ -196,7 +170,7 @@ class Optimised:
     left_out: list[LeftOut]
     expected_error: ExpectedError
     wide_gap: Finding | None
-    planes: list[PlaneResult]
+    planes: list[PlaneFigures]
     warnings: list[str]
 
 
@@ -276,7 +250,7 @@ class Evaluated:
     J_rises_1_deg_off: dict[str, float]
     expected_error: ExpectedError
     wide_gap: Finding | None
-    planes: list[PlaneResult]
+    planes: list[PlaneFigures]
     lever: Lever | None = None
     empty_cap: BlindCone | None = None
     interlaced_period_s: float | None = None
