@@ -10,7 +10,7 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.evaluation.as_built import AsBuilt
 from scanwright.design.evaluation.metres import planes_of, rounded
-from scanwright.design.findings import Finding, sentence
+from scanwright.design.findings import Finding
 from scanwright.design.motion import Motion
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
 from scanwright.design.search.mounts.gain import AS_GOOD
@@ -126,7 +126,7 @@ def _sees(answer: BuildAnswer) -> Card:
     headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
     if cloud.hidden:
         headline += ", except behind the robot"
-    warned = [] if cloud.gap is None else [sentence(cloud.gap)]
+    warned = [] if cloud.gap is None else [cloud.gap.message]
     if cloud.gap is not None and cloud.gap.value is not None:
         headline += f", but with a gap of {cloud.gap.value:.1f} deg"
     text = [f"{_capital(words)}." for words in (*warned, *cloud.hidden, *(plane.words() for plane in cloud.planes))]
