@@ -54,7 +54,7 @@ class ExpectedError:
             until = " until calibrated" if self.backlash_calibrated else ""
             parts.append(f"servo backlash {_figure(self.backlash_mm)}{until}")
         parts.append(f"encoder steps {_figure(self.encoder_mm)}")
-        bending = "unknown before a build" if self.bending_mm is None else _figure(self.bending_mm)
+        bending = "unknown" if self.bending_mm is None else _figure(self.bending_mm)
         parts.append(f"bending {bending}")
         about = "at least" if self.backlash_mm is None else "about"
         return f"expect {about} {rounded(self.total_mm)} mm at {self.at_m:g} m ({', '.join(parts)})"

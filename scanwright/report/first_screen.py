@@ -145,9 +145,7 @@ def _gain(built: AsBuilt) -> Card:
     better = " It has more beams than this scanner." if fewer else ""
     flaws = f" But: {first.flaws}." if first.flaws else ""
     rest = ", ".join(f"{gain.value} {gain.mount.name}" for gain in others)
-    text = (
-        f"{unit}Best of {len(built.mounts)} usual mounts, their parts not counted.{better}{flaws} The others: {rest}."
-    )
+    text = f"{unit}Best of {len(built.mounts)} mounts without parts.{better}{flaws} The others: {rest}."
     return Card("Compared with usual mounts", f"{first.value} {first.mount.name}", text)
 
 

@@ -37,7 +37,7 @@ def test_every_place_states_the_same_numbers_of_a_build(built, command):
     told, without = out.split("\nwithout parts:\n")
     assert [line for line in told.splitlines() if line.startswith("with parts")] == stated
     (expected,) = (line for line in lines if line.startswith("expect "))
-    assert expected in told.splitlines() and "unknown before a build" not in expected
+    assert expected in told.splitlines() and "bending unknown" not in expected
     assert "with parts" not in without
 
     facts = json.loads(command("evaluate", folder, "--json")[1])
