@@ -27,6 +27,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from importlib.util import find_spec
+from pathlib import Path
 
 _NO_SWITCH = "the servo knows its angle, and `scanwright scan` never read the switch"
 _NO_STEPPER = "no layout took the stepper; use a Dynamixel or Feetech servo, such as MX-64R"
@@ -40,6 +41,13 @@ REMOVED: dict[str, str] = {  # names in files and commands of version 0.1, and w
     "EE-SX672": _NO_SWITCH,
     "slot_switch": _NO_SWITCH,
     "PD42-3-1140": _NO_STEPPER,
+}
+
+
+MAKERS: dict[str, str] = {  # suffix of a file -> the end of the message that there is none
+    ".json": "; `scanwright build TASK` writes angles.json to out/TASK",
+    ".mcap": "; `scanwright scan` makes recordings, `scanwright import` converts ROS bags",
+    ".ply": "; `scanwright assemble` makes clouds of recordings",
 }
 
 
@@ -124,6 +132,11 @@ def suggest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"; did you mean '{folded[close[0]]}'?"
     return f"; known: {', '.join(names)}" if names else ""
+
+
+def made_by(path: Path) -> str:
+    """Return the end of a message about a missing file: the command that makes such a file; empty if there is none."""
+    return MAKERS.get(path.suffix.lower(), "")
 
 
 def require(extra: str, need: str, *modules: str) -> None:

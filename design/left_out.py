@@ -12,7 +12,7 @@ class LeftOut:
     Attributes:
         what: what was skipped.
         why: reason.
-        saved: count that it saved.
+        saved: count that it saved; 0 for mounts that were rejected.
         unit: unit of the count.
     """
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
-from scanwright.design.errors import RecordingError
+from scanwright.design.errors import RecordingError, made_by
 from scanwright.design.files.text_files import first_line
 
 P = ParamSpec("P")
@@ -25,7 +25,8 @@ def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) 
     except RecordingError:
         raise
     except OSError as error:
-        raise RecordingError(f"{what}: {error.strerror or first_line(error)}") from error
+        hint = made_by(Path(error.filename)) if isinstance(error, FileNotFoundError) and error.filename else ""
+        raise RecordingError(f"{what}: {error.strerror or first_line(error)}{hint}") from error
     except Exception as error:
         raise RecordingError(f"{what}: {first_line(error)}") from error
 

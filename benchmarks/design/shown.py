@@ -29,7 +29,6 @@ from scanwright.design.evaluation.comparison import compare, ready_made
 from scanwright.design.evaluation.comparison_table import notes, table
 from scanwright.design.evaluation.coverage import mean_density_at
 from scanwright.design.evaluation.evaluation import Lever, evaluate
-from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.evaluation.poles import Pole
 from scanwright.design.motion import Shortest
 from scanwright.design.objective.problem import problem_of
@@ -39,7 +38,7 @@ from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.task import LoadedTask
-from scanwright.report.answer import answer, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, problem_as_built
 from scanwright.report.colours import bands_to
 from scanwright.report.density_sphere import density_sphere
 from scanwright.report.first_screen import cards
@@ -134,12 +133,12 @@ def _compare_fully(drawn: RandomTask, _: Path) -> None:
 def _report(drawn: RandomTask, _: Path) -> None:
     loaded, shadow = drawn.loaded, _shadow(drawn)
     angles = loaded.angle_set(drawn.angles_deg)
-    problem, setting = problem_as_built(loaded, angles), mounting_rad(angles)
+    problem = problem_as_built(loaded, angles)
     found = answer(loaded, angles, shadow)
     tuned = [mount.gain.mount for mount in found.as_built.mounts]
     sphere = density_sphere(problem, angles, tuned, shadow)
     json.dumps(room_scene(room_about(loaded.task), np.zeros(3), np.array(sphere.middle), sphere.below))
-    cards(angles, found, on_planes(loaded, problem, setting, shadow), None)
+    cards(angles, found, None)
     found.as_built.lines()
 
 

@@ -27,14 +27,14 @@ import scanwright as sw
 from benchmarks.scanwright import gallery_worlds as worlds
 from benchmarks.scanwright.canvas import Canvas
 from benchmarks.scanwright.robot_picture import points_of, scanner_bodies
+from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
-from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.scene.ray_caster import build_scene
 from scanwright.design.self_occlusion import load_self_occlusion
 from scanwright.design.task.task import load_task
 from scanwright.firmware_io.emulators.simulated import simulated_recording
-from scanwright.report.answer import answer, mounting_rad, problem_as_built
+from scanwright.report.answer import answer
 from scanwright.report.first_screen import cards
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -270,10 +270,8 @@ def cloud(entry: Entry, angles: AngleSet) -> Image.Image:
 def section(entry: Entry, folder: Path) -> str:
     """Its part of the page."""
     loaded, angles = load_task(folder / "task.toml"), sw.load_angles(folder / "angles.json")
-    problem = problem_as_built(loaded, angles)
     shadow = load_self_occlusion(folder / "own_body.npz")[0]
-    planes = on_planes(loaded, problem, mounting_rad(angles), shadow)
-    first_three = cards(angles, answer(loaded, angles, shadow), planes, None)[:3]
+    first_three = cards(angles, answer(loaded, angles, shadow, read_checks(folder / "checks.json")), None)[:3]
     result = [f"{card.headline}. {card.text}" for card in first_three]
     found = angles.angles_deg
     four = (found.alpha_rot, found.beta_rot, found.alpha_laser, found.beta_laser)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.checks.limits import at_least, at_most, note, spot, tidy
+from scanwright.cad.checks.limits import at_least, at_most, figures, note, spot, tidy
 from scanwright.cad.checks.table import SMALLEST_HOLE_MM, THIN_SHARE
 from scanwright.cad.geometry.holes import Round, rounds_of
 from scanwright.cad.geometry.mesh import TriMesh
@@ -147,7 +147,7 @@ def islands_check(name: str, mesh: TriMesh, pose: PrintPose) -> Finding:
     at = np.linalg.inv(pose.T_bed_part) @ [*lowest.middle, lowest.height, 1.0]
     message = (
         f"{name}: {len(islands)} layers start in the air, the lowest {lowest.height:.1f} mm above the bed, "
-        f"{spot(at[:3])}, the largest {largest:.0f} mm2"
+        f"{spot(at[:3])}, the largest {figures(largest)} mm2"
     )
     return Finding("islands", "warning", name, message, tidy(len(islands)), 0.0, hint="let the slicer support them")
 

@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from scanwright.design.accuracy.front import dominators
 from scanwright.design.accuracy.machine import this_machine
 from scanwright.design.errors import BuildError
-from scanwright.design.evaluation.picture_files import save_picture
 from scanwright.design.files.atomic_file import atomic_write
+from scanwright.design.files.picture_files import save_picture
 
 T = TypeVar("T")
 REPEATS = 3  # timed runs after a warm-up

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from scanwright.design.evaluation.comparison import ComparisonRow
 from scanwright.design.evaluation.density_picture import INK
-from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.files.picture_files import save_picture
 from scanwright.design.objective.holes import percent
 
 LONG = {"color": "#555555"}

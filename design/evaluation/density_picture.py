@@ -14,7 +14,7 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.evaluation.coverage import mean_density_at
-from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.files.picture_files import save_picture
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion
 

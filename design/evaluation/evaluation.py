@@ -14,10 +14,11 @@ from scanwright.design.arrays import Setting
 from scanwright.design.density.beams import scan_at
 from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
-from scanwright.design.evaluation.coverage import Coverage, coverage, hidden_lines, on_surfaces
+from scanwright.design.evaluation.coverage import Coverage, coverage, on_surfaces
+from scanwright.design.evaluation.expected_cloud import ExpectedCloud, expected_cloud
 from scanwright.design.evaluation.gaps import BlindCone, Gaps, empty_cap, gaps, interlaced_period_s
-from scanwright.design.evaluation.metres import PlaneFigures, on_planes
 from scanwright.design.evaluation.poles import Pole, PoleChances, pole_chances, require_in_range
+from scanwright.design.findings import Finding
 from scanwright.design.objective.ball_search import BallScore, ball_score
 from scanwright.design.objective.holes import BlindSpot, holes, percent
 from scanwright.design.objective.problem import Problem, problem_of
@@ -79,9 +80,8 @@ class Evaluation:
         rises: by how much J rises where each angle is 1 deg off.
         hit: the chance to hit a pole, if the task has one.
         surfaces: points per square metre, if the task has a scene.
-        planes: what a full scan leaves on ground, ceiling and walls of the task.
-        hidden: which shares of the regions the masks hide, in words.
-        as_built: the same setting with the parts of its build, if there is one; all else is without parts.
+        cloud: error, gaps and points to expect; with the parts of its build, if there is one.
+        as_built: the same setting with these parts; all else is without parts.
     """
 
     problem: Problem
@@ -97,8 +97,7 @@ class Evaluation:
     rises: dict[str, float]
     hit: PoleChances | None
     surfaces: dict[str, float] | None
-    planes: tuple[PlaneFigures, ...]
-    hidden: tuple[str, ...]
+    cloud: ExpectedCloud
     as_built: AsBuilt | None
 
     def beam_directions(self) -> Float[ndarray, "n 3"]:
@@ -139,7 +138,7 @@ class Evaluation:
             "J_rises_1_deg_off": self.rises,
             **({} if self.hit is None else {"pole": asdict(self.hit)}),
             **(self.surfaces or {}),
-            **({"planes": [plane.facts() for plane in self.planes]} if self.planes else {}),
+            **self.cloud.facts(),
             **({} if self.as_built is None else {"as_built": self.as_built.facts()}),
         }
 
@@ -150,6 +149,7 @@ class Evaluation:
         lines = [
             *self._doubts(),
             *([] if self.as_built is None else self.as_built.lines()),
+            *self.cloud.lines(),
             "without parts:",
             *([] if self.lever is None else [f"lever          {self.lever.words()}"]),
             *(
@@ -183,8 +183,6 @@ class Evaluation:
             lines.append(
                 f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest"
             )
-        lines += [f"in metres      {plane.words()}" for plane in self.planes]
-        lines += [f"masks          {words}" for words in self.hidden]
         if self.interlaced_s is not None:
             lines.append(
                 f"interlaced     with {self.interlaced_s:g} s a turn: the next turn's lines fall between these"
@@ -199,6 +197,7 @@ def evaluate(
     lever: Lever | None,
     progress: Progress,
     shadow: SelfOcclusion | None = None,
+    checks: Sequence[Finding] = (),
 ) -> Evaluation:
     """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
@@ -209,6 +208,7 @@ def evaluate(
         lever: offset of the optical centre; None for one on the axis.
         progress: called with what is being computed.
         shadow: beams that the parts of this very setting block, if it was built.
+        checks: of these parts.
 
     Raises:
         BuildError: the shadow is of another number of beams.
@@ -243,8 +243,7 @@ def evaluate(
         rises=sensitivity(problem, angles_rad, np.radians(1.0)),
         hit=None if pole is None else pole_chances(problem, angles_rad, pole),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
-        planes=on_planes(loaded, problem, angles_rad),
-        hidden=tuple(hidden_lines(loaded)),
+        cloud=expected_cloud(loaded, problem, angles_rad, shadow, checks),
         as_built=built,
     )
 

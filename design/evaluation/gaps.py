@@ -16,12 +16,18 @@ from scipy.spatial import ConvexHull
 
 from scanwright.design.arrays import Array, Plane, Setting, Vector
 from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
+from scanwright.design.evaluation.metres import AT_M
+from scanwright.design.findings import Finding
 from scanwright.design.frames import R_rot_laser, R_world_rot
+from scanwright.design.objective.holes import heading
 from scanwright.design.objective.problem import NODES, Problem
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.sphere.directions import weighted_samples
 
-SWEPT_DIRECTIONS = 20_000
+DIRECTIONS = 20_000  # of the region, for a sweep and for the widest gap
+WIDE = 3.0
+"""Gaps this many times as wide as the spacing of lines or beams are holes in the pattern: discs between the corners of
+a regular pattern reach the square root of 2, and twice that at the seam where a turn ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +104,43 @@ def empty_cap(scan: Float[ndarray, "n 3"]) -> BlindCone:
     return BlindCone((x, y, z), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
 
 
+def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]) -> Finding | None:
+    """Return a warning if the region has a gap much wider than the spacing of lines and beams.
+
+    None if there is none, and if the region has a blind spot, which is reported on its own.
+
+    Args:
+        problem: the task.
+        angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        beams: of one full scan, unit vectors of the world.
+
+    Raises:
+        TaskError: no direction has a weight.
+    """
+    from scipy.spatial import cKDTree
+
+    directions = weighted_samples(problem.field, DIRECTIONS).directions
+    fan = problem.beams_rot(angles_rad[2:])
+    beam_step = float(np.median(np.diff(np.sort(problem.bearings_rad))))
+    spacing_deg = float(np.degrees(max(beam_step, problem.lines.step_rad * line_spacing(fan, angles_rad[2:]))))
+    tree = cKDTree(beams, balanced_tree=False, compact_nodes=False)
+    chord = 2 * np.sin(problem.ball_rad / 2)
+    distances = tree.query(directions, distance_upper_bound=float(chord))[0]
+    widest = int(distances.argmax())
+    if not np.isfinite(distances[widest]):
+        return None
+    gap_deg, limit_deg = float(np.degrees(4 * np.arcsin(distances[widest] / 2))), WIDE * spacing_deg
+    if gap_deg <= limit_deg:
+        return None
+    across_mm = 2000 * AT_M * np.tan(np.radians(gap_deg / 2))
+    message = (
+        f"a gap {gap_deg:.1f} deg wide {heading(directions[widest])} ({across_mm:.0f} mm across at "
+        f"{AT_M:g} m) has no beam; scan lines and beams are at most {spacing_deg:.2g} deg apart"
+    )
+    hint = "it can hide smaller objects: set density.ball_radius_deg to half the angle of the smallest one"
+    return Finding("wide_gap", "warning", "region", message, gap_deg, limit_deg, "deg", hint)
+
+
 def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:
     """The period nearest to one given whose next turn puts its lines halfway between those of this one."""
     return (np.floor(period_s * scan_rate_hz) + 0.5) / scan_rate_hz
@@ -126,7 +169,7 @@ def _within_limits(
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Bool[ndarray, "2 n"]]:
     """The same at directions, for a sweep: a family comes where the joint angle it needs lies within the limits."""
     assert problem.sweep is not None
-    samples = weighted_samples(problem.field, SWEPT_DIRECTIONS)
+    samples = weighted_samples(problem.field, DIRECTIONS)
     polar, azimuth = polar_and_azimuth(samples.directions @ R_world_rot(angles_rad[0], angles_rad[1]))
     families, bearings = _families(problem.bearings_rad, angles_rad[2:], polar)
     beam_azimuth = np.stack([polar_and_azimuth(beam_directions_rot(b, *angles_rad[2:]))[1] for b in bearings])

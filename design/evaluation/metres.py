@@ -7,12 +7,13 @@ and of what lies within the practical range of the lidar.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
+from pydantic import WithJsonSchema
 
 from scanwright.design.arrays import Array, Ints, Setting, Vector
 from scanwright.design.density.beams import polar_and_azimuth, scan_at
@@ -32,6 +33,9 @@ NO_SPOTS = np.empty((0, 4))
 Nearest = Callable[[Array, list[int]], tuple[Array, Ints]]
 """Distances from points (n, 3) to those points of a scan that are so many-th nearest, and which they are."""
 
+Infinite = Annotated[float, WithJsonSchema({"type": ["number", "null"]})]
+"""Infinite if there are no points, null in JSON."""
+
 QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
 SPOT = 0.8  # of the widest gap: narrower ones off the axis are listed apart from it
 SLACK = 0.02  # of a diameter: the stated one is at most this much too wide, and never too narrow
@@ -48,9 +52,9 @@ class PlaneFigures:
         points: beams that end on it.
         points_per_m2: in the mean over the part of it that no mask hides.
         at_m: distance from the optical centre to which `gap_cm` refers: `AT_M`, or the nearest to it in the region.
-        gap_cm: diameter of the widest disc on the plane, its middle there, that no beam hits.
-        gap_off_axis_cm: the same without the spots around the axis that the fan goes around.
-        twice_cm: diameter of the smallest disc on the plane that is hit at least twice wherever it lies in the region.
+        gap_cm: diameter of the largest disc without a point whose centre is there; null if there are no points.
+        gap_off_axis_cm: the same without the blind cones around the axis.
+        twice_cm: diameter of the smallest disc that gets two points at any place.
     """
 
     region: str
@@ -59,14 +63,9 @@ class PlaneFigures:
     points: int
     points_per_m2: float
     at_m: float
-    gap_cm: float
-    gap_off_axis_cm: float
-    twice_cm: float
-
-    def facts(self) -> dict[str, Any]:
-        """Names with units and values, for JSON; None if no beam ends there."""
-        facts = asdict(self)
-        return facts if self.points else facts | dict.fromkeys(("at_m", "gap_cm", "gap_off_axis_cm", "twice_cm"))
+    gap_cm: Infinite
+    gap_off_axis_cm: Infinite
+    twice_cm: Infinite
 
     def words(self) -> str:
         """The same in a line."""
@@ -105,13 +104,22 @@ def on_planes(
     regions = planes_of(loaded)
     if not regions:
         return ()
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-    beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
-    free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
-    beams = beams[free & ~problem.field.masked_at(beams)]
+    beams = free_beams(problem, angles_rad, shadow)
     spots = _spots(problem if shadow is None else problem.behind(shadow), angles_rad)
     reach_m = loaded.lidar.practical_range_m
     return tuple(on_plane(region, beams, problem, spots, reach_m) for region in regions)
+
+
+def free_beams(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Float[ndarray, "n 3"]:
+    """Return the beams of one full scan that no mask and no part blocks, unit vectors of the world, shape (n, 3).
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+    """
+    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
+    free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
+    return beams[free & ~problem.field.masked_at(beams)]
 
 
 def _spots(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 4"]:

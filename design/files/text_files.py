@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from scanwright.design.errors import MissingFileError, TaskError
+from scanwright.design.errors import MissingFileError, TaskError, made_by
 
 
 def read_text(path: Path) -> str:
@@ -40,8 +40,10 @@ def read_text_of(path: Path, what: str) -> str:
     except NotADirectoryError as error:
         raise TaskError(f"{path.parent}: this is a file; name the build folder that contains {path.name}") from error
     except (OSError, ValueError) as error:
-        kind = MissingFileError if isinstance(error, FileNotFoundError) else TaskError
-        raise kind(f"{path}: cannot read {what}: {getattr(error, 'strerror', None) or error}") from error
+        why = f"{path}: cannot read {what}: {getattr(error, 'strerror', None) or error}"
+        if isinstance(error, FileNotFoundError):
+            raise MissingFileError(f"{why}{made_by(path)}") from error
+        raise TaskError(why) from error
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from scanwright.design.arrays import Setting
 from scanwright.design.density.ball_count import ball_count
 from scanwright.design.density.beams import scan_at
 from scanwright.design.errors import BuildError
+from scanwright.design.left_out import LeftOut
 from scanwright.design.objective.ball_search import start_phases
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem
@@ -70,7 +71,7 @@ class Chosen:
         shadow: the beams that the parts block.
         bounded: settings that a bound was computed for.
         built: settings whose solids were made.
-        refused: why settings cannot be built, one line each.
+        refused: (J without parts, why it cannot be built) of each rejected setting.
         open: families whose bound is below the J found, left because `MOST_BUILT` were made.
     """
 
@@ -79,7 +80,7 @@ class Chosen:
     shadow: SelfOcclusion
     bounded: int
     built: int
-    refused: tuple[str, ...]
+    refused: tuple[tuple[float, str], ...]
     open: int
 
     def lines(self) -> list[str]:
@@ -87,11 +88,19 @@ class Chosen:
         lines = [
             f"built {angles_words(self.family.angles_deg)}: J = {self.bare.J:.4f} without parts; "
             f"considered {self.bounded} mounts, built {self.built}, rejected {len(self.refused)}",
-            *(f"rejected {reason}" for reason in self.refused),
+            *(f"{each.what} rejected: {each.why}" for each in self.left_out()),
         ]
         if self.open:
             lines.append(f"{self.open} more mounts can be better with their parts, but were not built")
         return lines
+
+    def left_out(self) -> list[LeftOut]:
+        """Return how many mounts with a lower J were rejected, and each reason once; nothing if there is none."""
+        reasons = [reason for J, reason in sorted(self.refused) if self.bare.J > J]
+        if not reasons:
+            return []
+        mounts = "mount" if len(reasons) == 1 else "mounts"
+        return [LeftOut(f"{len(reasons)} {mounts} with a lower J", "; ".join(dict.fromkeys(reasons)), 0, mounts)]
 
 
 def choose_with_parts(
@@ -120,7 +129,7 @@ def choose_with_parts(
     best: Chosen | None = None
     lowest: tuple[bool, int, float] | None = None  # rank of the best one
     avoid, simple = ranges.holes == "avoid", ranges.prefer == "simple"
-    refused: list[str] = []
+    refused: list[tuple[float, str]] = []
     bounded = built = 0
     queue = families if simple else sorted(families, key=lambda family: family.score.J)
     for place, family in enumerate(queue):
@@ -134,12 +143,12 @@ def choose_with_parts(
         bounds = []
         for angles_deg in equivalents(problem, family.angles_deg, ranges):
             if angles_deg in failed:
-                refused.append(f"{angles_words(angles_deg)}: its parts fail a check: {failed[angles_deg]}")
+                refused.append((family.score.J, f"its parts fail a check: {failed[angles_deg]}"))
                 continue
             bound = workshop.bound(np.radians(angles_deg))
             bounded += 1
             if isinstance(bound, Refused):
-                refused.append(f"{angles_words(angles_deg)}: {bound.reason}")
+                refused.append((family.score.J, bound.reason))
                 continue
             bare = score(problem.behind(bound), np.radians(angles_deg))
             turned = simple and angles_deg != family.angles_deg
@@ -152,13 +161,12 @@ def choose_with_parts(
             built += 1
             shadow = workshop.shadow(np.radians(angles_deg))
             if isinstance(shadow, Refused):
-                refused.append(f"{angles_words(angles_deg)}: {shadow.reason}")
+                refused.append((family.score.J, shadow.reason))
                 continue
             hidden = shadow.share()
             if limits.max_blocked is not None and hidden > limits.max_blocked:
-                refused.append(
-                    f"{angles_words(angles_deg)}: the parts block {hidden:.1%} of the beams (limits.max_blocked)"
-                )
+                why = f"the parts block {hidden:.1%} of the beams (limits.max_blocked)"
+                refused.append((family.score.J, why))
                 continue
             result = score_with(problem, np.radians(angles_deg), shadow)
             rank = _blind(result, avoid), first, result.J
@@ -167,7 +175,7 @@ def choose_with_parts(
                 chosen = replace(family, angles_deg=angles_deg, score=result)
                 best = Chosen(chosen, family.score, shadow, 0, 0, (), 0)
     if best is None:
-        raise BuildError(f"none of the {len(families)} best families can be built: {refused[0]}")
+        raise BuildError(f"none of the {len(families)} best families can be built: {refused[0][1]}")
     return replace(best, bounded=bounded, built=built, refused=tuple(refused))
 
 

@@ -29,7 +29,7 @@ def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], P
         names |= {other.stem: str(other) for other in source.parent.glob("*.toml")}
         close = difflib.get_close_matches(path.stem, names, n=1, cutoff=0.8)  # the person has typed a file's name
         known = f"; did you mean '{names[close[0]]}'?" if close else f"; known: {', '.join(names_in(shipped))}"
-        raise MissingFileError(f"{path}: no such {what} file{known}") from error
+        raise MissingFileError(f"{path}: no such {what} file{known}{_new(what)}") from error
 
 
 def names_in(shipped: Path) -> list[str]:
@@ -53,4 +53,8 @@ def _path_of(path: Path, shipped: Path, what: str) -> Path:
     if path.is_symlink():
         raise MissingFileError(f"{path}: a link to a file that does not exist")
     known = suggest(path.name, names_in(shipped))
-    raise MissingFileError(f"{path}: no such {what} file, and no shipped {what} of that name{known}")
+    raise MissingFileError(f"{path}: no such {what} file, and no shipped {what} of that name{known}{_new(what)}")
+
+
+def _new(what: str) -> str:
+    return "; `scanwright new` writes one" if what == "task" else ""

@@ -12,7 +12,9 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
+from scanwright.design.arrays import Rotation
 from scanwright.design.files.record import Record
+from scanwright.design.frames import Rx, Ry, Rz
 from scanwright.design.scene.posture import AS_IT_IS, Posture
 
 Number = Annotated[float, Strict()]
@@ -122,6 +124,11 @@ class Placed(Record):
     def posture(self) -> Posture:
         """The posture of the robot of a URDF."""
         return AS_IT_IS
+
+    def R_mesh_world(self) -> Rotation:
+        """Return the axes of the world in the mesh, shape (3, 3)."""
+        roll, pitch, yaw = np.radians(self.rpy_deg)
+        return Rz(yaw) @ Ry(pitch) @ Rx(roll)
 
 
 class MeshRegion(Placed):

@@ -115,7 +115,9 @@ def open_bag(path: Path, *more: Path) -> Iterator[Bag]:
 def _bag_file(path: Path) -> Path:
     """Return what the reader opens; refuse what is no bag."""
     if not path.exists():
-        raise RecordingError(f"{path}: no such bag")
+        raise RecordingError(
+            f"{path}: no such bag: a ROS 1 bag is a file .bag, a ROS 2 bag a file or a folder with metadata.yaml"
+        )
     if path.is_dir() and not (path / "metadata.yaml").is_file():
         inside = sorted(part for part in path.iterdir() if part.suffix in _SUFFIXES)
         if len(inside) != 1:

@@ -24,7 +24,7 @@ from mcap.summary import Summary
 from mcap.writer import Writer
 
 from scanwright.design.concurrency.ahead import ahead
-from scanwright.design.errors import RecordingError
+from scanwright.design.errors import RecordingError, made_by
 from scanwright.firmware_io.foreign import foreign
 
 CHUNK_S = 0.25
@@ -96,7 +96,8 @@ def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -
 
 def _opened(path: Path) -> BinaryIO:
     if not path.is_file():
-        raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
+        what = "this is a folder, not a recording" if path.is_dir() else f"no such file{made_by(path)}"
+        raise RecordingError(f"{path}: {what}")
     stream = foreign(f"{path}: cannot read", path.open, "rb")
     magic = stream.read(len(_MAGIC))
     if magic != _MAGIC:

@@ -83,7 +83,7 @@ def evaluate(
     built = as_built_scanner(task)
     loaded = as_task(task) if built is None else built.loaded
     if built is not None and (angles_deg is None or np.allclose(np.radians(angles_deg), built.setting_rad, atol=1e-9)):
-        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, progress, built.shadow)
+        return evaluation.evaluate(loaded, built.setting_rad, pole, lever, progress, built.shadow, built.checks)
     return evaluation.evaluate(loaded, evaluation.setting_rad(angles_deg or ()), pole, lever, progress)
 
 

@@ -19,11 +19,7 @@ app = Commands("Design")
 
 
 @app.command(example="optimise ground_ahead", no="J differs from a count of simulated beams")
-def optimise(
-    task: TaskFile,
-    picture: Annotated[Path | None, Option(metavar="FILE.png", help="Plot of the objective.")] = None,
-    as_json: AsJson = False,
-) -> None:
+def optimise(task: TaskFile, as_json: AsJson = False) -> None:
     """Find the best mounting angles for a task.
 
     Searches all angles within the task's ranges and prints the ten best distinct mounts.
@@ -31,31 +27,21 @@ def optimise(
     from scanwright import api
 
     optimum = api.optimise(task, progress=ConsoleProgress())
-    if picture is not None:
-        from scanwright.design.evaluation.landscape_picture import landscape_picture
+    from scanwright.design.evaluation.expected_cloud import expected_cloud
 
-        picture = landscape_picture(picture, optimum.search, f"{optimum.asked.task.name}: {optimum.long_title}")
-    from scanwright.design.evaluation.coverage import hidden_lines
-    from scanwright.design.evaluation.metres import on_planes
-
-    planes = on_planes(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
+    cloud = expected_cloud(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
     if as_json:
-        from scanwright.cli.results.angles import Optimised, PlaneResult
+        from scanwright.cli.results.angles import Optimised
 
-        plane_facts = [PlaneResult(**plane.facts()) for plane in planes]
-        show_json(Optimised(**optimum.facts(), planes=plane_facts, warnings=optimum.asked.warnings()))
+        show_json(Optimised(**optimum.facts(), **cloud.facts(), warnings=optimum.asked.warnings()))
     else:
-        scan = (f"one full scan, {plane.words()}" for plane in planes)
         show(
             [
                 *optimum.lines(verbosity() is Verbosity.VERBOSE),
-                *scan,
-                *hidden_lines(optimum.asked),
+                *cloud.lines(),
                 *(f"warning: {warning}" for warning in optimum.asked.warnings()),
             ]
         )
-        if picture is not None:
-            print(f"wrote {picture}")
         hint(f"next: `scanwright build {task}`")
 
 

@@ -45,9 +45,9 @@ def new(
         Option(metavar="BOX|FILE", help="Robot: box:LENGTH:WIDTH:HEIGHT, a mesh, or none."),
     ] = None,
     ahead_m: Annotated[
-        float,
-        Option(metavar="M", help="Scanner ahead of the box middle or mesh origin."),
-    ] = 0.0,
+        float | None,
+        Option(metavar="M", help="Scanner ahead of the box middle or mesh origin [default: 0]."),
+    ] = None,
     out: Annotated[
         Path | None, Option("--out", "-o", metavar="FILE.toml", help="Output file [default: NAME.toml].")
     ] = None,
@@ -61,12 +61,19 @@ def new(
     from scanwright.cli.results.of_commands import Created
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.lidar import Lidar
+    from scanwright.design.catalogue.servo import Servo
     from scanwright.pipeline.new_task import Answers, task_text, usual_scan_s, write_task_file
 
     products = load_catalogue()
+    if lidar is not None:
+        products.get(lidar, Lidar)
+    if servo is not None:
+        products.get(servo, Servo)
     asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
     if asks:
-        lidar, servo, height_m, robot, see, scan_s = _prompted(products, lidar, servo, height_m, robot, see, scan_s)
+        lidar, servo, height_m, robot, ahead_m, see, scan_s = _prompted(
+            products, lidar, servo, height_m, robot, ahead_m, see, scan_s
+        )
     elif lidar is None or servo is None or height_m is None or not see:
         flags = {"--lidar": lidar, "--servo": servo, "--height-m": height_m, "--see": see}
         needed = ", ".join(flag for flag, value in flags.items() if not value)
@@ -79,7 +86,7 @@ def new(
         see=tuple(see or ()),
         scan_s=usual_scan_s(products.get(str(lidar), Lidar)) if scan_s is None else scan_s,
         robot=robot or "none",
-        ahead_m=ahead_m,
+        ahead_m=ahead_m or 0.0,
     )
     path = out or Path(f"{answers.name}.toml")
     warnings = write_task_file(path, task_text(answers, products, _command(answers, path), path))
@@ -94,9 +101,10 @@ def _prompted(
     servo: str | None,
     height_m: float | None,
     robot: str | None,
+    ahead_m: float | None,
     see: list[str] | None,
     scan_s: float | None,
-) -> tuple[str, str, float, str, list[str], float]:
+) -> tuple[str, str, float, str, float, list[str], float]:
     """Ask the questions that no option answers, each again until its answer is valid."""
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.table import MARK, chosen, table_lines
@@ -110,6 +118,7 @@ def _prompted(
 
     def checked(**answers: Any) -> None:
         known = {"lidar": lidar, "servo": servo, "height_m": height_m, "robot": robot, "see": see, "scan_s": scan_s}
+        known["ahead_m"] = ahead_m
         values = {name: value for name, value in known.items() if value is not None} | answers
         check_answers(Answers(**(DEFAULTS | values) | {"see": tuple(values.get("see") or DEFAULTS["see"])}), products)
 
@@ -124,6 +133,9 @@ def _prompted(
         print("4. Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
         print("   or a file with its mesh (STL, OBJ, PLY), or none")
         robot = _until("  ", "none", str, lambda what: checked(robot=what))
+    if ahead_m is None and robot != "none":
+        print("   How many metres ahead of the middle of the box, or of the origin of the mesh, is the scanner?")
+        ahead_m = _until("  ", "0", _number, lambda ahead: checked(ahead_m=ahead))
     if not see:
         print("5. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
@@ -134,7 +146,7 @@ def _prompted(
         question = "6. How many seconds may one full scan take? Longer is denser"
         usual = f"{usual_scan_s(products.get(lidar, Lidar)):g}"
         scan_s = _until(question, usual, _number, lambda seconds: checked(scan_s=seconds))
-    return lidar, servo, height_m, robot, see, scan_s
+    return lidar, servo, height_m, robot, ahead_m or 0.0, see, scan_s
 
 
 def _until(question: str, usual: str | None, read: Callable[[str], T], fits: Callable[[T], object]) -> T:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import shutil
 import tempfile
 from collections import Counter
@@ -23,12 +24,13 @@ from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import LoadedTask, load_task
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
+from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
     from scanwright.design.evaluation.as_built import AsBuilt
-    from scanwright.design.evaluation.metres import PlaneFigures
+    from scanwright.design.evaluation.expected_cloud import ExpectedCloud
     from scanwright.design.left_out import LeftOut
     from scanwright.design.scanner import Scanner
     from scanwright.design.search.optimum import Optimum
@@ -53,6 +55,8 @@ MOST_FAILED = 3
 DRAWN = 2
 """Reference mounts beside the scanner in density.png, the best one first: its ratio is drawn."""
 
+DECK_MM = 10.0  # between the deck of the robot and that of the scanner: more moves the robot in the masks visibly
+
 BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files": 0.73, "report": 0.9}
 """Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
 
@@ -66,8 +70,7 @@ class Made:
         chosen: the setting that is best with its parts: the one that was built.
         as_built: what it sees, without the beams that its parts block.
         findings: what a person should know before the parts are made.
-        planes: what one full scan leaves on ground, ceiling and walls of the task.
-        hidden: which shares of the regions the masks hide, in words.
+        cloud: error, gaps and points to expect.
         to_make: how many parts to print and to have machined, and the time to print.
         mounted: where the optical centre is with respect to the deck.
     """
@@ -76,8 +79,7 @@ class Made:
     chosen: Chosen
     as_built: AsBuilt
     findings: tuple[Finding, ...]
-    planes: tuple[PlaneFigures, ...]
-    hidden: tuple[str, ...]
+    cloud: ExpectedCloud
     to_make: str
     mounted: str
 
@@ -112,13 +114,12 @@ class Build:
         optimum = self.made.optimum
         return [
             f"wrote {len(self.files)} files to {self.folder}",
+            *self.made.cloud.lines(),
             f"parts to make: {self.made.to_make}",
             f"optical centre: {self.made.mounted}",
             *(optimum.table() if in_full else [*optimum.hole_lines(tabled=False), *optimum.preferred_lines()]),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
-            *(f"with parts: one full scan, {plane.words()}" for plane in self.made.planes),
-            *self.made.hidden,
             *(f"warning: {warning}" for warning in self.warnings),
             *finding_lines(self.made.findings, self.checks, in_full),
         ]
@@ -310,8 +311,7 @@ def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     """Run all stages in order."""
     from scanwright.design.evaluation.as_built import as_built
-    from scanwright.design.evaluation.coverage import hidden_lines
-    from scanwright.design.evaluation.metres import on_planes
+    from scanwright.design.evaluation.expected_cloud import expected_cloud
     from scanwright.design.search.optimum import find_optimum
 
     with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this one never loads the kernel
@@ -342,21 +342,29 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
         findings, left_out = exported()
         write_files(work, drawn())
-        records.write_left_out(work, [*optimum.left_out, *parts.left_out, *left_out])
+        records.write_left_out(work, [*optimum.left_out, *chosen.left_out(), *parts.left_out, *left_out])
         write_package(work)
         write_manifest(work, requested, [asdict(part) for part in parts.parts])
         _at(progress, "report")("writing report.html")
         records.write_report(work, begin)
         to_make = read_parts(work / "bom.csv").to_make
-    planes = on_planes(loaded, problem, best.angles_rad, chosen.shadow)
+    checks = read_checks(target / "checks.json")
+    cloud = expected_cloud(loaded, problem, best.angles_rad, chosen.shadow, checks)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
-    hidden, mounted = tuple(hidden_lines(loaded)), _mounted(angles)
-    return Made(optimum, chosen, seen, (*parts.findings, *findings), planes, hidden, to_make, mounted)
+    return Made(optimum, chosen, seen, (*parts.findings, *findings), cloud, to_make, _mounted(angles, loaded))
 
 
-def _mounted(angles: AngleSet) -> str:
-    """Return where the optical centre is, in words."""
+def _mounted(angles: AngleSet, loaded: LoadedTask) -> str:
+    """Return where the optical centre is, in words, and by how much the height of the task must change for it."""
     x_mm, _, z_mm = angles.t_world_rot_mm
     height = "above the deck" if z_mm > 0 else "below the deck that the scanner hangs from"
     along = f", {abs(x_mm):.0f} mm {'ahead of' if x_mm > 0 else 'behind'} its holes" if abs(x_mm) >= 0.5 else ""
-    return f"{abs(z_mm):.0f} mm {height}{along}"
+    robot = robot_around(loaded.task.mask, loaded.source.parent)
+    has_mm = 1000 * (robot.below_m if z_mm > 0 else robot.above_m)
+    task = ""
+    if abs(has_mm - abs(z_mm)) > DECK_MM and math.isfinite(has_mm):
+        by_mm = (abs(z_mm) - has_mm) * (1 if z_mm > 0 else -1)
+        task = f"; the task has {has_mm:.0f} mm: {'raise' if by_mm > 0 else 'lower'} its scanner by {abs(by_mm):.0f} mm"
+    elif z_mm < 0 and math.isfinite(robot.below_m):
+        task = "; the task has no deck above it: limit angles.alpha_rot_deg to [-90, 90]"
+    return f"{abs(z_mm):.0f} mm {height}{along}{task}"

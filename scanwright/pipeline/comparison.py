@@ -42,6 +42,7 @@ class Comparison:
             return [
                 *short_table(self.rows),
                 "time of the measurement; beams: geometric mean within the ball; blind: share of the region never seen",
+                notes(self.optimum.loaded, self.rows)[0],
                 *verdict(self.optimum.gains),
                 *self._vibration_lines(),
                 f"wrote compare.csv, compare.png and compare.svg to {self.folder}",

@@ -19,8 +19,9 @@ from scanwright.design.electrics.cautions import data_fault
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
-from scanwright.design.task.shapes import LEAST_M, MOST_M
+from scanwright.design.task.shapes import LEAST_M, MOST_M, MeshRegion
 from scanwright.design.task.task import load_task
+from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines, require_positive
 
 LINE_GAP_DEG = 1.0  # between neighbouring lines of a usual scan: two to four lines meet every neighbourhood of 2 deg
@@ -41,7 +42,7 @@ ANGLES = r"""
 #          |                 /   \                   | \                  /   \                    | \
 #          S                S     >                  S  >                S                         S
 #
-# A pair [from, to] is searched, one value fixes the angle. With these ranges nothing is left out.
+# A pair [from, to] is searched, one value fixes the angle.
 """
 
 
@@ -86,6 +87,11 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     _require_strength(lidar, servo)
     if not LEAST_M <= answers.height_m <= MOST_M:
         raise TaskError(f"height_m = {answers.height_m:g}: must be between {LEAST_M:g} and {MOST_M:g} m")
+    if answers.height_m > lidar.practical_range_m:
+        raise TaskError(
+            f"height_m = {answers.height_m:g}: {lidar.name} sees {lidar.practical_range_m:g} m and would not reach the "
+            f"ground; use metres ({answers.height_m:g} cm is {answers.height_m / 100:g})"
+        )
     seen = [parse_region(each) for each in answers.see]
     if not seen:
         raise TaskError(f"see: no region; {known_regions()}")
@@ -103,7 +109,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         *_motion(answers, lidar, servo, slip_ring_for(lidar, servo, products)),
         ANGLES,
         "[angles]",
-        "alpha_rot_deg = [-180, 180]",
+        _alpha_rot(answers, path.parent),
         "beta_rot_deg = [-90, 90]",
         "alpha_laser_deg = [-90, 90]",
         "beta_laser_deg = [-90, 90]",
@@ -113,6 +119,17 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         *_mask(answers, path.parent),
     ]
     return "\n".join(blocks) + "\n"
+
+
+def _alpha_rot(answers: Answers, folder: Path) -> str:
+    """Return the range of the angle that turns the axis over: a scanner hangs only below a part of the robot."""
+    hangs = answers.robot == "none"
+    if not hangs and answers.robot.split(":")[0] != "box":
+        (table,) = tomllib.loads("\n".join(_mask(answers, folder)))["mask"]
+        hangs = math.isfinite(robot_around([MeshRegion(**table)], folder).above_m)
+    if hangs:
+        return "alpha_rot_deg = [-180, 180]"
+    return "alpha_rot_deg = [-90, 90]  # the axis points up: the robot has nothing above the scanner to hang it from"
 
 
 def usual_scan_s(lidar: Lidar) -> float:

@@ -73,6 +73,8 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
     """
     from scanwright.report.page import REPORT, report_html
 
+    if not folder.is_dir():
+        raise BuildError(f"{folder}: no such build folder; `scanwright build TASK` writes out/TASK")
     require_as_built(folder, but=REPORT)
     with atomic_write(place_in(folder, REPORT, BuildError), BuildError) as part:
         part.write_text(report_html(folder, begin), encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.as_built import AsBuilt, as_built
-from scanwright.design.evaluation.coverage import coverage, hidden_lines
+from scanwright.design.evaluation.coverage import coverage
+from scanwright.design.evaluation.expected_cloud import ExpectedCloud, expected_cloud
+from scanwright.design.findings import Finding
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -24,7 +27,7 @@ class BuildAnswer:
     Attributes:
         as_built: what it sees with its parts, and the reference mounts.
         ball_deg: within which a beam counts for a direction.
-        hidden: which shares of the regions the masks hide, in words.
+        cloud: error, gaps and points to expect.
         masked_fraction: share of the sphere that the robot hides.
         lines: of one full scan.
         beams: of one line.
@@ -32,14 +35,16 @@ class BuildAnswer:
 
     as_built: AsBuilt
     ball_deg: float
+    cloud: ExpectedCloud
     masked_fraction: float
     lines: int
     beams: int
-    hidden: tuple[str, ...] = ()
 
 
-def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None) -> BuildAnswer:
-    """Judge the angle set on its task, without the beams that `shadow` blocks.
+def answer(
+    loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None, checks: Sequence[Finding] = ()
+) -> BuildAnswer:
+    """Judge the angle set on its task, without the beams that `shadow` blocks; `checks` are those of its parts.
 
     Raises:
         BuildError: the shadow is of another number of beams.
@@ -51,10 +56,10 @@ def answer(loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = 
     return BuildAnswer(
         as_built=as_built(problem, built.task, setting, shadow, checked_score(built, problem, setting, shadow)),
         ball_deg=float(np.degrees(problem.ball_rad)),
+        cloud=expected_cloud(built, problem, setting, shadow, checks),
         masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
         beams=len(problem.bearings_rad),
-        hidden=tuple(hidden_lines(loaded)),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.evaluation.as_built import AsBuilt
-from scanwright.design.evaluation.metres import PlaneFigures, planes_of, rounded
+from scanwright.design.evaluation.metres import planes_of, rounded
 from scanwright.design.findings import Finding
 from scanwright.design.motion import Motion
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT, percent
@@ -58,11 +58,9 @@ def title(loaded: LoadedTask) -> str:
     return f"A 3D scanner: {loaded.task.name.replace('_', ' ')}"
 
 
-def cards(
-    angles: AngleSet, answer: BuildAnswer, planes: Sequence[PlaneFigures], parts: PartsList | None
-) -> tuple[Card, ...]:
+def cards(angles: AngleSet, answer: BuildAnswer, parts: PartsList | None) -> tuple[Card, ...]:
     """Return what it sees, the gain over usual mounts, one scan, and what it takes to make it."""
-    return _sees(answer, planes), _gain(answer.as_built), _scan(angles, answer), _make(parts)
+    return _sees(answer), _gain(answer.as_built), _scan(angles, answer), _make(parts)
 
 
 def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList | None) -> list[ToDo]:
@@ -120,18 +118,21 @@ def motion_in_words(motion: Motion | None) -> str:
     return f"{motion.stops} stops of {motion.dwell_s:g} s in one turn"
 
 
-def _sees(answer: BuildAnswer, planes: Sequence[PlaneFigures]) -> Card:
-    own = answer.as_built.own
+def _sees(answer: BuildAnswer) -> Card:
+    own, cloud = answer.as_built.own, answer.cloud
     gap_mm = 1000 * GAP_M * np.radians(own.line_gap_deg)
     lines = f"Scan lines at most {own.line_gap_deg:.2f} deg apart, {rounded(gap_mm)} mm at {GAP_M:g} m."
     unseen = own.blind_weight > NO_BLIND_WEIGHT
     headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
-    if answer.hidden:
+    if cloud.hidden:
         headline += ", except behind the robot"
-    text = [f"{_capital(words)}." for words in (*answer.hidden, *(figures.words() for figures in planes))]
+    warned = [] if cloud.gap is None else [cloud.gap.message]
+    if cloud.gap is not None and cloud.gap.value is not None:
+        headline += f", but with a gap of {cloud.gap.value:.1f} deg"
+    text = [f"{_capital(words)}." for words in (*warned, *cloud.hidden, *(plane.words() for plane in cloud.planes))]
     if own.blind:
         text.append(f"{_capital(', '.join(words.partition(':')[0] for words in own.blind))}.")
-    elif not planes:
+    elif not cloud.planes:
         disc_cm = rounded(200 * DISC_M * np.tan(np.radians(answer.ball_deg)))
         text.append(f"At least {own.least:,} beams on a disc of {disc_cm} cm, {DISC_M:g} m away.")
     return Card("What it sees", headline, " ".join([*text, lines]))
@@ -144,7 +145,7 @@ def _gain(built: AsBuilt) -> Card:
     better = " It has more beams than this scanner." if fewer else ""
     flaws = f" But: {first.flaws}." if first.flaws else ""
     rest = ", ".join(f"{gain.value} {gain.mount.name}" for gain in others)
-    text = f"{unit}Best of {len(built.mounts)} usual mounts.{better}{flaws} The others: {rest}."
+    text = f"{unit}Best of {len(built.mounts)} mounts without parts.{better}{flaws} The others: {rest}."
     return Card("Compared with usual mounts", f"{first.value} {first.mount.name}", text)
 
 
@@ -154,7 +155,8 @@ def _scan(angles: AngleSet, answer: BuildAnswer) -> Card:
     hidden = "" if blocked is None else f" Parts block {percent(blocked)}."
     words = _capital(motion_in_words(motion))
     headline = beams if motion is None else f"{motion.duration_s:g} s, {beams}"
-    return Card("One scan", headline, f"{words}: {answer.lines:,} lines of {answer.beams:,}.{hidden}")
+    error = _capital(answer.cloud.error.words())
+    return Card("One scan", headline, f"{error}. {words}: {answer.lines:,} lines of {answer.beams:,}.{hidden}")
 
 
 def _make(parts: PartsList | None) -> Card:

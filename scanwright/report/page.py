@@ -19,13 +19,12 @@ from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.angles import AngleSet, load_angles
 from scanwright.design.concurrency.processes import Begin, in_turn
 from scanwright.design.errors import BuildError
-from scanwright.design.evaluation.metres import on_planes
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion, load_self_occlusion
 from scanwright.design.task.task import LoadedTask, load_task
-from scanwright.report.answer import answer, mounting_rad, problem_as_built
+from scanwright.report.answer import answer, problem_as_built
 from scanwright.report.assembly_steps import steps_html
 from scanwright.report.build_files import packed, read, read_json, read_picture, read_text
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named, still
@@ -117,13 +116,11 @@ def _on_task(folder: Path) -> dict[str, Any]:
         return dict.fromkeys(("title", "objective", "ball_deg", "answer", "sphere", "cards", "task_scene"))
     angles = load_angles(folder / "angles.json")
     problem, task = problem_as_built(loaded, angles), loaded.task
-    setting = mounting_rad(angles)
     own_body = read(folder / "own_body.npz", load_self_occlusion)
     shadow = None if own_body is None else own_body[0]
-    result = answer(loaded, angles, shadow)
+    result = answer(loaded, angles, shadow, read(folder / "checks.json", read_checks) or ())
     mounts = [mount.gain.mount for mount in result.as_built.mounts]
     sphere = density_sphere(problem, angles, mounts, shadow)
-    figures = on_planes(loaded, problem, setting, shadow)
     return {
         "title": title(loaded),
         "objective": task.density.objective,
@@ -131,7 +128,7 @@ def _on_task(folder: Path) -> dict[str, Any]:
         "answer": result,
         "sphere": sphere,
         "task_scene": _task_scene(loaded, angles, problem, sphere, shadow),
-        "cards": cards(angles, result, figures, read(folder / "bom.csv", read_parts)),
+        "cards": cards(angles, result, read(folder / "bom.csv", read_parts)),
     }
 
 

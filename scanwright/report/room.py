@@ -13,7 +13,6 @@ from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.design.arrays import Array, Float32s, Vector
-from scanwright.design.frames import Rx, Ry, Rz
 from scanwright.design.scanner import Scanner
 from scanwright.design.scene.ray_caster import Scene, build_scene, load_scene
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -145,7 +144,6 @@ def _points(range_m: Array, bearing_rad: Array, T: Float[ndarray, "n 4 4"]) -> F
 def _scene(placed: Placed | None, folder: Path) -> Scene:
     if placed is None:
         return build_scene(furnished_room())
-    roll, pitch, yaw = np.radians(placed.rpy_deg)
-    R_mesh_world = Rz(yaw) @ Ry(pitch) @ Rx(roll)
+    R_mesh_world = placed.R_mesh_world()
     T_world_mesh = frames.rigid(R_mesh_world.T, -R_mesh_world.T @ np.array(placed.sensor_m))
     return load_scene(folder / placed.file, placed.unit_m, T_world_mesh)

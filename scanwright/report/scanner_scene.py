@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array, Vector
-from scanwright.design.frames import Rx, Ry, Rz, apply
+from scanwright.design.frames import apply
 from scanwright.design.motion import Sweep
 from scanwright.design.scene.ray_caster import load_triangles
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
@@ -105,9 +105,8 @@ def robot_bodies(task: Task, folder: Path, centre_m: Vector) -> list[dict[str, A
     robots = []
     for region in task.mask:
         if isinstance(region, MeshRegion):
-            roll, pitch, yaw = np.radians(region.rpy_deg)
             T_world_mesh = np.eye(4)
-            T_world_mesh[:3, :3] = (Rz(yaw) @ Ry(pitch) @ Rx(roll)).T
+            T_world_mesh[:3, :3] = region.R_mesh_world().T
             T_world_mesh[:3, 3] = centre_m - T_world_mesh[:3, :3] @ region.sensor_m
             triangles = load_triangles(folder / region.file, region.unit_m, T_world_mesh, region.posture)
             if len(triangles) <= MOST_TRIANGLES:

@@ -26,7 +26,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from scanwright.design.evaluation.picture_files import save_picture
+    from scanwright.design.files.picture_files import save_picture
 
     by_task: dict[str, list[dict[str, str]]] = {}
     shown = left = 0

@@ -22,7 +22,7 @@ import numpy as np
 from mcap import records as mcap
 from mcap.reader import NonSeekingReader, SeekingReader
 
-from scanwright.design.errors import RecordingError
+from scanwright.design.errors import RecordingError, made_by
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages
@@ -77,7 +77,8 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
 def repaired_place(path: Path) -> Path:
     """Where the repaired recording goes: beside the damaged one."""
     if not path.is_file():
-        raise RecordingError(f"{path}: {'this is a folder, not a recording' if path.is_dir() else 'no such file'}")
+        what = "this is a folder, not a recording" if path.is_dir() else f"no such file{made_by(path)}"
+        raise RecordingError(f"{path}: {what}")
     return path.with_name(f"{path.stem}.repaired.mcap")
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from scanwright.design.evaluation.as_built import Seen
 from scanwright.design.evaluation.comparison import ComparisonRow
 from scanwright.design.evaluation.evaluation import Lever
+from scanwright.design.evaluation.expected_cloud import ExpectedError
 from scanwright.design.evaluation.gaps import BlindCone
+from scanwright.design.evaluation.metres import PlaneFigures
 from scanwright.design.evaluation.poles import PoleChances
+from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.objective.holes import BlindSpot
 
@@ -127,33 +130,6 @@ class SeenGain(GainResult):
 
 
 @dataclass(frozen=True, slots=True)
-class PlaneResult:
-    """Points of one full scan on a region that is a plane.
-
-    Attributes:
-        region: the region in words.
-        range_m: practical range of the lidar.
-        beyond_range: share of the area beyond this range.
-        points: number of points.
-        points_per_m2: mean number of points per square metre.
-        at_m: distance that `gap_cm` is for.
-        gap_cm: diameter of the largest disc without a point; null if there are no points.
-        gap_off_axis_cm: the same without the blind cones around the axis.
-        twice_cm: diameter of the smallest disc that gets two points at any place.
-    """
-
-    region: str
-    range_m: float
-    beyond_range: float
-    points: int
-    points_per_m2: float
-    at_m: float | None
-    gap_cm: float | None
-    gap_off_axis_cm: float | None
-    twice_cm: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class Optimised:
     """The best mounting angles of a task.
 
@@ -172,6 +148,8 @@ class Optimised:
         evaluated: number of values of J that it computed.
         seconds: run time of the search.
         left_out: skipped work, with the reason.
+        expected_error: error of a point to expect.
+        wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
         planes: points on ground, walls and ceilings of the task.
         warnings: limits of the task that can surprise.
     """
@@ -190,7 +168,9 @@ class Optimised:
     evaluated: int
     seconds: float
     left_out: list[LeftOut]
-    planes: list[PlaneResult]
+    expected_error: ExpectedError
+    wide_gap: Finding | None
+    planes: list[PlaneFigures]
     warnings: list[str]
 
 
@@ -236,13 +216,15 @@ class Evaluated:
         crossing_deg: mean angle at which lines cross there; null if there is no double coverage.
         half_turn_misses: share that half a turn misses of what a full turn sees; null for a sweep.
         J_rises_1_deg_off: angle -> rise of J if it is 1 deg off.
+        expected_error: error of a point to expect.
+        wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
+        planes: points on ground, walls and ceilings of the task.
         lever: offset of the optical centre that the figures are for; null if it is on the axis.
         empty_cap: largest cone without a beam, of a sweep.
         interlaced_period_s: period for which the lines of the next turn fall between those of this one.
         pole: probability of hitting a pole (`--pole`).
         lowest_points_per_m2: lowest density on the scene mesh of the task.
         median_points_per_m2: median density on it, by area.
-        planes: points on ground, walls and ceilings of the task.
         as_built: view with the parts, of a build folder.
     """
 
@@ -266,13 +248,15 @@ class Evaluated:
     crossing_deg: float | None
     half_turn_misses: float | None
     J_rises_1_deg_off: dict[str, float]
+    expected_error: ExpectedError
+    wide_gap: Finding | None
+    planes: list[PlaneFigures]
     lever: Lever | None = None
     empty_cap: BlindCone | None = None
     interlaced_period_s: float | None = None
     pole: PoleChances | None = None
     lowest_points_per_m2: float | None = None
     median_points_per_m2: float | None = None
-    planes: list[PlaneResult] = field(default_factory=list)
     as_built: WithParts | None = None
 
 

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 from matplotlib.figure import Figure
 
-from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.files.picture_files import save_picture
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -141,7 +141,10 @@ def test_what_cannot_be_built_is_refused_with_its_reason():
     first, second = sorted(families, key=lambda f: f.score.J)
     chosen = choose_with_parts(p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg,)), no_progress)
     assert chosen.family.angles_deg == second.angles_deg
-    assert [reason.split(": ")[1] for reason in chosen.refused] == ["tilted too far"]
+    assert [reason for _, reason in chosen.refused] == ["tilted too far"]
+    (told,) = chosen.left_out()
+    assert (told.what, told.why) == ("1 mount with a lower J", "tilted too far")
+    assert "1 mount with a lower J rejected: tilted too far" in chosen.lines()
     with pytest.raises(BuildError, match="tilted too far"):
         choose_with_parts(
             p, families, fixed, Limits(), ConeRegion(p, 0.1, (first.angles_deg, second.angles_deg)), no_progress
@@ -163,6 +166,6 @@ def test_a_setting_whose_parts_failed_a_check_is_not_chosen_again():
     failed = {first.angles_deg: "the mount bends"}
     chosen = choose_with_parts(p, families, fixed, Limits(), ConeRegion(p, 0.1), no_progress, failed)
     assert chosen.family.angles_deg == second.angles_deg
-    assert any("fail a check: the mount bends" in reason for reason in chosen.refused)
+    assert any("fail a check: the mount bends" in reason for _, reason in chosen.refused)
     with pytest.raises(BuildError, match="the mount bends"):
         choose_with_parts(p, (first,), fixed, Limits(), ConeRegion(p, 0.1), no_progress, failed)

@@ -17,6 +17,7 @@ from scanwright.design.errors import TaskError
 from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.new_task import ANGLES, Answers, task_text, write_task_file
+from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.seen_regions import SEEN
 
 PATIENCE_S = 60.0  # ten times what it takes on a computer that has much else to do
@@ -107,6 +108,10 @@ def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
             "error: --see = 'wall:0:0:0:2.5': distance_m = 0: Input should be greater than or equal",
         ),
         (["--height-m", "-1"], "error: --height-m = -1: must be between 0.001 and 10000 m"),
+        (
+            ["--height-m", "45"],
+            "--height-m = 45: UST-20LX sees 20 m and would not reach the ground; use metres (45 cm is 0.45)",
+        ),
         (["--height-m", "-1", "--see", "all"], "--height-m = -1: must be"),
         (["--lidar", "UST10"], "did you mean 'UST-10LX'?"),
         (["--robot", "box:1"], "box:LENGTH:WIDTH:HEIGHT"),
@@ -139,6 +144,7 @@ def test_a_file_is_never_written_over_and_nobody_is_asked_where_nobody_is(comman
     assert "dog.toml: exists; choose" in command("new", "dog", *DOG)[2][0]
     assert (here / "dog.toml").read_text() == "mine"
     assert "missing options --servo, --height-m, --see" in command("new", "cat", "--lidar", "UST-10LX")[2][0]
+    assert "'LD20' is no lidar of the catalogue" in command("new", "cat", "--lidar", "LD20")[2][0]
 
 
 QUESTIONS = [
@@ -148,7 +154,9 @@ QUESTIONS = [
     ("How many metres", "sixty"),
     ("'sixty' is no number", "0.6"),
     ("blocks the view", "box:1:1:0.9"),
-    ("is not above it", "none"),
+    ("is not above it", "box:1:1:0.3"),
+    ("ahead of the middle of the box", "0.9"),
+    ("is not above it", "0.2"),
     ("must it see", "ground from 0.5 to 5"),
     ("'from': unknown region", "wall:2 around"),
     ("How many seconds", "0.1"),
@@ -218,3 +226,18 @@ def test_on_a_terminal_what_no_flag_answers_is_asked(here):
         os.close(screen)
     task = load_task(here / "asked.toml").task
     assert (task.sensor, task.weight[0].distance_m, task.weight[1].shape) == ("UST-10LX", 2, "band")
+    assert (task.mask[0].from_m, task.mask[0].to_m) == (-0.7, 0.3)
+
+
+@pytest.mark.parametrize("roof", [False, True], ids=["open deck", "below a roof"])
+def test_a_scanner_hangs_only_below_a_part_of_the_robot_mesh(command, here, roof):
+    import trimesh
+
+    deck = trimesh.creation.box((0.6, 0.3, 0.1), trimesh.transformations.translation_matrix((0, 0, 0.25)))
+    top = trimesh.creation.box((0.3, 0.3, 0.02), trimesh.transformations.translation_matrix((0, 0, 0.9)))
+    (trimesh.util.concatenate([deck, top]) if roof else deck).export(here / "robot.stl")
+    assert command("new", "dog", *DOG, "--robot", "robot.stl")[0] == 0
+    loaded = load_task(here / "dog.toml")
+    assert loaded.task.angles.alpha_rot_deg == ((-180, 180) if roof else (-90, 90))
+    around = robot_around(loaded.task.mask, here)
+    assert (around.below_m, around.above_m) == (pytest.approx(0.1), pytest.approx(0.49) if roof else float("inf"))

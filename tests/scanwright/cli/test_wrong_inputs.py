@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -234,3 +235,24 @@ def test_a_full_disk(shop, tmp_path):
         assert "cannot write" in complaint, out
         assert code == "exit code 2"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("words", "remedy"),
+    [
+        ("calibrate none.mcap --angles ANGLES -o a.json", "`scanwright import` converts ROS bags"),
+        ("assemble none.mcap --angles ANGLES -o a.ply", "`scanwright scan` makes recordings"),
+        ("assemble none.mcap --angles none.json -o a.ply", "`scanwright build TASK` writes angles.json"),
+        ("scan none", "`scanwright build TASK` writes angles.json"),
+        ("report none", "`scanwright build TASK` writes out/TASK"),
+        ("register none.ply none_2.ply -o a.ply", "`scanwright assemble` makes clouds"),
+        ("build none.toml", "`scanwright new` writes one"),
+        ("optimise none", "`scanwright new` writes one"),
+    ],
+)
+def test_a_missing_file_is_one_line_with_the_command_that_makes_it(command, tmp_path, monkeypatch, words, remedy):
+    monkeypatch.chdir(tmp_path)
+    angles = Path(__file__).parents[3] / "design/angle_sets/tilting_urg.json"
+    code, _, complaints = command(*words.replace("ANGLES", str(angles)).split())
+    assert (code, len(complaints)) == (2, 1)
+    assert "none" in complaints[0] and remedy in complaints[0]

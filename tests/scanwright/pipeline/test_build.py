@@ -416,7 +416,7 @@ def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     found = [Finding("turn_from_metal", "note", "shaft", "shaft: of metal", hint="have it turned")]
     checks = tuple(Finding("unverified", "note", "UTM", f"UTM: {v} is not verified") for v in ("a = 1", "b = 2"))
     told = SimpleNamespace(table=list, lines=list, hole_lines=lambda **_: [], preferred_lines=list)
-    made = Made(told, told, told, tuple(found), (), (), "", "")
+    made = Made(told, told, told, tuple(found), told, "", "")
     first, _, _, *gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
     assert first == f"wrote 1 files to {tmp_path}"
     assert gathered[0] == "warning: slow"

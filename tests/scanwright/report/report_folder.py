@@ -18,7 +18,7 @@ from trimesh.visual.material import PBRMaterial
 
 from scanwright.cad.checks.checks_json import checks_text
 from scanwright.design.angles import STANDARD_DEG, Angles, AngleSet
-from scanwright.design.evaluation.picture_files import save_picture
+from scanwright.design.files.picture_files import save_picture
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.search.mounts.reference import reference_mounts

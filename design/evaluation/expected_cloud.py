@@ -1,0 +1,160 @@
+"""The cloud to expect of a mount: the error of its points, its widest gap, and its points on the planes of the task."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from scanwright.design.arrays import Setting
+from scanwright.design.evaluation.coverage import hidden_lines
+from scanwright.design.evaluation.gaps import wide_gap
+from scanwright.design.evaluation.metres import AT_M, PlaneFigures, free_beams, on_planes, rounded
+from scanwright.design.findings import Finding, sentence
+from scanwright.design.frames import R_world_rot
+from scanwright.design.objective.problem import Problem
+from scanwright.design.self_occlusion import SelfOcclusion
+from scanwright.design.sphere.directions import weighted_samples
+from scanwright.design.task.task import LoadedTask
+
+DIRECTIONS = 5000  # of the region, for the mean distance from the axis
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedError:
+    """Error of a point of a cloud, root mean square over the region; mounting angles calibrated.
+
+    Attributes:
+        at_m: range that the errors hold at.
+        range_noise_mm: noise of the lidar, along the beam.
+        encoder_mm: steps of the servo's encoder, before `assemble` smooths them.
+        backlash_mm: half of the servo's backlash, if it moves points against each other; null if unknown.
+        backlash_calibrated: whether `calibrate` can correct it: the servo turns both ways, and gravity turns neither.
+        bending_mm: largest bend by gravity that changes over a turn; null without a build.
+        total_mm: root of the sum of the squares of what is known.
+    """
+
+    at_m: float
+    range_noise_mm: float
+    encoder_mm: float
+    backlash_mm: float | None
+    backlash_calibrated: bool
+    bending_mm: float | None
+    total_mm: float
+
+    def words(self) -> str:
+        """Return the error and its parts in a line."""
+        parts = [f"range noise {_figure(self.range_noise_mm)}"]
+        if self.backlash_mm is None:
+            parts.append("servo backlash unknown")
+        elif self.backlash_mm:
+            until = " until calibrated" if self.backlash_calibrated else ""
+            parts.append(f"servo backlash {_figure(self.backlash_mm)}{until}")
+        parts.append(f"encoder steps {_figure(self.encoder_mm)}")
+        bending = "unknown" if self.bending_mm is None else _figure(self.bending_mm)
+        parts.append(f"bending {bending}")
+        about = "at least" if self.backlash_mm is None else "about"
+        return f"expect {about} {rounded(self.total_mm)} mm at {self.at_m:g} m ({', '.join(parts)})"
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedCloud:
+    """The cloud of one full scan. Console, report and JSON print this record.
+
+    Attributes:
+        error: of a point.
+        gap: warning of a gap much wider than the spacing of the lines; None if there is none.
+        planes: points on ground, ceiling and walls of the task.
+        hidden: which shares of the regions the masks hide, in words.
+    """
+
+    error: ExpectedError
+    gap: Finding | None
+    planes: tuple[PlaneFigures, ...]
+    hidden: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Return the same, one line each."""
+        return [
+            self.error.words(),
+            *(f"one full scan, {plane.words()}" for plane in self.planes),
+            *([] if self.gap is None else [f"warning: {sentence(self.gap)}"]),
+            *self.hidden,
+        ]
+
+    def facts(self) -> dict[str, Any]:
+        """Return names with units and values, for JSON."""
+        return {
+            "expected_error": asdict(self.error),
+            "wide_gap": None if self.gap is None else asdict(self.gap),
+            "planes": [asdict(plane) for plane in self.planes],
+        }
+
+
+def expected_cloud(
+    loaded: LoadedTask,
+    problem: Problem,
+    angles_rad: Setting,
+    shadow: SelfOcclusion | None = None,
+    checks: Sequence[Finding] = (),
+) -> ExpectedCloud:
+    """Return the cloud to expect of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+
+    Args:
+        loaded: the task, with the motion of the setting.
+        problem: the same as numbers.
+        angles_rad: the setting.
+        shadow: beams that its parts block, if they are known.
+        checks: of its build; none before it.
+
+    Raises:
+        BuildError: the shadow is of another number of beams.
+    """
+    return ExpectedCloud(
+        expected_error(loaded, problem, angles_rad, checks),
+        wide_gap(problem, angles_rad, free_beams(problem, angles_rad, shadow)),
+        on_planes(loaded, problem, angles_rad, shadow),
+        tuple(hidden_lines(loaded)),
+    )
+
+
+def expected_error(
+    loaded: LoadedTask, problem: Problem, angles_rad: Setting, checks: Sequence[Finding] = (), at_m: float = AT_M
+) -> ExpectedError:
+    """Return the error to expect of a point at a range, or at the lidar's practical range if that is shorter.
+
+    An error of the joint moves a point by its distance from the axis; the mean square of that is over the region.
+    Arguments as for `expected_cloud`.
+    """
+    lidar, servo = loaded.lidar, loaded.servo
+    at_m = min(at_m, lidar.practical_range_m)
+    samples = weighted_samples(problem.field, DIRECTIONS)
+    along = samples.directions @ R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
+    off_mm = 1000 * at_m * math.sqrt(float(np.average(1 - along**2, weights=samples.weights)))
+    found = {check.code: check for check in checks}
+    sweeps, flanks, bend = problem.sweep is not None, found.get("flanks"), found.get("deflection_turning")
+    by_gravity = flanks is not None and flanks.severity != "ok"
+    # "ok" without a limit: gravity holds one flank in both directions of a sweep
+    loose = by_gravity or (sweeps and (flanks is None or flanks.limit is not None))
+    backlash_mm: float | None = 0.0
+    if loose:
+        backlash_mm = None if servo.backlash_deg is None else off_mm * math.radians(servo.backlash_deg / 2)
+    bending_mm = None if bend is None or bend.value is None else 1000 * at_m * math.radians(bend.value)
+    noise_mm = float(lidar.sigma_mm(1000 * at_m))
+    encoder_mm = off_mm * math.radians(servo.position_step_deg) / math.sqrt(12)
+    return ExpectedError(
+        at_m=at_m,
+        range_noise_mm=noise_mm,
+        encoder_mm=encoder_mm,
+        backlash_mm=backlash_mm,
+        backlash_calibrated=loose and sweeps and not by_gravity,
+        bending_mm=bending_mm,
+        total_mm=math.hypot(noise_mm, encoder_mm, backlash_mm or 0.0, bending_mm or 0.0),
+    )
+
+
+def _figure(value_mm: float) -> str:
+    return rounded(round(value_mm, 1))
