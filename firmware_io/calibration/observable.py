@@ -179,8 +179,11 @@ def _geometry(tiles: FlatTiles, grouping: Grouping) -> str:
     if share[1] < _ONE_LINE:
         return f"empty hall: all surfaces face along {shown[2]} of the axis frame; scan where walls are in reach"
     if share[0] < _ONE_LINE:
-        return f"corridor: no surface faces along {shown[0]} of the axis frame"
-    return "its surfaces are too few, too far or too much alike; scan another place, away from the middle of the room"
+        return f"corridor: no surface faces along {shown[0]} of the axis frame; scan where one does, too"
+    return (
+        "its surfaces are too few, too far or too much alike; scan another place, away from the middle of the room, and "
+        "give both recordings"
+    )
 
 
 def _words(group: tuple[int, ...]) -> str:
