@@ -67,7 +67,7 @@ class Trap:
 
     @property
     def corner(self) -> float:
-        """From the axis to a corner of the pocket."""
+        """Distance from the axis to a corner of the pocket."""
         return self.across / math.sqrt(3)
 
 

@@ -46,7 +46,7 @@ class Shortest(Record):
 
 
 class Sweep(Record):
-    """From one limit to the other and back: accelerate, cruise, brake, equally in both directions."""
+    """Motion from one limit to the other and back: accelerate, cruise, brake, equally in both directions."""
 
     mode: Literal["sweep"] = Field(default="sweep", description="back and forth between two angles")
     limits_deg: tuple[Annotated[float, Strict()], Annotated[float, Strict()]] = Field(

@@ -74,7 +74,7 @@ class Assembly:
         return self._meshes[name]
 
     def meshes(self) -> dict[str, TriMesh]:
-        """Of all parts by name."""
+        """Meshes of all parts by name."""
         return {name: self.mesh(name) for name in (*self.made, *self.bought)}
 
     def inertial(self, name: str) -> Inertial:
@@ -91,7 +91,7 @@ class Assembly:
         return self._poses[name]
 
     def outlines(self) -> dict[str, TriMesh]:
-        """Of all parts by name, as they look from outside while they turn."""
+        """Outlines of all parts by name, as they look from outside while they turn."""
         return self.meshes() | {
             name: self._swept(name, part.sweep)
             for name, part in self.parts.items()

@@ -31,7 +31,7 @@ STUB = 0.4  # between the stub of a capsule's rotor and its body
 
 
 def lidar_body(lidar: Lidar) -> cq.Solid:
-    """Below the window, with its holes."""
+    """Case of a lidar below its window, with its holes."""
     half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
     radius = SCREWS[lidar.base.screw].nominal / 2 + (THROUGH if lidar.base.kind == "through" else 0.0)
     threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.base.places]
@@ -42,7 +42,7 @@ def lidar_body(lidar: Lidar) -> cq.Solid:
 
 
 def lidar_window(lidar: Lidar) -> cq.Solid:
-    """Where the beams leave."""
+    """Window of a lidar, where the beams leave."""
     return solids.upright(lidar.window_radius_mm, *lidar.window_z_mm)
 
 
@@ -82,13 +82,13 @@ def servo_horn(servo: Servo, z: float) -> cq.Solid:
 
 
 def ring_stator(ring: SlipRing, low: float, high: float) -> cq.Solid:
-    """Of a through-bore ring; the split to its rotor is not in any drawing."""
+    """Stator of a through-bore ring; the split to its rotor is not in any drawing."""
     stator = solids.upright(ring.outer_diameter_mm / 2, low, high - 1.0)
     return stator.cut(solids.upright(_split(ring), low - 1.0, high + 1.0)).Solids()[0]
 
 
 def ring_rotor(ring: SlipRing, low: float, high: float) -> cq.Solid:
-    """Of a through-bore ring."""
+    """Rotor of a through-bore ring."""
     rotor: cq.Shape = solids.upright(_split(ring) - 0.2, low + 1.0, high)
     if ring.rotor is not None:
         high += ring.rotor.length_mm

@@ -48,7 +48,7 @@ def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
 
 
 def _balanced(assembly: Assembly) -> Assembly:
-    """With the counterweight, cut to the solids; without linkage and sub-plate, to their estimate."""
+    """The assembly with its counterweight, cut to the solids; without linkage and sub-plate, to their estimate."""
     layout = assembly.layout
     bar = layout.counterweight
     assert not isinstance(bar, LeftOut)

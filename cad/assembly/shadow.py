@@ -47,7 +47,7 @@ class PartsWorkshop:
         return SelfOcclusion(beams_in_cone(stack, bearings), None)
 
     def shadow(self, setting_rad: Array) -> SelfOcclusion | Refused:
-        """From the solids of that setting."""
+        """Return the shadow of the solids of that setting."""
         scanner = at_setting(self.scanner, setting_rad)
         try:
             assembly = self.assembly(scanner)

@@ -35,7 +35,7 @@ class Pattern:
 
     @property
     def direction(self) -> Array:
-        """Along the holes."""
+        """Unit vector along the holes."""
         return np.array(self.holes[0].direction)
 
     @property

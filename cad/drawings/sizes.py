@@ -34,7 +34,7 @@ CENTRE_GAP_MM = 3.0  # between the optical centre and its name
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Of a view, about its origin, model mm.
+    """Sizes of a view, about its origin, model mm.
 
     Attributes:
         box: left, bottom, right and top of its lines.

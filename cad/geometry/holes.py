@@ -40,7 +40,7 @@ class Round:
 
     @property
     def length(self) -> float:
-        """Along the axis."""
+        """Length along the axis."""
         return math.dist(self.low, self.high)
 
 

@@ -28,7 +28,7 @@ class Inertial:
 
 
 def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
-    """Of a homogeneous solid in mm."""
+    """Inertia of a homogeneous solid in mm."""
     kg_per_mm3, properties = density_g_cm3 * 1e-6, GProp_GProps()
     BRepGProp.VolumeProperties_s(solid.wrapped, properties)  # once: the same integral gives all three
     matrix = properties.MatrixOfInertia()
@@ -38,7 +38,7 @@ def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
 
 
 def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> Inertial:
-    """Of a homogeneous box: bought parts, of which only mass and size are known."""
+    """Inertia of a homogeneous box: bought parts, of which only mass and size are known."""
     low, high = np.array(tuple(low_mm)) / 1000, np.array(tuple(high_mm)) / 1000
     x, y, z = (high - low) ** 2
     mass = mass_g / 1000
@@ -46,7 +46,7 @@ def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> 
 
 
 def of_line(mass_g: float, points_mm: Array) -> Inertial:
-    """Of a thin line of even mass through points (n, 3) no further apart than its bends ask for."""
+    """Inertia of a thin line of even mass through points (n, 3) no further apart than its bends ask for."""
     points = points_mm / 1000
     middles, lengths = (points[1:] + points[:-1]) / 2, np.linalg.norm(np.diff(points, axis=0), axis=1)
     masses = mass_g / 1000 * lengths / lengths.sum()

@@ -38,7 +38,7 @@ class TriMesh:
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
     def manifold(self) -> manifold3d.Manifold:
-        """For booleans and slices, in single precision."""
+        """The same for booleans and slices, in single precision."""
         return manifold3d.Manifold(manifold3d.Mesh(self.vertices.astype(np.float32), self.faces.astype(np.uint32)))
 
     def is_closed(self) -> bool:

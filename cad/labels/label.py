@@ -198,7 +198,7 @@ def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -
 
 
 def _places(rooms: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
-    """Of lettering of a size: in the first room first, there nearest to its middle."""
+    """Places of lettering of a size: in the first room first, there nearest to its middle."""
     for flat, room in rooms:
         for turn in TURNS:
             for x, y in _corners(room, size, turn):

@@ -29,7 +29,7 @@ class Lettering:
         return width, self.height * (1 + LEADING * (len(self.lines) - 1))
 
     def outlines(self, stroke: float) -> list[shapely.Polygon]:
-        """Of its grooves, about its origin."""
+        """Outlines of its grooves, about its origin."""
         return [
             shapely.affinity.translate(letter, 0.0, LEADING * self.height * i)
             for i, line in enumerate(reversed(self.lines))
@@ -51,5 +51,5 @@ class Place:
         return np.asarray(points @ self.turn.T + [self.x, self.y])
 
     def outlines(self, lines: Lettering, stroke: float) -> list[shapely.Polygon]:
-        """Of the grooves of some lines, in the axes of the face."""
+        """Outlines of the grooves of some lines, in the axes of the face."""
         return [shapely.transform(outline, self.put) for outline in lines.outlines(stroke)]

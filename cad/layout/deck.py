@@ -118,7 +118,7 @@ def _on_flat_deck(mounted: Mounted) -> Joint:
 
 
 def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:
-    """At the middle of each side of the foot, unless a screw is there; the groove is below."""
+    """Seats at the middle of each side of the foot, unless a screw is there; the groove is below."""
     x, y, _ = foot
     seats = [
         TieSeat(
@@ -143,7 +143,7 @@ def _near_screw(seat: TieSeat, deck_holes: tuple[tuple[float, float], ...]) -> b
 
 
 def strut_corners(deck: Deck) -> Array:
-    """Of back plate and a pad in the foot: the strut is what of their hull is behind the back plate, shape (n, 3).
+    """Corners of back plate and a pad in the foot, shape (n, 3): the strut is the part of their hull behind the plate.
 
     No facet coincides with plate or foot.
     """

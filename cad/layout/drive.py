@@ -236,7 +236,7 @@ class DriveLayout:
 
     @property
     def masses(self) -> tuple[Mass, ...]:
-        """Of the bought products between mount and linkage."""
+        """Masses of the bought products between mount and linkage."""
         return tuple(
             Mass(each.name, each.product.mass_g, each.box, each.turning)
             for each in self.stations

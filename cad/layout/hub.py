@@ -54,12 +54,12 @@ class Hub(ABC):
 
     @property
     def hub_radius(self) -> float:
-        """Of the linkage's hub."""
+        """Radius of the linkage's hub."""
         return self.shaft_diameter / 2 + (CUP_HUB_WALL if self.cup_bore > 0 else HUB_WALL)
 
     @property
     def neck_radius(self) -> float:
-        """Of the linkage's neck where it leaves the hub: over a cup no wider than its rim bears."""
+        """Radius of the linkage's neck where it leaves the hub: over a cup no wider than its rim bears."""
         return self.shaft_diameter / 2 - NECK_ON_RIM if self.cup_bore > 0 else self.hub_radius - 1.0
 
     @property
@@ -94,7 +94,7 @@ class Hub(ABC):
 
     @property
     def leads_half_width(self) -> float:
-        """Of the room of all bundles side by side."""
+        """Half the width of the room of all bundles side by side."""
         return (self.lead_count * (self.lead_diameter + BUNDLE_GAP) + BUNDLE_GAP) / 2
 
     @property

@@ -88,7 +88,7 @@ class Joint:
 
     @property
     def length_mm(self) -> int:
-        """Of a screw's shank."""
+        """Length of a screw's shank."""
         if self.protrudes_mm is not None:
             return round(self.grip_mm + self.protrudes_mm)
         return shank_mm(self.screw, self.grip_mm, self.fixing, self.thread_mm)
@@ -143,12 +143,12 @@ def fixing_in(thread: Thread) -> Fixing:
 
 
 def upright_axes(points: Iterable[Sequence[float]], z: float, up: float) -> tuple[ScrewAxis, ...]:
-    """Of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
+    """Axes of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
     return tuple(ScrewAxis((float(x), float(y), z), (0.0, 0.0, up)) for x, y in points)
 
 
 def inward_axes(azimuths: Iterable[float], radius: float, z: float) -> tuple[ScrewAxis, ...]:
-    """Of screws towards the rotation axis that start at a radius."""
+    """Axes of screws towards the rotation axis that start at a radius."""
     outwards = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
     return tuple(ScrewAxis((radius * x, radius * y, z), (-x, -y, 0.0)) for x, y in outwards)
 
@@ -186,12 +186,12 @@ def horn_thread_mm(servo: Servo) -> float:
 
 
 def horn_centres(servo: Servo) -> Array:
-    """Of the horn's holes, servo's frame, shape (n, 2)."""
+    """Centres of the horn's holes, servo's frame, shape (n, 2)."""
     return polygon(servo.horn_circle_mm / 2, servo.horn_holes, math.radians(90.0 + servo.horn_first_hole_deg))
 
 
 def horn_joint(servo: Servo, part: str, onto: str, heads: float, grip: float) -> Joint:
-    """Of what is screwed to a servo's horn, its heads at a height, in the frame of the servo's axis."""
+    """Joint of what is screwed to a servo's horn, its heads at a height, in the frame of the servo's axis."""
     axes = upright_axes(horn_centres(servo), heads, -1.0)
     screw = SCREWS[servo.horn_screw]
     return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=horn_thread_mm(servo))

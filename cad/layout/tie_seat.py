@@ -52,7 +52,7 @@ class TieSeat:
 
     @property
     def half_width(self) -> float:
-        """Of the whole tongue."""
+        """Half the width of the whole tongue."""
         return self.half + SLOT_ACROSS + SLOT_WALL
 
     def direction(self) -> Array:
@@ -66,6 +66,6 @@ class TieSeat:
         return x[:, None] * out + y[:, None] * [-out[1], out[0], 0.0] + height[:, None] * [0.0, 0.0, 1.0]
 
     def corners(self, inner: float) -> Array:
-        """Of the tongue from a place outwards, shape (8, 3)."""
+        """Corners of the tongue from a place outwards, shape (8, 3)."""
         across = np.array([-self.half_width, self.half_width])
         return self.points(np.array([inner, self.end]), across, np.array([self.low, self.high]))

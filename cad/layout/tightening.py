@@ -138,7 +138,7 @@ def _under_head_mm2(joint: Joint, hole: float) -> float:
 
 
 def stress_area_mm2(screw: Screw) -> float:
-    """Of its thread (ISO 898-1); the pitch of a coarse thread is what its core hole is smaller."""
+    """Stress area of its thread (ISO 898-1); the pitch of a coarse thread is what its core hole is smaller."""
     return math.pi / 4 * (screw.nominal - 0.9382 * (screw.nominal - screw.core)) ** 2
 
 

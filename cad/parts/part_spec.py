@@ -145,6 +145,6 @@ class PartSpec:
         return tuple(field.removeprefix(kind) for field in (*self.shaped_by, *self.shapes) if field.startswith(kind))
 
     def density_g_cm3(self, printer: Printer) -> float:
-        """Of its material."""
+        """Density of its material."""
         densities = {"printed": printer.density_g_cm3, "turned": ALUMINIUM_G_CM3, "sawn": STEEL_G_CM3}
         return densities[self.process]

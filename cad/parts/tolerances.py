@@ -9,7 +9,7 @@ from scanwright.design.catalogue.products import Bearing
 
 @dataclass(frozen=True, slots=True)
 class ToleratedDiameter:
-    """Of the cylinders of one diameter about the axis that a part is measured from.
+    """Diameter of the cylinders of one diameter about the axis that a part is measured from.
 
     Attributes:
         diameter: as the part is drawn.
@@ -40,7 +40,7 @@ class OnSheet:
 
 
 def printed_seat(bearing: Bearing, fit: float) -> ToleratedDiameter:
-    """Of a bearing's outer ring in a printed part, which is drawn half of the sliding fit wider."""
+    """Diameter of a bearing's outer ring in a printed part, which is drawn half of the sliding fit wider."""
     why = f"seat of {bearing.name}, from size for size to a sliding fit"
     return ToleratedDiameter(bearing.outer_mm + fit / 2, True, f"±{_g(fit / 2)}", why)
 
@@ -51,7 +51,7 @@ def no_wider(diameter: float, fit: float, why: str) -> ToleratedDiameter:
 
 
 def spigot_in_hub(diameter: float, fit: float) -> ToleratedDiameter:
-    """Of a shaft's upper end in the printed hub."""
+    """Diameter of a shaft's upper end in the printed hub."""
     return ToleratedDiameter(diameter, False, f"0/-{_g(fit / 2)}", "half of the fit in the printed hub")
 
 

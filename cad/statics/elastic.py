@@ -142,7 +142,7 @@ def lumps(model: Model, density_g_cm3: float) -> tuple[Array, Array, Array]:
 
 
 def _middles(parts: int) -> Array:
-    """Of the cubes of a cell of edge 1, shape (parts^3, 3)."""
+    """Centres of the cubes of a cell of edge 1, shape (parts^3, 3)."""
     along = (np.arange(parts) + 0.5) / parts
     return np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=3).reshape(-1, 3)
 

@@ -95,7 +95,7 @@ def _on_grid(
 
 
 def _grid(triangles: Array, edge: float) -> Grid:
-    """Around all triangles, with a face at the deck's height."""
+    """Grid around all triangles, with a face at the deck's height."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     middle = (low + high) / 2
     cells = np.maximum(np.ceil((high - low) / edge), 1).astype(int)

@@ -25,5 +25,5 @@ def rigid(points: Array, moved: Array) -> tuple[Array, Array]:
 
 
 def _second_moments(arms: Array) -> Array:
-    """Of unit masses, shape (3, 3)."""
+    """Second moments of unit masses, shape (3, 3)."""
     return np.asarray((arms**2).sum() * np.eye(3) - arms.T @ arms)

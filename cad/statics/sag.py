@@ -52,7 +52,7 @@ class Sag:
 def linkage_sag(
     stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
 ) -> Sag:
-    """Of the printed parts alone.
+    """Sag of the printed parts alone.
 
     Args:
         stack: the layout.
@@ -117,7 +117,7 @@ def _on_grid(
 
 
 def _grid(triangles: Array, edge: float, seat: float) -> Grid:
-    """Around all triangles, with a face at the seat's height, and the same on both sides of the lidar's axis."""
+    """Grid around all triangles, with a face at the seat's height, symmetric about the lidar's axis."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     start = np.array([0.0, 0.0, seat])
     before, beyond = (np.ceil((start - low) / edge), np.ceil((high - start) / edge))

@@ -56,7 +56,7 @@ class ReferenceMount:
 
     @property
     def name(self) -> str:
-        """Of the mount."""
+        """Name of the mount."""
         return self.gain.mount.name
 
     @property

@@ -102,7 +102,7 @@ class Layer:
         )
 
     def chance(self, d: Array, area: float) -> Array:
-        """Of drawing each direction, per steradian."""
+        """Probability of drawing each direction, per steradian."""
         if isinstance(self.region, PlaneRegion):
             return _On(self.region).chance(d)
         if self.chances is None:

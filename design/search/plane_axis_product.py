@@ -70,7 +70,7 @@ def lowest(
     plain, feasible = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
 
     def met(planes: slice) -> tuple[_Running, _Running]:
-        """With some of the planes; the axes are those of all threads, so their lowest are kept apart."""
+        """Return the state with some of the planes; all threads share the axes, so their lowest are kept apart."""
         of_all, of_feasible = plain.about_the_same_axes(), feasible.about_the_same_axes()
         for part in _slices(0, has_axis.shape[1], PART):
             for piece in _slices(planes.start, planes.stop, PIECE):
@@ -110,7 +110,7 @@ class _Running:
 
     @classmethod
     def over(cls, closed_plane: Array, closed_axis: Array) -> _Running:
-        """Of as many planes and axes, nothing met yet."""
+        """State of as many planes and axes, nothing met yet."""
         none = np.zeros(closed_plane.shape, np.intp)
         by_plane, by_axis = (np.full(closed.shape, np.inf, np.float32) for closed in (closed_plane, closed_axis))
         return cls(closed_plane, closed_axis, by_plane, none, none.copy(), by_axis)

@@ -263,7 +263,7 @@ def _plane_of(q: Vector) -> Array:
 
 
 def _walked(frame: Rotation, moved_rad: Array) -> Vector:
-    """From a point of the unit sphere along the great circle that leaves it in a direction of its tangent plane."""
+    """Walk from a point of the unit sphere along the great circle that leaves it in a tangent direction."""
     across, up, start = frame
     away = float(np.hypot(*moved_rad))
     if away == 0.0:

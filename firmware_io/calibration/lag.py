@@ -148,7 +148,7 @@ def _differences(
     there: Bool[ndarray, "scans beams"],
     back: Bool[ndarray, "scans beams"],
 ) -> tuple[Floats, Floats]:
-    """Of two range images (beams x angle cells): sum of each beam's capped differences, and how many there are."""
+    """Sum and number of each beam's capped differences between two range images (beams x angle cells)."""
     if not (there.any() and back.any()):
         return np.zeros(range_m.shape[1]), np.zeros(range_m.shape[1])
     low = max(np.nanmin(joint_rad[there]), np.nanmin(joint_rad[back]))

@@ -181,8 +181,8 @@ def _geometry(tiles: FlatTiles, grouping: Grouping) -> str:
     if share[0] < _ONE_LINE:
         return f"corridor: no surface faces along {shown[0]} of the axis frame; scan where one does, too"
     return (
-        "its surfaces are too few, too far or too much alike; scan another place, away from the middle of the room, and "
-        "give both recordings"
+        "its surfaces are too few, too far or too much alike; scan another place, away from the middle of the room, "
+        "and give both recordings"
     )
 
 

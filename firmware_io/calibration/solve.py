@@ -213,7 +213,7 @@ def step(part: Reduced) -> tuple[Floats, Floats]:
 
 
 def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
-    """Of the free parameters, shape (k, k); infinite if the information is singular."""
+    """Covariance of the free parameters, shape (k, k); infinite if the information is singular."""
     scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information * np.outer(scale, scale))
     with np.errstate(divide="ignore"):

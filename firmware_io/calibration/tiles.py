@@ -53,7 +53,7 @@ class FlatTiles:
 
     @property
     def variance_m2(self) -> Float64[ndarray, " tiles"]:
-        """Of one range in each tile, shape (m,): the common noise, more where a tile is rough beyond chance."""
+        """Variance of a range in each tile, shape (m,): the common noise, and more if a tile is rougher than that."""
         chance = 1 + 3 * np.sqrt(2 / np.maximum(self.count - 3, 1))
         return self.noise_m**2 + np.maximum(self.rms_m**2 - chance * self.noise_m**2, 0.0)
 

@@ -36,7 +36,7 @@ def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = N
 
 
 def one_to_a_voxel(points_m: Float[ndarray, "n 3"], edge_m: float) -> Int64[ndarray, " kept"]:
-    """Of the points in each voxel the one that lies nearest to their mean; indices in increasing order, shape (m,).
+    """Index of the point nearest to the mean of each voxel, in increasing order, shape (m,).
 
     Points stay as measured, with their time, beam and intensity.
     """

@@ -111,7 +111,7 @@ class HornMotion:
         return Motion(float(state[2]), float(state[3]), duty, torque)
 
     def _index(self, t: float) -> int:
-        """Of the drive that acts at `t`."""
+        """Index of the drive that acts at `t`."""
         return max(0, bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1)
 
     def _begin(self, t: float, state: Floats, drive: Actuation, setpoint: float) -> None:

@@ -47,7 +47,7 @@ class SensorLine:
 
     @property
     def name(self) -> str:
-        """Of the sensor, in messages."""
+        """Name of the sensor, in messages."""
         return f"{self.address}: lidar"
 
     @property

@@ -122,7 +122,7 @@ def occupancy_grid(
 
 @njit(cache=True)
 def _paths_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, short_m: float) -> Floats:
-    """Of each beam what lies between two heights and ends `short_m` before its point: (m, 4), x y from and x y to."""
+    """Part of each beam between two heights that ends `short_m` before its point: (m, 4), x y from and x y to."""
     paths = np.empty((points_m.shape[0], 4))
     count = 0
     for i in range(points_m.shape[0]):

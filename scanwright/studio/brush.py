@@ -31,7 +31,7 @@ class PaintBrush:
 
     @property
     def radius_deg(self) -> float:
-        """Of the cone that a dab paints."""
+        """Radius of the cone that a dab paints."""
         return float(np.clip(self._controls.radius.value, LEAST_DEG, MOST_DEG))
 
     def arm(self, guarded: Callable[[Callable[[], Any]], Callable[[Any], None]]) -> None:

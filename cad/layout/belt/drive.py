@@ -186,7 +186,7 @@ def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
 
 
 def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth: float) -> Iterator[LeadExit]:
-    """Up the bore and out by its two windows."""
+    """Paths of the leads up the bore and out by its two windows."""
     low, middle = stack.ring_top + stack.rotor.length_mm, stack.hub_bottom - WINDOW_BELOW
     ends = []
     for sign in (1.0, -1.0) if bundle.count == 1 else (1.0 - 2.0 * (bundle.number % 2),):

@@ -94,7 +94,7 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
 
 
 def _second_moment(stack: BeltStack) -> float:
-    """Of the tube [m4]."""
+    """Second moment of the tube [m4]."""
     return math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12
 
 

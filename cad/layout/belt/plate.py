@@ -61,5 +61,5 @@ def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
 
 
 def pulley_foot_radius(servo: Servo) -> float:
-    """Of what lies on the horn, under the drive pulley."""
+    """Radius of what lies on the horn, under the drive pulley."""
     return servo.horn_circle_mm / 2 + SCREWS[servo.horn_screw].nominal / 2 + 2.0

@@ -86,12 +86,12 @@ class BeltStack(Hub):
 
     @property
     def tube_diameter(self) -> float:
-        """Of the shaft below the hub: that of its bearings."""
+        """Diameter of the shaft below the hub: that of its bearings."""
         return self.carrier.bore_mm
 
     @property
     def seat_diameter(self) -> float:
-        """Of the shaft in its bearings."""
+        """Diameter of the shaft in its bearings."""
         return self.tube_diameter - SLIDES
 
     @property
@@ -116,32 +116,32 @@ class BeltStack(Hub):
 
     @property
     def pitch_radius(self) -> float:
-        """Of the belt's cords on a pulley."""
+        """Radius of the belt's cords on a pulley."""
         return self.teeth * self.belt.pitch_mm / (2 * math.pi)
 
     @property
     def tip_radius(self) -> float:
-        """Of the pulleys' teeth."""
+        """Radius of the pulleys' teeth."""
         return self.pitch_radius - self.belt.pitch_line_mm
 
     @property
     def belt_radius(self) -> float:
-        """Of the belt's back on a pulley."""
+        """Radius of the belt's back on a pulley."""
         return self.tip_radius + self.belt.thickness_mm - self.belt.tooth_height_mm
 
     @property
     def rim_radius(self) -> float:
-        """Of the pulleys' rims: the largest of what turns with them."""
+        """Radius of the pulleys' rims: the largest of what turns with them."""
         return self.belt_radius + RIM_ABOVE_BELT
 
     @property
     def boss_radius(self) -> float:
-        """Of the boss, and of the ring under the lower bearing."""
+        """Radius of the boss, and of the ring under the lower bearing."""
         return self.tube_diameter / 2 + BOSS_WALL
 
     @property
     def collar_radius(self) -> float:
-        """Of the shaft's collar, which touches the inner ring only."""
+        """Radius of the shaft's collar, which touches the inner ring only."""
         return self.tube_diameter / 2 + INNER_RING
 
     @property
@@ -286,14 +286,14 @@ class BeltStack(Hub):
 
 
 def case_corners(stack: BeltStack) -> Array:
-    """Of the servo's case where it stands, rotation frame, shape (8, 3)."""
+    """Corners of the servo's case where it stands, rotation frame, shape (8, 3)."""
     low, high = stack.servo.case_min_mm, stack.servo.case_max_mm
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     return corners @ stack.turn().T + stack.servo_origin()
 
 
 def drive_corners(stack: BeltStack) -> Array:
-    """Of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
+    """Corners of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
     rim, (low, high) = stack.rim_radius, stack.plate_y
     reach = stack.centre + stack.plate_x + TRAVEL
     shelf = [(x, y, z) for x in (0.0, reach) for y in (low, high) for z in (stack.tower_top - SHELF, stack.tower_top)]

@@ -46,11 +46,11 @@ def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
 
 
 def disc_azimuths(stack: BeltStack) -> list[float]:
-    """Of the radial screws that hold the capsule's disc [rad], servo's frame: between the screws of its flange."""
+    """Azimuths [rad] of the radial screws of the capsule's disc, servo's frame: between the screws of its flange."""
     return [math.pi / stack.flange.holes + 2 * math.pi * k / DISC_SCREWS + math.pi / 2 for k in range(DISC_SCREWS)]
 
 
 def flange_centres(flange: Flange) -> list[tuple[float, float]]:
-    """Of the flange's holes, servo's frame; one at its +y."""
+    """Centres of the flange's holes, servo's frame; one at its +y."""
     centres = outlines.polygon(flange.circle_mm / 2, flange.holes, math.pi / 2)
     return [(float(x), float(y)) for x, y in centres]

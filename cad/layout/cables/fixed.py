@@ -56,7 +56,7 @@ class FixedCable:
 
     @property
     def mass_g(self) -> float:
-        """As far as it is drawn; 0 where there is no way."""
+        """Mass of the drawn part; 0 without a path."""
         return mass_g(self.path, self.diameter)
 
 
@@ -121,7 +121,7 @@ def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Pat
 
 
 def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
-    """Over the slots at each side of the foot, outwards, two cables side by side."""
+    """Ends over the slots at each side of the foot, outwards, two cables side by side."""
     ends = []
     for seat in deck.ties:
         aside = (2 * lane - 1) * (seat.half - half - FROM_SLOT)
@@ -136,7 +136,7 @@ def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
 
 
 def _next_to_case(mounted: Mounted, half: float) -> list[Ending]:
-    """On a flat deck, beside the case, outwards."""
+    """Ends on a flat deck, beside the case, outwards."""
     corners, z, ends = mounted.corners, mounted.rear + half + ON_FOOT, []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         out = sign * np.eye(3)[axis]

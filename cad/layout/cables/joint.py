@@ -40,7 +40,7 @@ class LeadJoint:
         return self.piece.middle + self.off * self.along
 
     def points(self) -> Array:
-        """From its one end to the other, shape (n, 3)."""
+        """Points from one end to the other, shape (n, 3)."""
         return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along)
 
 
@@ -69,7 +69,7 @@ def straights(path: Path) -> list[PathPiece]:
 
 
 def _places(piece: PathPiece) -> list[LeadJoint]:
-    """From the middle of a piece to its ends."""
+    """Joints from the middle of a piece to its ends."""
     most = (piece.length - LENGTH) / 2
     steps = np.linspace(0.0, most, math.ceil(most / STEP) + 1).tolist() if most >= 0 else []
     return [LeadJoint(piece, off) for off in dict.fromkeys(side * step for step in steps for side in (-1.0, 1.0))]

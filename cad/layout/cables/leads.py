@@ -53,7 +53,7 @@ class RotorLead:
 
     @property
     def mass_g(self) -> float:
-        """Of the wires between ring and jacket; 0 without a path."""
+        """Mass of the wires between ring and jacket; 0 without a path."""
         return mass_g(self.path, self.diameter)
 
 
@@ -147,7 +147,7 @@ def outlet_mm(place: Placement, y: float, out: float) -> Array:
 
 
 def _outlet(place: Placement, y: float, half: float) -> Ending:
-    """Behind the straight piece of the lidar's cable."""
+    """End of a lead behind the straight piece of the lidar's cable."""
     start = outlet_mm(place, y, place.scanner.lidar.cable_straight_mm)
     return Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
 

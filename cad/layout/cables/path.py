@@ -83,11 +83,11 @@ class Path:
         return pieces
 
     def length(self) -> float:
-        """From end to end."""
+        """Length from end to end."""
         return sum(piece.length for piece in self.pieces())
 
     def least_radius(self) -> float:
-        """Of the circles through the ends and the middle of its arcs: what was drawn, not what was asked for."""
+        """Smallest radius of its arcs as drawn: of the circles through their ends and middles."""
         radii = [math.inf]
         for piece in self.pieces():
             if not piece.straight:
@@ -113,7 +113,7 @@ class Path:
 
 
 def turns(corners: Array) -> Array:
-    """By how much a polyline turns at each inner corner [rad], shape (n - 2,)."""
+    """Angle by which a polyline turns at each inner corner [rad], shape (n - 2,)."""
     along = np.diff(corners, axis=0)
     along = along / np.linalg.norm(along, axis=1)[:, None]
     cosine = np.einsum("ij,ij->i", along[:-1], along[1:])

@@ -63,7 +63,7 @@ class RotorRoom:
         return farther(points, *self.others)
 
     def _carved(self, points: Array, room: float) -> Mask:
-        """In the channels that the linkage leaves free for the cables and for putting in the lidar."""
+        """Whether points are in the channels that the linkage leaves for the cables and for inserting the lidar."""
         at = points @ self.R_rot_laser
         inside = [
             (at > np.array(low) + room).all(axis=1) & (at[:, :2] < np.array(high[:2]) - room).all(axis=1)
@@ -72,13 +72,13 @@ class RotorRoom:
         return np.asarray(np.any(inside, axis=0))
 
     def _over_deck(self, points: Array, room: float) -> Mask:
-        """Over the foot of the mount in every position of the turn."""
+        """Whether points are over the foot of the mount in every position of the turn."""
         normal = np.array(self.deck.normal)
         lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
         return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + room)
 
     def _in_fan(self, points: Array, half: float) -> Mask:
-        """Where a beam would meet the lead: lead and beams turn together."""
+        """Whether a beam would meet a lead at points: lead and beams turn together."""
         if self.bearings_rad is None:
             return np.zeros(len(points), dtype=bool)
         x, y, z = (points @ self.R_rot_laser).T

@@ -225,7 +225,7 @@ def _arc(radius: float, cosine: Array) -> Array:
 
 
 def _on_arcs(radius: float, direction: Array, along: Array) -> Array:
-    """From a corner to the quarters of its arc, for each way on (m, 3): shape (3, m, 3).
+    """Vectors from a corner to the quarters of its arc, for each way on (m, 3): shape (3, m, 3).
 
     The widest arcs are four times as long as SAMPLE; where they begin and end, they touch the straight pieces.
     """

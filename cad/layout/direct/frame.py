@@ -74,7 +74,7 @@ class ServoFrame:
 
     @property
     def heel_mm(self) -> float:
-        """From the line of the servo's screws to the edge over which the servo tips off the plate."""
+        """Distance of the servo's screws from the edge over which the servo tips off the plate."""
         y = sum(y for _, y in self.holes) / len(self.holes)
         return min(abs(end - y) for end in self.ends_y)
 

@@ -186,7 +186,7 @@ def shaft_bend(
 
 
 def shaft_modulus_pa(scanner: Scanner, stack: DirectStack) -> float:
-    """Of elasticity of the shaft's material: a cup is printed, every other shaft is taken for aluminium."""
+    """Modulus of elasticity of the shaft's material: a cup is printed, every other shaft is taken for aluminium."""
     return 1e9 * scanner.printer.modulus_gpa if stack.cup_bore > 0 else ALUMINIUM_PA
 
 

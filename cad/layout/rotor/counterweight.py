@@ -80,7 +80,7 @@ class Counterweight:
 
     @property
     def mass_g(self) -> float:
-        """Of the bar with its screws, which fill its threads."""
+        """Mass of the bar with its screws, which fill its threads."""
         return _grams_per_mm(self.section) * self.length
 
     @property
@@ -221,7 +221,7 @@ def _height_over(deck: Deck, rims: tuple[tuple[float, float], ...]) -> float:
 
 
 def _points(low: tuple[float, float, float], high: tuple[float, float, float], azimuth: float) -> Array:
-    """Of a box whose first axis has an azimuth, its faces included, in the rotation frame, shape (n, 3)."""
+    """Points of a box whose first axis has an azimuth, its faces included, in the rotation frame, shape (n, 3)."""
     axes = [np.linspace(a, b, max(2, math.ceil((b - a) / STEP) + 1)) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     out = _direction(azimuth)

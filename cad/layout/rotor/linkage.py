@@ -153,7 +153,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
 
 
 def neck_corners(p: LinkageBody, attempt: int) -> Array:
-    """Of the hub's core, raised to just under the lidar, and of the plate: the neck is their hull, shape (n, 3).
+    """Corners of the neck's hull, shape (n, 3): the hub's core, raised to just under the lidar, and the plate.
 
     No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
     """

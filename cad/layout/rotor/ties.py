@@ -86,7 +86,7 @@ def _without(which: str, why: str) -> LeftOut:
 
 
 def _candidates(p: LinkageBody, ear: Ear | None) -> Iterator[TieSeat]:
-    """Between the cross screws, where the leads of a bearing's sleeve leave; else on the free sides of these too."""
+    """Seats between the cross screws, where the leads of a bearing's sleeve leave; else on their free sides too."""
     stack, free = p.stack, sum(p.cross_azimuths) / 2
     wired = stack.bearing is not None
     low = stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS if wired else stack.shoulder

@@ -238,7 +238,7 @@ def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
 
 
 def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
-    """From the ways of drivers outwards, or of heads, where they run beside the surface: else a skin is left of it."""
+    """Cuts from the ways of drivers or heads outwards, if they run near the surface: else a skin would be left."""
     low, high = p.top - PLATE_THICKNESS - DRIVER_LENGTH, p.top - PLATE_THICKNESS
     below = high - DRIVER_DEEP
     if p.ears is not None:
@@ -265,7 +265,7 @@ def _for_screws(p: AlignmentLinkage, radius: float, low: float, high: float) -> 
 
 
 def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
-    """Of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
+    """Holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
         return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
     pockets = _for_screws(p, p.screw.head_room, *_pockets(p))

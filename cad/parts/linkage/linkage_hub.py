@@ -117,7 +117,7 @@ def _bore(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _index_groove(p: AlignmentLinkage) -> cq.Solid:
-    """At the hub's lower end, or above the wires where they leave at +y; there an ear carries it outwards."""
+    """Groove at the hub's lower end, or above the wires if they leave at +y; there an ear carries it outwards."""
     stack, ear, y = p.stack, p.ear, p.stack.hub_radius
     low, high = stack.shoulder - 1.0, stack.shoulder + 4.0
     if stack.journal > 0 and math.cos(_free_side(p) - math.pi / 2) > 0.9:

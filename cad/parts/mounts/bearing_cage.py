@@ -227,7 +227,7 @@ def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
 
 
 def _windows(p: BearingCage) -> list[cq.Solid]:
-    """At +-x open below, for the adapter's arms; at +-y closed, so that the legs stand in pairs."""
+    """Windows: at +-x open below, for the adapter's arms; at +-y closed, so that the legs stand in pairs."""
     cuts = []
     for k in range(4):
         out = np.array([1.0, 0.0, 0.0]) if k % 2 == 0 else np.array([0.0, 1.0, 0.0])

@@ -132,7 +132,7 @@ def bearing_tower(p: BearingTower) -> cq.Solid:
 
 
 def _tube(p: BearingTower) -> cq.Solid:
-    """Round outside: around the bearings, then at 45 deg wider around the capsule."""
+    """Round outer shape: around the bearings, then at 45 deg wider around the capsule."""
     stack = p.stack
     narrow, wide, wall = stack.tower_radius, stack.wide_radius, 1.0
     inner = stack.carrier.outer_mm / 2 - LIP

@@ -200,7 +200,7 @@ def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -
 
 
 def _outline(stack: BeltStack) -> cq.Wire:
-    """Of the teeth, in the plane z = 0: per tooth a flank, the groove's half circle in chords, a flank, the tip."""
+    """Outline of the teeth at z = 0: for each a flank, the groove's half circle in chords, a flank, the tip."""
     groove, tip = stack.belt.groove_radius_mm, stack.tip_radius
     centre = tip - stack.belt.tooth_height_mm + groove
     half = (groove + MOUTH) / tip  # rad, of the mouth

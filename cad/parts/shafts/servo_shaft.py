@@ -132,7 +132,7 @@ def _waist(stack: DirectStack) -> cq.Solid:
 
 
 def _groove(stack: DirectStack) -> cq.Solid:
-    """Of the retaining ring under the bearing's sleeve."""
+    """Groove of the retaining ring under the bearing's sleeve."""
     bottom, width = GROOVES[stack.retaining_ring]
     high, outer = stack.hub_bottom, stack.shaft_diameter
     return solids.lathe(

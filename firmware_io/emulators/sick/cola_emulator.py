@@ -84,7 +84,7 @@ class SickMachine:
 
     @property
     def period_ns(self) -> float:
-        """Of a turn."""
+        """Period of a turn."""
         return 1e9 / self.lidar.scan_rate_hz
 
     @property

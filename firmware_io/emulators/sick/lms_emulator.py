@@ -69,7 +69,7 @@ class LmsMachine:
 
     @property
     def turns(self) -> int:
-        """Of the mirror, for one telegram."""
+        """Turns of the mirror, for one telegram."""
         return max(round(100 / self._step_centideg), 1)
 
     @property

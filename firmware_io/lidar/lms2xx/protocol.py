@@ -43,7 +43,7 @@ class LmsTelegram:
 
     @property
     def status(self) -> int:
-        """Of the sensor that answers."""
+        """Status of the sensor that answers."""
         return self.values[-1] if self.values else 0
 
 

@@ -41,7 +41,7 @@ class Window:
 
     @property
     def bytes_per_scan(self) -> int:
-        """Of a reply: echo, status, stamp, and lines of 64 characters with their sum and end."""
+        """Bytes of a reply: echo, status, stamp, and lines of 64 characters with their sum and end."""
         characters = self.size * self.characters * (2 if self.intensity else 1)
         return 16 + 4 + 6 + 1 + characters + 2 * -(-characters // LINE_CHARACTERS)
 

@@ -68,7 +68,7 @@ class Telegram:
 
     @property
     def name(self) -> bytes:
-        """Of the variable, method or event; empty in an error."""
+        """Name of the variable, method or event; empty in an error."""
         return b"" if self.word == b"sFA" else self.payload[4:].split(b" ", 1)[0]
 
     def values(self) -> Reader:

@@ -18,7 +18,7 @@ _LONGEST = 250  # of the length byte; more is damage
 
 
 def checksum(body: bytes) -> int:
-    """Of everything between header and sum."""
+    """Checksum of everything between header and sum."""
     return ~sum(body) & 0xFF
 
 
