@@ -55,7 +55,7 @@ class Walk:
     values: int
 
 
-WIDE = Walk(0.5, 243, 0.1, 1e-4, 30)
+WIDE = Walk(0.5, 243, 0.1, 1e-4, 60)
 SHRUNK = 1.0, 0.3, 0.1  # the reach of one walk after another
 NARROW = Walk(0.1, 1215, 0.005, 1e-7, 30)
 
