@@ -132,7 +132,9 @@ def _type(field: Schema) -> str:
     if field.get("type") == "array":
         inner = field.get("prefixItems") or [field.get("items", {})]
         return f"list of {' and '.join(dict.fromkeys(_type(item) for item in inner))}{_count(field)}"
-    return f"{_TYPES.get(field.get('type', ''), 'table')}{_bounds(field)}"
+    kinds = field.get("type", "")
+    kind = next(kind for kind in kinds if kind != "null") if isinstance(kinds, list) else kinds
+    return f"{_TYPES.get(kind, 'table')}{_bounds(field)}"
 
 
 def _named(field: Schema) -> str:
