@@ -16,20 +16,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TextIO
 
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import RecordingError
 
 _WAIT_S = 0.1  # until the end of a replay is noticed
+_REMEDY = "`scanwright doctor --capture FILE` writes captures"
 _files: list[TextIO] = []
 _lock = threading.Lock()
 
 
 @contextmanager
 def capturing(path: Path) -> Iterator[None]:
-    """Write all bytes that devices exchange during the body to a new file; DeviceError if it cannot be created."""
+    """Write all bytes that devices exchange during the body to a new file; RecordingError if it cannot be created."""
     try:
         file = path.open("x", encoding="ascii")
     except OSError as error:
-        raise DeviceError(f"{path}: cannot write: {error.strerror}") from error
+        raise RecordingError(
+            f"{path}: cannot write: {error.strerror}; name a new file in a folder that exists"
+        ) from error
     with file:
         _files.append(file)
         try:
@@ -51,7 +54,7 @@ def captured(port: str, direction: str, data: bytes) -> bytes:
 class _Device:
     """A device that repeats what a capture holds: after each request, the bytes that followed it, at their times."""
 
-    unasked: list[tuple[int, bytes]] = field(default_factory=list)  # delay [ns] and bytes before any request
+    unasked: list[tuple[int, bytes]] = field(default_factory=list)  # delay [ns] and bytes sent before the first request
     replies: dict[bytes, deque[list[tuple[int, bytes]]]] = field(default_factory=dict)  # the same, by request
     due: deque[tuple[int, bytes]] = field(default_factory=deque)  # time [ns] and bytes that will be sent
     received: bytes = b""
@@ -104,9 +107,9 @@ def _devices(path: Path) -> dict[str, _Device]:
             else:
                 raise ValueError(direction)
     except OSError as error:
-        raise DeviceError(f"{path}: cannot read: {error.strerror}") from error
-    except ValueError as error:
-        raise DeviceError(f"{path}: line {number}: not a line of a capture") from error
+        raise RecordingError(f"{path}: cannot read: {error.strerror}; {_REMEDY}") from error
+    except ValueError as error:  # of bytes that are no text, too
+        raise RecordingError(f"{path}: {f'line {number}: ' * bool(number)}not a capture; {_REMEDY}") from error
     return devices
 
 
@@ -118,7 +121,7 @@ def replaying(path: Path) -> Iterator[dict[str, str]]:
         Port in the capture -> path of the pseudo-terminal.
 
     Raises:
-        DeviceError: the file cannot be read, or is no capture.
+        RecordingError: the file cannot be read, or is no capture.
     """
     import tty  # POSIX only, while captures are imported everywhere
 
@@ -137,7 +140,7 @@ def replaying(path: Path) -> Iterator[dict[str, str]]:
             for master in select.select(list(masters), [], [], max(wait_s, 0.0))[0]:
                 masters[master].hear(os.read(master, 4096), time.monotonic_ns())
             for master, device in masters.items():
-                with suppress(BlockingIOError):  # nobody reads
+                with suppress(BlockingIOError):  # the buffer is full: no program reads
                     os.write(master, device.send(time.monotonic_ns()))
 
     thread = threading.Thread(target=serve, name="replay")

@@ -73,7 +73,8 @@ def run() -> None:
     except USAGE_ERROR as error:
         number = re.fullmatch(r"-[\d.]+", getattr(error, "option_name", ""))
         advice = "; a value that begins with - goes behind =: --angles=0,90,0,-90" if number else ""
-        print_error(f"{error.format_message()}{advice} (see `{_named(error)} --help`)")
+        message = error.format_message().replace(": Value error, ", ": ").removesuffix(".")  # the words of pydantic
+        print_error(f"{message}{advice} (see `{_named(error)} --help`)")
         sys.exit(2)
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):

@@ -4,7 +4,7 @@ from contextlib import closing
 
 import pytest
 
-from scanwright.design.errors import DeviceError
+from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.capture import capturing, replaying
 from scanwright.firmware_io.serial_port import open_serial_port
 
@@ -53,10 +53,16 @@ def test_a_replay_answers_as_the_device_did_and_can_be_captured_again(capture, t
 
 
 def test_a_capture_is_never_written_over_and_a_damaged_one_is_named(capture):
-    with pytest.raises(DeviceError, match="File exists"), capturing(capture):
+    with pytest.raises(RecordingError, match="File exists"), capturing(capture):
         pass
     capture.write_text("1 S > ff\n2 S = 00\n")
-    with pytest.raises(DeviceError, match="line 2: not a line of a capture"), replaying(capture):
+    with pytest.raises(RecordingError, match="line 2: not a capture"), replaying(capture):
         pass
-    with pytest.raises(DeviceError, match="cannot read: No such file"), replaying(capture.with_name("none")):
+    capture.write_bytes(b"\xff\xfe")
+    with (
+        pytest.raises(RecordingError, match=r"txt: not a capture; `scanwright doctor --capture FILE`"),
+        replaying(capture),
+    ):
+        pass
+    with pytest.raises(RecordingError, match="cannot read: No such file"), replaying(capture.with_name("none")):
         pass

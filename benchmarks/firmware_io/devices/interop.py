@@ -83,7 +83,7 @@ words = (sys.argv[1] + "/launch/" + launch, "hostname:=" + sys.argv[2], "port:="
 SickScanApiInitByLaunchfile(library, handle, " ".join(words))
 callback = SickScanPointCloudMsgCallback(show)
 SickScanApiRegisterCartesianPointCloudMsg(library, handle, callback)
-time.sleep(60)
+time.sleep(60)  # the callback prints until the benchmark ends this program
 """
 _FTSERVO = """
 from scservo_sdk import PortHandler, sms_sts

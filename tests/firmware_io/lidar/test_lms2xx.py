@@ -38,7 +38,7 @@ OTHER_REQUESTS = [
     ("74", "F4 00 00 46 00 01 00 01"),
     ("32", "B2"),
     ("77" + "00" * 34, "F7 00 00 00 46 00 01 00 01"),  # not in installation mode
-    ("20 00" + b"SICK_XXX".hex(), "A0 01"),
+    ("20 00" + b"SICK_XXX".hex(), "A0 01"),  # a wrong password of the installation mode
     ("20 00" + b"SICK_LMS".hex(), "A0 00"),
     ("77 00 00 46 00 01 00 00" + "00" * 27, "F7 01 00 00 46 00 01 00 00"),
     ("20 25", "A0 00"),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -245,6 +246,7 @@ def test_a_full_disk(shop, tmp_path):
         ("assemble none.mcap --angles none.json -o a.ply", "`scanwright build TASK` writes angles.json"),
         ("scan none", "`scanwright build TASK` writes angles.json"),
         ("report none", "`scanwright build TASK` writes out/TASK"),
+        ("emulate --replay none", "`scanwright doctor --capture FILE` writes captures"),
         ("register none.ply none_2.ply -o a.ply", "`scanwright assemble` makes clouds"),
         ("build none.toml", "`scanwright new` writes one"),
         ("optimise none", "`scanwright new` writes one"),
@@ -256,3 +258,10 @@ def test_a_missing_file_is_one_line_with_the_command_that_makes_it(command, tmp_
     code, _, complaints = command(*words.replace("ANGLES", str(angles)).split())
     assert (code, len(complaints)) == (2, 1)
     assert "none" in complaints[0] and remedy in complaints[0]
+
+
+@pytest.mark.parametrize("words", ["scan none --stamp-at foo", "scan none --echo foo", "import a --stamp foo -o b"])
+def test_a_choice_that_does_not_exist_is_named_with_those_that_do(command, words):
+    code, _, complaints = command(*words.split())
+    assert (code, len(complaints)) == (2, 1)
+    assert re.match(r"error: Invalid value for '--[a-z-]+': 'foo' is not one of '\w+', .*'\w+' \(see ", complaints[0])
