@@ -198,8 +198,8 @@ def test_colours_are_for_terminals_that_want_them(screen, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["assemble", "r.mcap"], "Missing option '--angles'. (see `scanwright assemble --help`)"),
-        (["build"], "Missing argument 'TASK'. (see `scanwright build --help`)"),
+        (["assemble", "r.mcap"], "Missing option '--angles' (see `scanwright assemble --help`)"),
+        (["build"], "Missing argument 'TASK' (see `scanwright build --help`)"),
         (["biuld", "x"], "'biuld'. Did you mean 'build'? (see `scanwright --help`)"),
         (["study", "x", "--processes", "0"], "--processes"),
         (["check", "x", "--loud"], "--loud"),
