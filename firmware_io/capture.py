@@ -5,6 +5,7 @@ A line of a capture is: time [ns, time.monotonic_ns], port, `<` (from the device
 
 from __future__ import annotations
 
+import logging
 import os
 import select
 import threading
@@ -14,39 +15,39 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TextIO
 
 from scanwright.design.errors import RecordingError
 
 _WAIT_S = 0.1  # until the end of a replay is noticed
 _REMEDY = "`scanwright doctor --capture FILE` writes captures"
-_files: list[TextIO] = []
-_lock = threading.Lock()
+_log = logging.getLogger("scanwright.firmware_io.bytes")
+_log.propagate = False  # only captures take its records, whatever the level of the other loggers
+_log.setLevel(logging.CRITICAL)
 
 
 @contextmanager
 def capturing(path: Path) -> Iterator[None]:
     """Write all bytes that devices exchange during the body to a new file; RecordingError if it cannot be created."""
     try:
-        file = path.open("x", encoding="ascii")
+        handler = logging.FileHandler(path, "x", encoding="ascii")
     except OSError as error:
         raise RecordingError(
             f"{path}: cannot write: {error.strerror}; name a new file in a folder that exists"
         ) from error
-    with file:
-        _files.append(file)
-        try:
-            yield
-        finally:
-            _files.remove(file)
+    _log.addHandler(handler)
+    _log.setLevel(logging.DEBUG)
+    try:
+        yield
+    finally:
+        _log.removeHandler(handler)
+        _log.setLevel(logging.CRITICAL)
+        handler.close()
 
 
 def captured(port: str, direction: str, data: bytes) -> bytes:
     """Return the bytes, and write them to a running capture."""
-    if data and _files:
-        with _lock:
-            for file in _files:
-                file.write(f"{time.monotonic_ns()} {port} {direction} {data.hex()}\n")
+    if data and _log.isEnabledFor(logging.DEBUG):
+        _log.debug("%d %s %s %s", time.monotonic_ns(), port, direction, data.hex())
     return data
 
 

@@ -14,6 +14,7 @@ from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
 from scanwright.firmware_io.lidar.lidar import TimedScan
 from scanwright.firmware_io.samples import Scan
 
+_MEAN_TURNS = 64  # speeds wander by a per cent, and a pause of 10 s is 100 turns
 _BACK_DEG = 10.0  # by which the angle of a point may lie before that of the one before it
 
 
@@ -71,7 +72,8 @@ class TurnQueue:
 
     def begin_anew(self, skip: int) -> None:
         """A new stream, before which nothing is missing; of its turns `skip` are left out between two."""
-        self._end_ns = 0
+        self._begin_ns = self._seen = 0
+        self._turn_ns = 0.0
         self._skip = self._skipped = skip
         self.resume()
 
@@ -93,9 +95,12 @@ class TurnQueue:
         while self._waiting:
             turn, arrival_ns = self._waiting.popleft()
             begin_ns, end_ns = (line.host_ns(float(turn.sensor_ns[at])) for at in (0, -1))
-            if self._end_ns and end_ns > begin_ns:
-                self.dropped += max(round((begin_ns - self._end_ns) / (end_ns - begin_ns)), 0)
-            self._end_ns = end_ns
+            turn_ns = (end_ns - begin_ns) * turn.sensor_ns.size / max(turn.sensor_ns.size - 1, 1)
+            self._seen += 1
+            self._turn_ns += (turn_ns - self._turn_ns) / min(self._seen, _MEAN_TURNS)
+            if self._begin_ns and self._turn_ns > 0:
+                self.dropped += max(round((begin_ns - self._begin_ns) / self._turn_ns) - 1, 0)
+            self._begin_ns = begin_ns
             self._skipped += 1
             if self._skipped > self._skip:
                 self._skipped = 0

@@ -114,8 +114,10 @@ def test_bad_packets_are_counted_and_never_handed_out():
         lidar.read_raw()
         emulator.garble(3)
         emulator.cut(3)
-        for _ in range(8):
+        for _ in range(40):  # on a busy computer some packets were under way before
             check(lidar.read_raw(), 1081)
+            if lidar.bad_packets >= 6:
+                break
         assert 6 <= lidar.bad_packets <= 9  # a lost end takes the next one with it
         assert lidar.dropped >= 3  # on a busy computer the emulator leaves out some more
 

@@ -192,13 +192,15 @@ def test_the_disk_is_full(drill, monkeypatch):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return os.write(descriptor, data)
 
-    fake = SimpleNamespace(**{name: getattr(os, name) for name in ("open", "close", "ftruncate", "fsync")})
+    fake = SimpleNamespace(**{name: getattr(os, name) for name in ("open", "close", "ftruncate")})
+    fake.fsync = lambda _: None  # a slow disk of this computer is no part of the drill
     fake.O_WRONLY, fake.O_CREAT, fake.O_EXCL, fake.write = os.O_WRONLY, os.O_CREAT, os.O_EXCL, write
     monkeypatch.setattr(recorder, "os", fake)
+    monkeypatch.setattr(recorder, "CHUNK_S", 0.01)  # the recorder's thread runs in real time, the rest does not
     one.happens(3.0, lambda: full.append(True))
     assert one.run() == 3
     assert "No space left on device; what came before is on the disk: free space, then `scanwright repair" in one.told
     assert OFF in one.told and not one.torque()
     full.clear()
     summary = repair(one.file)
-    assert summary.times_ns[1] > one.fault_ns - 5 * 10**9
+    assert one.fault_ns - summary.times_ns[1] < 1e9
