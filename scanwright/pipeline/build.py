@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import shutil
 import tempfile
 from collections import Counter
@@ -13,18 +12,17 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.checks.checks_json import read_checks
+from scanwright.cad.checks.checks_json import add_check, read_checks
 from scanwright.cad.files.part_files import PartReport, PartsResult, build_parts, write_files
 from scanwright.cad.kernel import require_kernel
-from scanwright.design.angles import AngleSet
 from scanwright.design.concurrency.processes import Begin, Packed, worker_processes
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding, errors_in, sentence
 from scanwright.design.progress import Progress, no_progress
 from scanwright.design.task.task import LoadedTask, load_task
+from scanwright.pipeline.deck_height import deck_height
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import changes, first_difference, is_current, listed_files, write_manifest
-from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.ros2.package import write_package
 
 if TYPE_CHECKING:
@@ -55,8 +53,6 @@ MOST_FAILED = 3
 DRAWN = 2
 """Reference mounts beside the scanner in density.png, the best one first: its ratio is drawn."""
 
-DECK_MM = 10.0  # between the deck of the robot and that of the scanner: more moves the robot in the masks visibly
-
 BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files": 0.73, "report": 0.9}
 """Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
 
@@ -72,7 +68,6 @@ class Made:
         findings: what a person should know before the parts are made.
         cloud: error, gaps and points to expect.
         to_make: how many parts to print and to have machined, and the time to print.
-        mounted: where the optical centre is with respect to the deck.
     """
 
     optimum: Optimum
@@ -81,7 +76,6 @@ class Made:
     findings: tuple[Finding, ...]
     cloud: ExpectedCloud
     to_make: str
-    mounted: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +110,6 @@ class Build:
             f"wrote {len(self.files)} files to {self.folder}",
             *self.made.cloud.lines(),
             f"parts to make: {self.made.to_make}",
-            f"optical centre: {self.made.mounted}",
             *(optimum.table() if in_full else [*optimum.hole_lines(tabled=False), *optimum.preferred_lines()]),
             *self.made.chosen.lines(),
             *self.made.as_built.lines(),
@@ -329,6 +322,8 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         chosen, scanner, parts = _that_passes(begin, optimum, requested.sha256(), made(), work, progress)
         best, angles = chosen.family, scanner.angles
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
+        height = deck_height(loaded, angles)
+        add_check(work / "checks.json", height)
         exported, drawn = (
             begin(_exported, scanner, parts.result, work, progress),
             begin(_drawn, scanner, parts.result, progress),
@@ -351,20 +346,4 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     checks = read_checks(target / "checks.json")
     cloud = expected_cloud(loaded, problem, best.angles_rad, chosen.shadow, checks)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
-    return Made(optimum, chosen, seen, (*parts.findings, *findings), cloud, to_make, _mounted(angles, loaded))
-
-
-def _mounted(angles: AngleSet, loaded: LoadedTask) -> str:
-    """Return where the optical centre is, in words, and by how much the height of the task must change for it."""
-    x_mm, _, z_mm = angles.t_world_rot_mm
-    height = "above the deck" if z_mm > 0 else "below the deck that the scanner hangs from"
-    along = f", {abs(x_mm):.0f} mm {'ahead of' if x_mm > 0 else 'behind'} its holes" if abs(x_mm) >= 0.5 else ""
-    robot = robot_around(loaded.task.mask, loaded.source.parent)
-    has_mm = 1000 * (robot.below_m if z_mm > 0 else robot.above_m)
-    task = ""
-    if abs(has_mm - abs(z_mm)) > DECK_MM and math.isfinite(has_mm):
-        by_mm = (abs(z_mm) - has_mm) * (1 if z_mm > 0 else -1)
-        task = f"; the task has {has_mm:.0f} mm: {'raise' if by_mm > 0 else 'lower'} its scanner by {abs(by_mm):.0f} mm"
-    elif z_mm < 0 and math.isfinite(robot.below_m):
-        task = "; the task has no deck above it: limit angles.alpha_rot_deg to [-90, 90]"
-    return f"{abs(z_mm):.0f} mm {height}{along}{task}"
+    return Made(optimum, chosen, seen, (height, *parts.findings, *findings), cloud, to_make)

@@ -223,6 +223,7 @@ def test_recordings_of_two_places_that_are_given_as_one_are_named(tmp_path):
     ]
     record = calibrate_recordings(paths, designed(PITCHING), tmp_path / "a.json", one_place=True).record
     assert any(
-        "a person walked through the scene, an object was moved, or the scanner was moved between recordings" in said
+        "a person walked through the scene, an object was moved, times of scans or angles were wrong, or "
+        "the scanner was moved between recordings" in said
         for said in record["notes"]
     )
