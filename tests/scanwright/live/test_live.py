@@ -126,7 +126,7 @@ def test_the_view_states_its_progress_and_the_unit_of_its_colours():
         view = CloudView(server, "scan", np.zeros(3), 18.0)
         assert view.legend.content == ""
         view.add(CloudGrowth(points, np.zeros(101, np.float32), np.full(101, 22.5, np.float32), (), 2))
-        assert "101 points; full scan 2: 25% (4.5 of 18 s); it dropped 2 scans" in view.facts.content
+        assert "101 points; full scan 2: 25% (4.5 of 18 s); the view dropped 2 scans" in view.facts.content
         assert "0.0 m" in view.legend.content and "3.0 m" in view.legend.content
         view.by.value = "time"
         assert "22.5 s" in view.legend.content
