@@ -233,7 +233,8 @@ class ConsoleProgress:
     def left_s(self, fraction: float) -> float | None:
         """Return the time left at a fraction [s], from the time that it took so far; None if that is too short."""
         now_s = self.clock()
-        if self.began is None or fraction < self._fraction - _LEAST_SHARE:  # other work, or steps that are done again
+        # nothing is done yet, or other work, or steps that are done again
+        if self.began is None or not fraction or fraction < self._fraction - _LEAST_SHARE:
             self.began, self._fraction = (now_s, fraction), fraction
         fraction = self._fraction = max(fraction, self._fraction)
         began_s, first = self.began
