@@ -67,6 +67,19 @@ def test_blind_spots_are_named_and_no_ratio_is_stated_without_one(built):
     assert scan.text.endswith("Parts block 25.0%.")
 
 
+@pytest.mark.parametrize(
+    ("share", "headline"), [(0.2, "All you asked for, except behind the robot"), (0.8, "The robot hides most of it")]
+)
+def test_a_region_that_the_robot_hides_leads(built, share, headline):
+    severity = "warning" if share > 0.5 else "note"
+    hidden = Finding("hidden_region", severity, "weight.0", "the robot hides most of it", share, 0.5, "1", "move it")
+    sees = cards(ANGLES, replace(built, cloud=replace(built.cloud, hidden=(hidden,))), None)[0]
+    assert sees.headline == headline
+    assert ("The robot hides most of it." in sees.text) == (share < 0.5)
+    height = replace(hidden, code="deck_height", severity="warning", message="the optical centre is high")
+    assert to_do((), (height,), None)[0].text == "The optical centre is high."
+
+
 def test_planes_are_stated_in_metres():
     loaded = ground_task()
     sees = cards(ANGLES, answer(loaded, ANGLES), None)[0]
