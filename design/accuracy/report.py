@@ -27,11 +27,7 @@ class StressReport:
 
 
 def report_stress(loaded: LoadedTask, folder: Path, progress: Progress, more: Iterable[StressRow] = ()) -> StressReport:
-    """Run the stiff and extreme cases on a task, add the rows `more`, and write `stress.csv`.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+    """Run the stiff and extreme cases on a task, add the rows `more`, and write `stress.csv`."""
     progress("stiff and extreme cases")
     loaded = as_turning(loaded)
     rows = [*stress_rows(loaded, problem_of(loaded)), *more]

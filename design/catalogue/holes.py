@@ -76,7 +76,7 @@ def mounting_holes(holes: Iterable[Hole], face: Face) -> HolePattern:
 
 
 def what_holds(holes: Iterable[Hole]) -> str:
-    """Return the holes in words, for a message: how many of which kind in which face."""
+    """Return the number of holes of each kind and face as text."""
     counts: dict[tuple[str, str, str], int] = {}
     for hole in holes:
         face = hole.axis if isinstance(hole.axis, str) else "an oblique face"

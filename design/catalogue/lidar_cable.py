@@ -1,8 +1,7 @@
-"""Cables of a lidar, and the connectors that take them. Millimetres, grams."""
+"""Cables of a lidar, and their mating connectors. Millimetres, grams."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,11 +26,6 @@ class Cable(Record):
     def length_mm(self) -> float:
         """Length as delivered."""
         return self.lengths_mm[0]
-
-    @property
-    def volume_mm3(self) -> float:
-        """Volume of its round section."""
-        return math.pi / 4 * self.diameter_mm**2 * self.length_mm
 
     @property
     def mass_g(self) -> float:
@@ -69,7 +63,7 @@ BLOCK_MM = (25.0, 12.0)  # across it, with the wires in it, and height
 
 
 def connector_for(end: End, poles: int) -> Connector:
-    """Return what takes an end of a cable: its socket, or a terminal block for bare wires.
+    """Return the mate of an end of a cable: a socket, or a terminal block for bare wires.
 
     Args:
         end: of the cable.

@@ -1,4 +1,4 @@
-"""The picture of a comparison: one line of bars per candidate, readable in grey."""
+"""The picture of a comparison: one row of bars for each candidate."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ OPTIMUM = {"color": INK}
 
 
 def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
-    """Bars of -J, blind share of the weight, widest gap, cost, and what a dollar sees, one candidate below the other.
+    """Draw bars of -J, blind share of the weight, widest gap, cost, and beams per ball and dollar.
 
     Args:
-        path: PNG to write; an SVG of the same name is written too.
+        path: PNG to write, next to an SVG of the same name.
         rows: of the comparison, the optimum first; a candidate with two rows gets two bars, the shorter time below.
-        title: line above all.
+        title: of the picture.
     """
     names = list(dict.fromkeys(row.name for row in rows))
     longest = {name: max(row.time_s for row in rows if row.name == name) for name in names}
