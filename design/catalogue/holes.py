@@ -88,9 +88,8 @@ def what_holds(holes: Iterable[Hole]) -> str:
 def with_holes(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a product file with `holes` in place of the fields of version 0.1.
 
-    Args:
-        table: of a product file; each value a table of value, source and verified. Returned as it is if it states
-            `holes`, or not all of the old fields. The holes are verified if their places and size are.
+    A table that has `holes`, or not all of the old fields, is not changed. The holes are verified if their places and
+    their size are.
     """
     old = OLD_LIDAR if table.get("kind") == "lidar" else OLD_SERVO
     entries = [table.get(field) for field in old]

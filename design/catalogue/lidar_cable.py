@@ -63,12 +63,7 @@ BLOCK_MM = (25.0, 12.0)  # across it, with the wires in it, and height
 
 
 def connector_for(end: End, poles: int) -> Connector:
-    """Return the mate of an end of a cable: a socket, or a terminal block for bare wires.
-
-    Args:
-        end: of the cable.
-        poles: wires of the cable.
-    """
+    """Return the mate of an end of a cable with `poles` wires: a socket, or a terminal block for bare wires."""
     if end != "bare":
         return CONNECTORS[end]
     return Connector(f"terminal block, {poles} poles", (POLE_MM * poles, *BLOCK_MM), POLE_G * poles)

@@ -135,12 +135,7 @@ def chosen(
 
 
 def table_lines(products: Iterable[Product], in_full: bool = True) -> list[str]:
-    """Return a table for each kind, with `MARK` behind unverified values.
-
-    Args:
-        products: what to list.
-        in_full: False for the most important columns and rows, and only the names if there are several kinds.
-    """
+    """Return a table for each kind; unless `in_full`, of the main columns, or only names if there are several kinds."""
     listed = list(products)
     if not listed:
         return ["no product of the catalogue matches"]

@@ -75,15 +75,8 @@ def phase_statistics(
 ) -> PhaseStatistics:
     """Return exact statistics of the count over the start phase at polar angles about the axis.
 
-    Args:
-        polar_rad: polar angles of the ball centres.
-        beam_polar_rad: polar angles of the beams in the rotation frame.
-        beam_azimuth_rad: azimuths of the beams in the rotation frame.
-        lines: scan lines of the turn.
-        ball_rad: ball radius.
-        g: function of the count, element by element.
-        until_rad: other ends of ranges that begin at `polar_rad`: `least` is then a lower bound of the lowest count in
-            each range, and the other statistics have no meaning.
+    `g` is a function of the count, element by element. With `until_rad`, the other ends of ranges that begin at
+    `polar_rad`, `least` is a lower bound of the lowest count in each range, and the others have no meaning.
     """
     order = np.argsort(beam_polar_rad, kind="stable")
     polar_b, azimuth_b = beam_polar_rad[order], beam_azimuth_rad[order] % (2 * np.pi)

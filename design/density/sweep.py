@@ -58,11 +58,7 @@ def mean_count_swept(
 ) -> Float[ndarray, " n"]:
     """Return the mean count of beams within a ball over the start phase, for each direction, shape (n,).
 
-    Args:
-        directions_rot: unit vectors in the rotation frame at joint angle 0.
-        beams_rot: unit vectors of the beams in the rotation frame.
-        lines: scan lines of one period.
-        ball_rad: ball radius.
+    Directions and beams are unit vectors in the rotation frame at joint angle 0.
     """
     t, p, t_b, p_b = _sorted(directions_rot, beams_rot)
     numbers = lines.numbers()

@@ -21,12 +21,7 @@ def with_value_table(
 ) -> list[Array]:
     """Return the four statistics of all directions, (directions,) each, with a longer table for those that need it.
 
-    Args:
-        kernel: computes the statistics of some directions.
-        directions: number of directions.
-        g: function of the count of beams.
-        repeats: measurements of each line.
-        smallest: number of directions that is worth a thread.
+    `repeats` is the number of measurements of each line, `smallest` that of directions that are worth a thread.
     """
     result, need = _with_table(kernel, np.arange(directions), _table(g, repeats, FIRST), smallest)
     late = np.flatnonzero(need > FIRST)

@@ -41,12 +41,9 @@ class FreeLines:
 
 
 def free_lines(blocked: Bool[ndarray, "beams angles"], lines: ScanLines, sweep: SweepLines | None) -> FreeLines:
-    """Return the table of free lines.
+    """Return the table of free lines of a full turn, or of a sweep.
 
-    Args:
-        blocked: whether a beam is blocked, at equal steps of the axis angle from 0.
-        lines: of a full turn; its last gap can be shorter.
-        sweep: the trajectory if the servo sweeps.
+    `blocked` states whether a beam is blocked at equal steps of the axis angle from 0.
     """
     steps = blocked.shape[1]
     step = 2 * np.pi / steps

@@ -119,15 +119,9 @@ def as_built(
     own: Score | None = None,
     mounts: tuple[TunedMount, ...] | None = None,
 ) -> AsBuilt:
-    """Evaluate a mount with its parts.
+    """Evaluate (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] without the beams that `shadow` blocks, if known.
 
-    Args:
-        problem: the task as numbers, with the motion that was built.
-        task: the task, to which the reference mounts are tuned.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        shadow: the beams that its parts block, if known.
-        own: its score with the parts, if known.
-        mounts: the reference mounts, if known.
+    `own`, the score with the parts, and the reference mounts are computed if they are not given.
     """
     if own is None:
         own = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)

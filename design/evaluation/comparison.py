@@ -110,13 +110,7 @@ def compare(
 ) -> list[ComparisonRow]:
     """Return rows of the optimum, the reference mounts, other scanners, and every multibeam of the catalogue.
 
-    Args:
-        loaded: the task.
-        problem: the task as numbers.
-        best: the optimum.
-        mounts: the reference mounts.
-        progress: progress callback.
-        built: mounting angles [rad] of a build of the task, and the beams that its parts block; makes the first row.
+    `built`, the angles [rad] of a build and the beams that its parts block, makes the first row.
     """
     rows = [_rotating("optimum", loaded, problem, best.angles_rad, best.score)]
     if built is not None:

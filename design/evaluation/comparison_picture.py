@@ -17,12 +17,9 @@ OPTIMUM = {"color": INK}
 
 
 def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
-    """Draw bars of -J, blind share of the weight, widest gap, cost, and beams per ball and dollar.
+    """Write bars of -J, blind share of the weight, widest gap, cost, and beams per ball and dollar to a PNG and an SVG.
 
-    Args:
-        path: PNG to write, next to an SVG of the same name.
-        rows: of the comparison, the optimum first; a candidate with two rows gets two bars, the shorter time below.
-        title: of the picture.
+    The first row is the optimum; a candidate with two rows gets two bars, the shorter time below.
     """
     names = list(dict.fromkeys(row.name for row in rows))
     longest = {name: max(row.time_s for row in rows if row.name == name) for name in names}

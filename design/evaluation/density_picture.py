@@ -38,11 +38,8 @@ def density_figure(
 ) -> Figure:
     """Return density maps on one colour scale, and below them the ratio of the first two, if there are two.
 
-    Args:
-        problem: the task as numbers.
-        settings: title of each map and its (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], from the top.
-        title: of the figure.
-        shadow: beams that the parts of the first mount block, if known.
+    `settings` maps titles to (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], from the top; `shadow` are the beams
+    that the parts of the first one block.
     """
     theta = np.arange(STEP_DEG / 2, 180, STEP_DEG)
     phi = np.arange(-180 + STEP_DEG / 2, 180, STEP_DEG)

@@ -199,16 +199,9 @@ def evaluate(
     shadow: SelfOcclusion | None = None,
     checks: Sequence[Finding] = (),
 ) -> Evaluation:
-    """Evaluate mounting angles.
+    """Evaluate (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
-    Args:
-        loaded: the task.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        pole: pole to hit, if any.
-        lever: lever arm of the optical centre, if any.
-        progress: progress callback.
-        shadow: beams that the parts of this mount block, if it was built.
-        checks: checks of these parts.
+    `shadow` are the beams that the parts of this mount block and `checks` the checks of these parts, if it was built.
 
     Raises:
         TaskError: no direction has a weight, or the lidar cannot measure the pole.

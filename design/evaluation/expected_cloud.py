@@ -101,14 +101,9 @@ def expected_cloud(
     shadow: SelfOcclusion | None = None,
     checks: Sequence[Finding] = (),
 ) -> ExpectedCloud:
-    """Return the expected cloud of a mount.
+    """Return the expected cloud of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
-    Args:
-        loaded: the task.
-        problem: the task as numbers.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        shadow: beams that its parts block, if known.
-        checks: checks of its parts, if it was built.
+    `shadow` are the beams that its parts block and `checks` the checks of these parts, if it was built.
     """
     return ExpectedCloud(
         expected_error(loaded, problem, angles_rad, checks),

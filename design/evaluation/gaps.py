@@ -98,10 +98,7 @@ def empty_cap(scan: Float[ndarray, "n 3"]) -> BlindCone:
 def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]) -> Finding | None:
     """Return a warning if the region has a gap much wider than the spacing of lines and beams, but no blind spot.
 
-    Args:
-        problem: the task as numbers.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        beams: unit vectors of one full scan in the world.
+    `beams` are unit vectors of one full scan in the world.
     """
     from scipy.spatial import cKDTree
 

@@ -90,18 +90,11 @@ def counted_J(
     shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Counted:
-    """Return J of mounting angles, counted.
+    """Return J of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], counted at `sets` shifts of the net.
 
-    Args:
-        loaded: the task.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        seed: of the shifts.
-        points: approximate number of directions of each shift, divided among the regions by their weight; more if few
-            have a weight. For the paper's grid: nodes, or start phases times nodes if it has fewer.
-        sets: number of shifts.
-        bearings_rad: bearings of the beams; all those of the lidar by default.
-        shadow: beams to omit because parts of the scanner block them.
-        lever: offset of the optical centre from the axis, in the rotation frame, as a share of the range.
+    Each shift has about `points` directions, divided among the regions by their weight; more if few have a weight. For
+    the paper's grid they are nodes, or start phases times nodes if it has fewer. `bearings_rad` replaces those of the
+    lidar.
 
     Raises:
         TaskError: hardly any drawn direction has a weight, or the objective is not one of `COUNTED`.

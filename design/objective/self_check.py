@@ -36,17 +36,11 @@ def require_counted(
     shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = NO_LEVER,
 ) -> None:
-    """Compare the score of a mount with a count.
+    """Compare the score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with a count of simulated beams.
 
-    For the objective `worst` a count gives a bound only, and objectives of installed packages have no formula for
-    counts: then J of `log` is compared, which uses the same beams, regions and lines.
-
-    Args:
-        loaded: the task, with the motion of the score.
-        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        result: the score, with the parts if `shadow` is given.
-        shadow: the beams that the parts block.
-        lever: offset of the optical centre from the axis, as in `design.objective.problem.Problem`.
+    `result` is the score without the beams that `shadow` blocks. For the objective `worst` a count gives a bound only,
+    and objectives of installed packages have no formula for counts: then J of `log` is compared, which uses the same
+    beams, regions and lines.
 
     Raises:
         NumericalError: they differ by more than their errors.

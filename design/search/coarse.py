@@ -148,15 +148,8 @@ def lowest_within(
 ) -> tuple[Lowest, Lowest, int]:
     """Return the lowest J of all mounts and of those that meet the constraints, and the number of exact planes.
 
-    Planes are made exact until no bound is within `margin` of the lowest J.
-
-    Args:
-        lowest_of: returns both for some planes about some axes.
-        make_exact: replaces the bound of some planes by exact values.
-        size: numbers of planes and axes.
-        batch_size: planes that are made exact at once.
-        margin: error of J.
-        progress: called every `REPORT` planes with the share of exact planes.
+    `lowest_of` returns both for some planes about some axes. `make_exact` replaces the bounds of a batch of planes by
+    exact values, until no bound is within `margin` of the lowest J. `size` are the numbers of planes and axes.
     """
     step = max(1, size[1] // SCOUTS)
     everything, scouts = slice(None), slice(None, None, step)

@@ -123,13 +123,7 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
 
 
 def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str:
-    """Return the message that limits on scan planes cause blind spots.
-
-    Args:
-        problem: the task as numbers.
-        limits: of the task.
-        angles_deg: the best mount without blind spots if there were no such limits.
-    """
+    """Return the message for scan-plane limits that blind all mounts; without them `angles_deg` would be best."""
     planes_rad = np.radians(angles_deg[None, 2:])
     gap_deg, cone_deg = float(line_gaps_deg(problem, planes_rad)[0]), float(blind_cones_deg(problem, planes_rad)[0])
     if limits.max_line_gap_deg is not None and gap_deg > limits.max_line_gap_deg:

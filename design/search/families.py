@@ -187,15 +187,10 @@ def _distinct(points: Float[ndarray, "n 3"]) -> int:
 
 
 def _candidate(J: Array, land: Landscape, plane: int, orientation: int, axis: int, every: int) -> Candidate:
-    """Return the group of all mounts of the grid that equal one entry of the landscape by symmetry.
+    """Return the group of all mounts of the grid that equal J[orientation, axis] of a landscape by symmetry.
 
-    Args:
-        J: of the plane class about all axes, shape (2, axes).
-        land: the landscape.
-        plane: plane class of the entry.
-        orientation: 1 if one of plane and axis is flipped, else 0.
-        axis: axis class of the entry.
-        every: number of different axes of the grid.
+    `J` is that of a plane class about all axes; `orientation` is 1 if one of plane and axis is flipped; `every` is the
+    number of different axes of the grid.
     """
     planes, axes = land.space.planes, land.space.axes
     same = np.abs(J - J[orientation, axis]) <= EQUAL

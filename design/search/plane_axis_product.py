@@ -59,12 +59,8 @@ def lowest(
 ) -> tuple[Lowest, Lowest]:
     """Return the lowest J of all mounts of the grid, and of those that meet constraints (inf if there are none).
 
-    Args:
-        objective: joins the moments.
-        orientations: computes each moment.
-        has_plane: whether the grid has a plane class not flipped, and flipped, (2, planes).
-        has_axis: the same for axes, (2, axes).
-        constraints: of the mounts.
+    `orientations` compute the moments; `has_plane` (2, planes) and `has_axis` (2, axes) state whether the grid has a
+    class not flipped, and flipped.
     """
     closed_axis, closed_plane = (np.where(has, 0, np.inf).astype(np.float32, "C") for has in (has_axis, has_plane))
     plain, feasible = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)

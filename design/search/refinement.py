@@ -82,15 +82,9 @@ class Descent:
 def descended(space: SearchSpace, starts: list[tuple[Setting, bool]], most: int, progress: Progress) -> list[Descent]:
     """Return mounts refined by at most `most` simplex runs each, the lowest J first.
 
-    In a valley that is long and narrower than the grid a simplex ends far from the minimum, and another one with
-    rotated sides continues. A run is expected to gain as much as the last one; only those that could give the best
-    result continue.
-
-    Args:
-        space: the mounts.
-        starts: angles [deg], and whether J does not depend on the axis.
-        most: runs.
-        progress: progress callback.
+    `starts` are angles [deg], and whether J does not depend on the axis. In a valley that is long and narrower than the
+    grid a simplex ends far from the minimum, and another one with rotated sides continues. A run is expected to gain as
+    much as the last one; only those that could give the best result continue.
     """
     descents = [Descent(k, any_axis, angles_deg) for k, (angles_deg, any_axis) in enumerate(starts)]
     for number in range(most):
@@ -187,12 +181,8 @@ def lowest_by_simplex(
 ) -> tuple[Float[ndarray, " n"], float]:
     """Return the lowest corner of a simplex that reflects, expands and contracts (Nelder and Mead 1965), and its value.
 
-    Args:
-        value: function to minimise; inf for rejected points.
-        corners: the first simplex, one corner more than coordinates.
-        values: of its corners.
-        bounds: of each coordinate, to which points are clipped.
-        run: when it ends; the values of the first simplex count.
+    `value` is inf for rejected points, and points are clipped to `bounds`. The values of the first simplex, with one
+    corner more than coordinates, count as values of the run.
     """
     corners, values = corners.copy(), values.copy()
     left = run.values * corners.shape[1] - len(values)

@@ -111,14 +111,7 @@ def choose_with_parts(
 ) -> Chosen:
     """Return the family that is best with its parts; with `prefer = "simple"` the first one that can be built.
 
-    Args:
-        problem: of the task.
-        families: candidates.
-        ranges: of the angles.
-        limits: of the task.
-        workshop: makes the parts.
-        progress: progress callback.
-        failed: settings [deg] whose parts failed their checks, and which one: they are not chosen.
+    `failed` maps angles [deg] of mounts whose parts failed a check to its message: they are not chosen.
 
     Raises:
         BuildError: none can be built within the limits of the task.

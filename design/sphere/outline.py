@@ -48,13 +48,7 @@ def _cosines(points: Float[ndarray, "n 3"], axes: Float[ndarray, "axes 3"]) -> F
 
 @dataclass(frozen=True, slots=True)
 class _Arcs:
-    """The points of an edge circle `x . m = c` at which weight begins.
-
-    Attributes:
-        frame: rows e1, e2, m.
-        offset: c.
-        azimuth_rad: azimuths of the points about m, increasing.
-    """
+    """The points of an edge circle `x . m = c` (offset) at which weight begins: increasing azimuths in (e1, e2, m)."""
 
     frame: Float[ndarray, "3 3"]
     offset: float

@@ -62,11 +62,8 @@ class PolarRule:
 def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"], nodes: int) -> PolarRule:
     """Return the midpoint rule on each segment, with denser nodes at its ends, where the integrand has square roots.
 
-    Args:
-        field: the weights.
-        axis: unit vector.
-        breaks_rad: further breaks of the integrand.
-        nodes: approximate number of all nodes; the rule has none if no direction has a weight.
+    `breaks_rad` are further breaks of the integrand. The rule has about `nodes` nodes, or none if no direction has a
+    weight.
 
     Raises:
         NumericalError: the sum of the weights is not the integral of the weight.

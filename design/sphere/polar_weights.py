@@ -22,13 +22,9 @@ MISSED = 0.05  # largest relative error of the sum over circles
 def weights_over_polar(
     field: Field, axes: Float[ndarray, "axes 3"], nodes: int, grid_step_deg: float | None
 ) -> Float[ndarray, "axes nodes"]:
-    """Return the share of the weight near each polar angle about each axis; rows sum to 1.
+    """Return the share of the weight near each of `nodes` equally spaced polar angles about each axis; rows sum to 1.
 
-    Args:
-        field: the weights.
-        axes: unit vectors.
-        nodes: number of equally spaced polar angles from 0 to pi.
-        grid_step_deg: of the paper's grid, if only its directions have weight.
+    With `grid_step_deg` only the directions of the paper's grid have weight.
 
     Raises:
         TaskError: no direction has a weight.

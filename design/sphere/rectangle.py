@@ -21,13 +21,7 @@ STRIPS = 2048  # of the sum of the solid angle: an even number
 
 @dataclass(frozen=True, slots=True)
 class SeenRectangle:
-    """The frame of a rectangle and its bounds there.
-
-    Attributes:
-        frame: rows e1, e2, n, shape (3, 3).
-        x: lower and upper bound along e1, at unit distance of the plane.
-        y: the same along e2.
-    """
+    """A rectangle: rows e1, e2, n of its frame, and its bounds along e1 and e2 at unit distance of the plane."""
 
     frame: Float[ndarray, "3 3"]
     x: tuple[float, float]
@@ -36,9 +30,7 @@ class SeenRectangle:
     def spread(self, along: Float[ndarray, " n"], across: Float[ndarray, " n"]) -> tuple[Float[ndarray, "n 3"], float]:
         """Return a direction for each pair of area-preserving coordinates 0 .. 1, and the solid angle of the rectangle.
 
-        Args:
-            along: share of the solid angle below each direction along e1.
-            across: share of its strip below each direction along e2.
+        `along` is the share of the solid angle below a direction along e1, `across` the share of its strip along e2.
         """
         from scipy.integrate import cumulative_simpson  # a heavy import that few tasks need
 

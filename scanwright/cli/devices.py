@@ -179,7 +179,7 @@ def scan(
     with viewer as watch, closing(watch):
         try:
             recorded = _acquired(plan, progress, watch, out, servo_id)
-            watch.ended(finished(recorded))  # the devices stand, whatever becomes of the cloud
+            watch.ended(finished(recorded))  # the devices are at rest, even if assembling fails
             progress(f"recorded {recorded.duration_s:.1f} s, assembling")
             print_lines(recorded.lines())
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
@@ -201,7 +201,7 @@ def _devices_of(plan: ScanPlan) -> Devices:
 
 
 def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
-    """Record, after the person has agreed to what the servo needs; Ctrl-C ends the command."""
+    """Record a scan, after the user has agreed to changes of servo settings; Ctrl-C ends the command."""
     from scanwright.firmware_io.scan.acquire import acquire
 
     try:
@@ -213,7 +213,7 @@ def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Pat
 
 
 def _end(watch: Viewer, end: ScanEnd, recording: Path) -> None:
-    """Say how a scan ended early, in the same words on standard error and to the viewer."""
+    """Print how a scan ended early on standard error, and pass it to the viewer."""
     recorded_in = (f"what was recorded is in {recording}",) if recording.exists() else ()
     end = replace(end, lines=(*end.lines, *recorded_in))
     for line in end.lines:

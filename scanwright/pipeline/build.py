@@ -47,18 +47,18 @@ KERNEL = (
     "scanwright.cad.files.workshop_files",
     "scanwright.report.page",
 )
-"""What brings the CAD kernel and all that works on parts with it: loaded while the search runs, in no third place."""
+"""Modules that import the CAD kernel; worker processes import them while the search runs."""
 
 MOST_FAILED = 3
 """Other mounts that are made if the parts of the best one fail a check."""
 
 DRAWN = 2
-"""Reference mounts beside the scanner in density.png, the best one first: its ratio is drawn."""
+"""Reference mounts in density.png, the best one first, for which the ratio is drawn."""
 
-DECK_MM = 10.0  # between the deck of the robot and that of the scanner: more moves the robot in the masks visibly
+DECK_MM = 10.0  # difference between the height of the task and that of the scanner that is reported
 
 BEHIND = {"search": 0.0, "shadow": 0.3, "parts": 0.51, "pictures": 0.51, "files": 0.73, "report": 0.9}
-"""Share of a build's time that has gone when a stage begins: `ground_ahead` on two cores."""
+"""Share of the time of a build before each stage: `ground_ahead` on two cores."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +66,13 @@ class Made:
     """The results of one build.
 
     Attributes:
-        optimum: the search.
-        chosen: the setting that is best with its parts: the one that was built.
-        as_built: what it sees, without the beams that its parts block.
-        findings: what a person should know before the parts are made.
-        cloud: error, gaps and points to expect.
-        to_make: how many parts to print and to have machined, and the time to print.
-        mounted: where the optical centre is with respect to the deck.
+        optimum: result of the search.
+        chosen: the best mount with its parts, which was built.
+        as_built: its view without the beams that its parts block.
+        findings: to read before the parts are made.
+        cloud: expected error, gaps and points.
+        to_make: numbers of parts to print and to machine, and the time to print.
+        mounted: position of the optical centre relative to the deck.
     """
 
     optimum: Optimum
@@ -89,11 +89,11 @@ class Build:
     """A build folder.
 
     Attributes:
-        folder: where it is.
+        folder: the folder.
         files: its files, relative to the folder.
-        warnings: what the task can do, but not as well as its author may think.
+        warnings: limits of the task that can surprise.
         checks: of its parts, as in `checks.json`.
-        made: what was done; None if the folder was current and there was nothing to do.
+        made: results of the build; None if the folder was current.
     """
 
     folder: Path
@@ -104,7 +104,7 @@ class Build:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The checks that failed; the parts are safe to make only if there are none."""
+        """The failed checks; make the parts only if there are none."""
         return errors_in(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
@@ -127,7 +127,7 @@ class Build:
 
 @dataclass(frozen=True, slots=True)
 class PartsMade:
-    """The parts: reports, findings, omissions, and the solids for processes that have the kernel."""
+    """The parts: reports, findings, omissions, and the solids for processes with the CAD kernel."""
 
     parts: tuple[PartReport, ...]
     findings: tuple[Finding, ...]
@@ -146,18 +146,13 @@ def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_ful
 
 
 def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
-    """Build the folder of a task, unless it is up to date. Failed checks do not raise: see `Build.failed`.
-
-    Args:
-        loaded: the task.
-        target: the folder, `out/<task>`.
-        progress: progress callback.
+    """Build the folder of a task, `out/<task>`, unless it is up to date; failed checks are in `Build.failed`.
 
     Raises:
         InstallError: the CAD kernel is not installed.
-        TaskError: no direction has a weight, or no setting keeps the limits.
-        BuildError: no setting can be built, or the folder cannot be written.
-        KeyboardInterrupt: with a note of what became of the folder.
+        TaskError: no direction has a weight, or no mount meets the limits.
+        BuildError: no mount can be built, or the folder cannot be written.
+        KeyboardInterrupt: with a note on the state of the folder.
     """
     require_kernel("build")
     try:
@@ -192,7 +187,7 @@ def setting_built(optimum: Optimum) -> Chosen:
         InstallError: the CAD kernel is not installed.
         BuildError: no setting can be built.
     """
-    require_kernel("what parts hide")
+    require_kernel("a mount with its parts")
     from scanwright.cad.assembly.shadow import PartsWorkshop
 
     return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), {}, no_progress)
@@ -240,7 +235,7 @@ def _that_passes(
         _at(progress, "shadow")(f"a check failed, trying another mount: {errors[0].message}")
         try:
             attempt = begin(_chosen_and_made, optimum, task_sha256, failed, progress)()
-        except BuildError:  # there is no other one
+        except BuildError:  # no other mount can be built
             break
         parts, errors = _written_and_checked(begin, attempt, work, progress)
     if errors and attempt is not first:
@@ -314,16 +309,16 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     from scanwright.design.evaluation.expected_cloud import expected_cloud
     from scanwright.design.search.optimum import find_optimum
 
-    with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this one never loads the kernel
+    with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this process does not load the kernel
         optimum = find_optimum(requested, _at(progress, "search"))
-        # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
+        # with `period_s = "shortest"` the search has changed the motion, but `requested` is written for a rebuild
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
         from scanwright.report.parts_list import read_parts
 
         made = begin(_chosen_and_made, optimum, requested.sha256(), {}, progress)
-        begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
+        begin(import_module, "trimesh")  # for the report, in the idle process
         records.write_task(work, requested)
         records.write_search(work, result)
         chosen, scanner, parts = _that_passes(begin, optimum, requested.sha256(), made(), work, progress)
@@ -355,7 +350,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
 
 
 def _mounted(angles: AngleSet, loaded: LoadedTask) -> str:
-    """Return where the optical centre is, in words, and by how much the height of the task must change for it."""
+    """Return the position of the optical centre as text, and the change of height that the task needs for it."""
     x_mm, _, z_mm = angles.t_world_rot_mm
     height = "above the deck" if z_mm > 0 else "below the deck that the scanner hangs from"
     along = f", {abs(x_mm):.0f} mm {'ahead of' if x_mm > 0 else 'behind'} its holes" if abs(x_mm) >= 0.5 else ""

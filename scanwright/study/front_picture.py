@@ -9,20 +9,13 @@ from typing import Any
 
 from scanwright.study.front import COLUMNS
 
-DPI = 110  # readable at its own size on a screen
-MOST = 20_000  # rows that a picture shows; more are a blot
-NAMED = 12  # members of a front that get their name
+DPI = 110  # readable on a screen at 100 %
+MOST = 20_000  # rows that a picture shows
+NAMED = 12  # members of a front that are labelled
 
 
 def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -> int:
-    """Draw the first column of the front against each other one; returns the number of rows not drawn.
-
-    Args:
-        path: PNG to write; an SVG of the same name is written too.
-        table: CSV to read.
-        title: above the picture.
-        front: columns of the front.
-    """
+    """Draw the first column of the front against each other one from a CSV; return the number of rows not drawn."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
