@@ -122,10 +122,10 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
         here = [trial for trial in trials if trial.choice == choice]
         floor = min((t.error for t in here if t.error > 0), default=1e-16) / 3
         for i, method in enumerate(dict.fromkeys(trial.method for trial in here)):
-            mine = [trial for trial in here if trial.method == method]
-            x, y = [t.median_s for t in mine], [max(t.error, floor) for t in mine]
+            of_method = [trial for trial in here if trial.method == method]
+            x, y = [t.median_s for t in of_method], [max(t.error, floor) for t in of_method]
             axis.plot(x, y, marker=MARKS[i % 8], color=GREYS[i % 8], label=method, linewidth=1.2, markersize=6)
-            for trial, at in zip(mine, zip(x, y, strict=True), strict=True):
+            for trial, at in zip(of_method, zip(x, y, strict=True), strict=True):
                 axis.annotate(trial.setting, at, textcoords="offset points", xytext=(5, 4), fontsize=6.5)
         for trial in here:
             if trial.chosen:

@@ -31,7 +31,7 @@ class Hole(Record):
         axis: out of the device, towards that part: a face, or a vector.
         kind: tapped, self_tapping, through (the nut, or the head, is on the far side), or one that carries no load.
         size: of the screw.
-        depth_mm: of the thread, or of what a screw passes in a through hole.
+        depth_mm: of the thread, or of the material around a through hole.
         head_space_mm: of a through hole: free height for a nut or a head on the far side.
     """
 
@@ -45,14 +45,14 @@ class Hole(Record):
 
 @dataclass(frozen=True, slots=True)
 class HolePattern:
-    """Equal holes in one plane, which hold one part.
+    """Equal holes in one plane, for one part.
 
     Attributes:
         screw: size of the screws.
         kind: of the holes.
         places: x and y of each.
         z_mm: of the plane.
-        depth_mm: of the thread, or of what a screw passes.
+        depth_mm: of the thread, or of the material around a through hole.
     """
 
     screw: Size

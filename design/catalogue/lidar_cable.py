@@ -42,7 +42,7 @@ class Connector:
     """A plug in its socket, ready for use.
 
     Attributes:
-        words: what to buy for the other side of the plug.
+        words: name of the part to buy.
         size_mm: of the mated pair: along the cable, across it, and height.
         mass_g: of the mated pair.
     """

@@ -17,7 +17,7 @@ UsbId = Annotated[str, Field(pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")]
 
 
 def absent(value: object) -> bool:
-    """Return whether a field that shapes parts is left out of the record, so that others keep their digest."""
+    """Return whether to omit a new field from the dump, so that products without it keep their digest."""
     return value is None
 
 
@@ -28,7 +28,7 @@ def no_shape(description: str = "", **bounds: float) -> Any:
 
 
 class Provenance(Record):
-    """Where a value comes from. `verified` means: two independent sources, or a drawing of the maker."""
+    """Source of a value. `verified` means: two independent sources, or a drawing of the maker."""
 
     source: str
     verified: bool
@@ -55,7 +55,7 @@ class Product(Record):
         return [field for field, origin in self._provenance.items() if not origin.verified]
 
     def caution(self, field: str) -> str:
-        """Return what a message adds behind an unverified value; empty if it is verified."""
+        """Return the end of a message on an unverified value; empty if it is verified."""
         origin = self._provenance.get(field)
         return "" if origin is None or origin.verified else " (not verified: measure yours)"
 

@@ -15,7 +15,7 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Ints
 from scanwright.design.sphere.shell_sort import sort_indices
 
-TIE = 1e-9  # share of a gap: counts that hold over less are rounding
+TIE = 1e-9  # share of a gap: counts over shorter intervals are rounding errors
 NO_LEVEL = 1 << 62  # above every count
 
 

@@ -48,7 +48,7 @@ def free_lines(blocked: Bool[ndarray, "beams angles"], lines: ScanLines, sweep: 
     steps = blocked.shape[1]
     step = 2 * np.pi / steps
     low, high = (0.0, 2 * np.pi) if sweep is None else np.radians(sweep.motion.limits_deg)
-    first = int(np.floor(low / step + 0.5))  # index of the step that holds the lowest angle
+    first = int(np.floor(low / step + 0.5))  # index of the step of the lowest angle
     last = int(np.ceil(high / step + 0.5)) if high > low else first + 1
     edges = np.clip((np.arange(first, last + 1) - 0.5) * step, low, high)
     if sweep is None:

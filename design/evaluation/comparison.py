@@ -135,10 +135,8 @@ def compare(
 
 def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRow:
     """Return the row of a multibeam over a number of turns."""
-    if np.ptp(product.azimuth_deg) == 360:
-        J, J_error, blind_fraction, blind_weight = _zonal(problem, product, turns)
-    else:
-        J, J_error, blind_fraction, blind_weight = sampled(problem, product, turns)
+    figures = _zonal if np.ptp(product.azimuth_deg) == 360 else sampled
+    J, J_error, blind_fraction, blind_weight = figures(problem, product, turns)
     return ComparisonRow(
         name=product.name,
         setting="upright",

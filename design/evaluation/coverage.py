@@ -44,11 +44,11 @@ def hidden_lines(loaded: LoadedTask) -> list[str]:
 def hidden_share(loaded: LoadedTask, region: Region) -> float:
     """Return the share of the weight of one region of the task that the masks hide."""
     unmasked = replace(loaded, task=loaded.task.model_copy(update={"mask": ()}))
-    seen, whole = (
+    seen, unhidden = (
         total_weight(field_of(each, lambda other: float(other is region), background=0.0))
         for each in (loaded, unmasked)
     )
-    return 1 - seen / whole if whole > 0 else 0.0
+    return 1 - seen / unhidden if unhidden > 0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)

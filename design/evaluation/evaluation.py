@@ -110,7 +110,7 @@ class Evaluation:
         off = abs(self.score.J - self.ball.J)
         return bool(off <= self.score.J_error + self.ball.J_error) or not np.isfinite(off)
 
-    def _doubts(self) -> list[str]:
+    def _disagreement(self) -> list[str]:
         if self.agree:
             return []
         off = abs(self.score.J - self.ball.J) / (self.score.J_error + self.ball.J_error)
@@ -147,7 +147,7 @@ class Evaluation:
         J, ball, seen, gap = self.score, self.ball, self.coverage, self.gaps
         ball_deg = np.degrees(self.problem.ball_rad)
         lines = [
-            *self._doubts(),
+            *self._disagreement(),
             *([] if self.as_built is None else self.as_built.lines()),
             *self.cloud.lines(),
             "without parts:",

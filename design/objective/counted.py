@@ -336,13 +336,15 @@ def _counts(
             start = p - azimuth[b] - half
             mean[i] += count * half / np.pi
             for k in range(turned.shape[1]):
-                mine = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
+                phase_lines = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
                 low = (start - turned[i, k]) % turn
                 high = low + 2 * half
-                before = _before(mine, low, step), _before(mine, high, step)
-                counts[i, k] += _free(mine, *before, turned[i, k], blocked[b])
+                before = _before(phase_lines, low, step), _before(phase_lines, high, step)
+                counts[i, k] += _free(phase_lines, *before, turned[i, k], blocked[b])
                 if high > turn:
-                    counts[i, k] += _free(mine, 0, _before(mine, high - turn, step), turned[i, k], blocked[b])
+                    counts[i, k] += _free(
+                        phase_lines, 0, _before(phase_lines, high - turn, step), turned[i, k], blocked[b]
+                    )
     return counts, mean
 
 

@@ -102,8 +102,8 @@ def kl(field: Field, loaded: LoadedTask) -> Objective:
     support = _mapped(field, lambda w: (w > 0).astype(float))
     least = _least(field)  # as the unit of weights it keeps all logarithms positive
     logarithms = _mapped(field, lambda w: w * (np.log(np.where(w > 0, w, least)) - np.log(least)))
-    logs, full, held = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
-    shift = logs / full + np.log(least) - np.log(full / held)
+    logs, full, solid_angle = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
+    shift = logs / full + np.log(least) - np.log(full / solid_angle)
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
     error = 0.0 if grid_step_deg else RELATIVE_ERROR * (2 * abs(logs / full) + 2)
     return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift, error)

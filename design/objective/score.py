@@ -32,7 +32,7 @@ ROUNDING = 1e-6  # smallest stated error
 # nearly the same phase, and for closer nodes (`benchmarks.design.claims stated`)
 ERROR_SHARE, FAR = (0.7, 0.2), 0.6
 BENDS = 1.6  # weight of bends relative to differences of rules, which are 3 to 9 times the error of the finer rule
-MISSED_AGAIN = 3.0  # error of a highest value, in units of the error of a third of the nodes
+THIRD_FACTOR = 3.0  # error of a highest value, in units of the error of a third of the nodes
 RANGE = 16  # nodes of the first ranges of the search for the lowest count
 MOST_RANGES, SLIVER_RAD = 2048, 1e-6
 SETS = 8  # of directions for a sweep
@@ -294,7 +294,7 @@ def _highest(
     thirds = [highest for highest in (g[i::3].max(initial=-np.inf) for i in range(3)) if np.isfinite(highest)]
     return _MomentValue(
         value=value,
-        error=max(MISSED_AGAIN * (value - float(np.mean(thirds))), _one_less(moment, least)),
+        error=max(THIRD_FACTOR * (value - float(np.mean(thirds))), _one_less(moment, least)),
         lower=float(lower[fine > 0].max()),
         least=least,
         blind=blind_share(fine, blind),

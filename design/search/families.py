@@ -100,8 +100,8 @@ def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
     pieces = [slice(i, i + PIECE) for i in range(0, len(planes.first), PIECE)]
     J = np.concatenate([_feasible_J(land, piece) for piece in pieces])
     every = _distinct(axes.points)
-    left = J.reshape(len(J), -1).copy()
-    low = left.min(axis=1)  # of each plane
+    remaining = J.reshape(len(J), -1).copy()
+    low = remaining.min(axis=1)  # of each plane
     q = planes.representatives
     cosines = axes.representatives @ axes.representatives.T
     next_to, opposite = cosines >= np.cos(NEAR_RAD), cosines <= -np.cos(NEAR_RAD)
@@ -113,7 +113,7 @@ def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
         if not np.isfinite(lowest):
             break
         c = int((low <= lowest + EQUAL).argmax())
-        orientation, axis = divmod(int((left[c] <= lowest + EQUAL).argmax()), J.shape[2])
+        orientation, axis = divmod(int((remaining[c] <= lowest + EQUAL).argmax()), J.shape[2])
         same = J[c] <= lowest + EQUAL
         around = np.stack([side[same[0]].any(axis=0) for side in (next_to, opposite)])
         around |= np.stack([side[same[1]].any(axis=0) for side in (opposite, next_to)])
@@ -122,12 +122,12 @@ def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
             for mirror in land.space.mirrors
             for sign, there in ((1, around), (-1, around[::-1]))
         ]
-        beaten = any((J.reshape(left.shape)[block] < lowest - EQUAL).any() for block in near)
+        beaten = any((J.reshape(remaining.shape)[block] < lowest - EQUAL).any() for block in near)
         candidate = _candidate(J[c], land, c, orientation, axis, every)
         exact = None if beaten else space.score(candidate.angles_deg)
         if not beaten and exact is None:
-            J[c][same] = left[c][same.ravel()] = np.inf
-            low[c] = left[c].min()
+            J[c][same] = remaining[c][same.ravel()] = np.inf
+            low[c] = remaining[c].min()
             rejected += 1
             continue
         tries += 1
@@ -135,11 +135,11 @@ def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
         changed = low <= lowest + (EQUAL if beaten else VALLEY_J)
         if not beaten:
             block = np.ix_(changed, (around | around[::-1]).ravel())
-            left[block] = np.where(left[block] <= lowest + VALLEY_J, np.inf, left[block])
+            remaining[block] = np.where(remaining[block] <= lowest + VALLEY_J, np.inf, remaining[block])
         for block in near:
-            left[block] = np.inf
+            remaining[block] = np.inf
             changed[block[0]] = True
-        low[changed] = left[changed].min(axis=1)
+        low[changed] = remaining[changed].min(axis=1)
     return minima + slopes
 
 
@@ -290,9 +290,5 @@ def _by_the_worst(space: SearchSpace, families: list[Family]) -> tuple[Family, .
 
 def _family(angles_deg: Array, exact: Score, candidate: Candidate) -> Family:
     word = "any axis" if candidate.every_axis else f"{candidate.axes} axes" if candidate.axes > 1 else ""
-    return Family(_four(angles_deg), exact, candidate.members, word)
-
-
-def _four(angles_deg: Array) -> tuple[float, float, float, float]:
-    alpha_rot, beta_rot, alpha_laser, beta_laser = (float(angle) for angle in angles_deg)
-    return alpha_rot, beta_rot, alpha_laser, beta_laser
+    a, b, c, d = (float(angle) for angle in angles_deg)
+    return Family((a, b, c, d), exact, candidate.members, word)

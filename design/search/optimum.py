@@ -27,7 +27,7 @@ from scanwright.design.search.shortest_period import fastest
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import LoadedTask
 
-SQUARE_DEGREES = 41_253  # on the whole sphere
+SQUARE_DEGREES = 41_253  # on the sphere
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class Optimum:
     """The result of a task.
 
     Attributes:
-        asked: the task as it was read.
+        requested: the task as it was read.
         loaded: the same with the result of a search for the shortest period.
         problem: the same as numbers.
         search: result of the search.
     """
 
-    asked: LoadedTask
+    requested: LoadedTask
     loaded: LoadedTask
     problem: Problem
     search: SearchResult
@@ -61,7 +61,7 @@ class Optimum:
     @property
     def long_title(self) -> str:
         """`title`, and the origin of the duration."""
-        shortest = isinstance(self.asked.task.motion, Shortest)
+        shortest = isinstance(self.requested.task.motion, Shortest)
         return f"{self.title}, the shortest found that keeps the limits" if shortest else self.title
 
     def angle_set(self, rank: int = 0) -> AngleSet:

@@ -25,12 +25,7 @@ def breaking_planes(field: Field) -> Float[ndarray, "edges 4"]:
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """Points at which edges of a region cross.
-
-    Attributes:
-        points: unit vectors, shape (n, 3).
-        weights: of the directions around each.
-    """
+    """Points at which edges of a region cross, and the weights of directions around each."""
 
     points: Float[ndarray, "n 3"]
     weights: Float[ndarray, "n probes"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -171,8 +170,8 @@ def scan(
     )
     progress = ConsoleProgress()
     result = ScanResult(_devices_of(plan), plan.angles_path, plan.duration_s)
-    print_lines = _print_nothing if as_json else show
-    print_lines(plan.lines())
+    if not as_json:
+        show(plan.lines())
     if dry_run:
         show_result(tuple, result, as_json)
         return
@@ -181,17 +180,14 @@ def scan(
             recorded = _acquired(plan, progress, watch, out, servo_id)
             watch.ended(finished(recorded))  # the devices are at rest, even if assembling fails
             progress(f"recorded {recorded.duration_s:.1f} s, assembling")
-            print_lines(recorded.lines())
+            if not as_json:
+                show(recorded.lines())
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
             watch.ended(finished(recorded, cloud.lines()))
             show_result(cloud.lines, replace(result, recording=recorded, cloud=cloud), as_json)
         except ScanwrightError as error:
             _end(watch, failed(error), plan.recording)
             raise typer.Exit(exit_code(error)) from None
-
-
-def _print_nothing(_lines: Iterable[str]) -> None:
-    """Replace `show` if one JSON object is printed at the end."""
 
 
 def _devices_of(plan: ScanPlan) -> Devices:

@@ -69,8 +69,8 @@ def new(
         products.get(lidar, Lidar)
     if servo is not None:
         products.get(servo, Servo)
-    asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
-    if asks:
+    interactive = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
+    if interactive:
         lidar, servo, height_m, robot, ahead_m, see, scan_s = _prompted(
             products, lidar, servo, height_m, robot, ahead_m, see, scan_s
         )

@@ -156,7 +156,7 @@ def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
     """
     require_kernel("build")
     try:
-        made = None if is_current(target, loaded) else _made_again(loaded, target, progress)
+        made = None if is_current(target, loaded) else _make_and_log(loaded, target, progress)
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
@@ -204,7 +204,7 @@ def _chosen(optimum: Optimum, workshop: Workshop, failed: Failed, progress: Prog
     return chosen
 
 
-def _chosen_and_made(
+def _choose_and_make(
     optimum: Optimum, task_sha256: str, failed: Failed, progress: Progress
 ) -> tuple[Chosen, Scanner, Packed[Assembly]]:
     """Choose a mount that is not among those that failed, and make the scanner and its parts."""
@@ -224,27 +224,27 @@ def _chosen_and_made(
     return chosen, scanner, Packed.of(assembly)
 
 
-def _that_passes(
+def _make_passing(
     begin: Begin, optimum: Optimum, task_sha256: str, first: Attempt, work: Path, progress: Progress
 ) -> tuple[Chosen, Scanner, PartsMade]:
     """Write parts and checks of the first mount, or of the next one if a check fails; if all fail, of the first."""
     attempt, failed = first, dict[tuple[float, ...], str]()
-    parts, errors = _written_and_checked(begin, attempt, work, progress)
+    parts, errors = _write_and_check(begin, attempt, work, progress)
     while errors and len(failed) < MOST_FAILED:
         failed[attempt[0].family.angles_deg] = errors[0].message
         _at(progress, "shadow")(f"a check failed, trying another mount: {errors[0].message}")
         try:
-            attempt = begin(_chosen_and_made, optimum, task_sha256, failed, progress)()
+            attempt = begin(_choose_and_make, optimum, task_sha256, failed, progress)()
         except BuildError:  # no other mount can be built
             break
-        parts, errors = _written_and_checked(begin, attempt, work, progress)
+        parts, errors = _write_and_check(begin, attempt, work, progress)
     if errors and attempt is not first:
         attempt = first
-        parts, errors = _written_and_checked(begin, attempt, work, progress)
+        parts, errors = _write_and_check(begin, attempt, work, progress)
     return attempt[0], attempt[1], parts
 
 
-def _written_and_checked(
+def _write_and_check(
     begin: Begin, attempt: Attempt, work: Path, progress: Progress
 ) -> tuple[PartsMade, tuple[Finding, ...]]:
     """Write parts and checks of a mount, in place of those of another one; returns the checks that failed."""
@@ -295,7 +295,7 @@ def _at(progress: Progress, stage: str) -> Progress:
     return lambda step, _fraction=None, /: progress(step, share)
 
 
-def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
+def _make_and_log(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
     """Build a folder that is not up to date, and log the edits that are lost."""
     edits = changes(target)
     if edits:
@@ -317,11 +317,11 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         from scanwright.pipeline import records
         from scanwright.report.parts_list import read_parts
 
-        made = begin(_chosen_and_made, optimum, requested.sha256(), {}, progress)
+        made = begin(_choose_and_make, optimum, requested.sha256(), {}, progress)
         begin(import_module, "trimesh")  # for the report, in the idle process
         records.write_task(work, requested)
         records.write_search(work, result)
-        chosen, scanner, parts = _that_passes(begin, optimum, requested.sha256(), made(), work, progress)
+        chosen, scanner, parts = _make_passing(begin, optimum, requested.sha256(), made(), work, progress)
         best, angles = chosen.family, scanner.angles
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         exported, drawn = (

@@ -100,7 +100,7 @@ def _alone(target: Path) -> Iterator[None]:
     """Lock a build folder; the lock ends with the process.
 
     Raises:
-        BuildError: another process holds it.
+        BuildError: another process has locked it.
     """
     path = target.with_name(f".{target.name}.lock")
     with _locked(path, target) as lock:
@@ -118,7 +118,7 @@ def _locked(path: Path, target: Path) -> TextIO:
     """Open the lock file and lock it; if the system has no `flock`, the file alone is the lock.
 
     Raises:
-        BuildError: another process holds it.
+        BuildError: another process has locked it.
     """
     busy = f"{target}: another build of this folder is at work: wait for it"
     with _disk_errors(target):

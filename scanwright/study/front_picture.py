@@ -22,7 +22,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
     from scanwright.design.files.picture_files import save_picture
 
     by_task: dict[str, list[dict[str, str]]] = {}
-    shown = left = 0
+    shown = omitted = 0
     with table.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             rows = by_task.setdefault(row["task"], [])
@@ -31,7 +31,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
                 if shown <= MOST or row["status"] == "front":
                     rows.append(row)
                 else:
-                    left += 1
+                    omitted += 1
     others = front[1:] or ("period_s",)
     figure = Figure(figsize=(5.2 * len(others), 3.9 * max(1, len(by_task))), layout="constrained", dpi=DPI)
     FigureCanvasAgg(figure)
@@ -42,7 +42,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
             ax.set_title(task, fontsize=10)
     figure.suptitle(title, fontsize=11)
     save_picture(figure, path, DPI)
-    return left
+    return omitted
 
 
 def _panel(ax: Any, rows: list[dict[str, str]], across: str, up: str) -> None:

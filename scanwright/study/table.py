@@ -58,14 +58,14 @@ def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
     statuses = write_tables(folder, noted())
     candidates = f"{statuses.total():,} candidates"
     title = f"{study.name}: {statuses['front']:,} of {candidates} on the front of their task"
-    left = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
+    omitted = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
     shares = [f"{statuses[status]:,} {status} ({means})" for status, means in STATUSES.items() if statuses[status]]
     lines = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
     lines += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:
         lines.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
-    if left:
-        lines.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
+    if omitted:
+        lines.append(f"front.png leaves out {omitted:,} rows that are not on a front: too many to see")
     return lines
 
 

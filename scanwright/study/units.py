@@ -66,11 +66,9 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Crew:
-    """An executor and its width.
+    """An executor, and a function that returns the number of units that can run now.
 
-    Attributes:
-        executor: runs the units.
-        width: returns the number of units that can run now; raises BuildError if there will be no worker.
+    The function raises BuildError if there will be no worker.
     """
 
     executor: Executor

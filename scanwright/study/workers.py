@@ -24,7 +24,7 @@ T = TypeVar("T")
 ADDRESS = re.compile(r"(tcp|tls|wss?)://[^\s/]+:\d{1,5}")
 CONNECT_S = 10.0  # for a scheduler to answer
 ALONE_S = 60.0  # without any worker, before the run ends
-LOOK_S = 5.0  # between two counts of the workers
+COUNT_S = 5.0  # between two counts of the workers
 
 
 def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractContextManager[Crew]:
@@ -35,7 +35,7 @@ def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractCont
         TaskError: the scheduler does not answer, or its address is invalid.
         BuildError: during the work: the scheduler has stopped, or there was no worker for a minute.
     """
-    return _here(processes or cores()) if scheduler is None else _at_scheduler(scheduler)
+    return _local_crew(processes or cores()) if scheduler is None else _scheduler_crew(scheduler)
 
 
 class SingleProcesses(Executor):
@@ -66,13 +66,13 @@ class SingleProcesses(Executor):
 
 
 @contextmanager
-def _here(processes: int) -> Iterator[Crew]:
+def _local_crew(processes: int) -> Iterator[Crew]:
     with one_thread_each(), SingleProcesses(processes) as executor:
         yield Crew(executor, lambda: processes)
 
 
 @contextmanager
-def _at_scheduler(address: str) -> Iterator[Crew]:
+def _scheduler_crew(address: str) -> Iterator[Crew]:
     require("cluster", "a scheduler needs Dask", "dask", "distributed")
     from distributed import Client
 
@@ -103,13 +103,13 @@ class _Threads:
 
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
-        self._looked = self._seen = time.monotonic()
+        self._counted = self._present = time.monotonic()
         self._number = self._now()
 
     def __call__(self) -> int:
-        if time.monotonic() - self._looked > (LOOK_S if self._number else 0.1):
+        if time.monotonic() - self._counted > (COUNT_S if self._number else 0.1):
             self._number = self._now()
-        if self._seen < self._looked - ALONE_S:
+        if self._present < self._counted - ALONE_S:
             raise BuildError(
                 f"no worker has been there for {ALONE_S:g} s: start `dask worker {self._address} --nthreads 1`, "
                 "and run the study again: it continues"
@@ -118,6 +118,6 @@ class _Threads:
 
     def _now(self) -> int:
         number = sum(self._client.nthreads().values())
-        self._looked = time.monotonic()
-        self._seen = self._looked if number else self._seen
+        self._counted = time.monotonic()
+        self._present = self._counted if number else self._present
         return number
