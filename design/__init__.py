@@ -1,1 +1,1 @@
-"""What the scanner is: task, catalogue, angle set, frames, beams, density, objective, search."""
+"""Design of the scanner: task, catalogue, angle set, frames, beams, density, objective, search."""

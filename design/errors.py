@@ -142,10 +142,7 @@ def made_by(path: Path) -> str:
 def require(extra: str, need: str, *modules: str) -> None:
     """Require packages to be installed, without importing them.
 
-    Args:
-        extra: the extra of the package that brings them, such as "clouds".
-        need: the beginning of the line, such as "studio needs a page server".
-        modules: their top-level names.
+    The message is `need`, such as "studio needs a page server", and the extra of the package that installs them.
 
     Raises:
         InstallError: one of them is not installed.

@@ -18,4 +18,4 @@ class Progress(Protocol):
 
 
 def no_progress(_step: str, _fraction: float | None = None, /) -> None:
-    """Report nothing: the default of functions that take a `Progress`."""
+    """Report nothing: the default of functions with a `Progress`."""

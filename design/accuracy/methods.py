@@ -16,7 +16,7 @@ from scipy.special import roots_legendre
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.density.ball_count import ball_count
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_at
-from scanwright.design.density.spin import ball_search, mean_count, zones
+from scanwright.design.density.spin import ball_search, mean_count, phase_statistics
 from scanwright.design.density.sweep import mean_count_swept
 from scanwright.design.errors import TaskError
 from scanwright.design.frames import R_world_rot
@@ -144,7 +144,7 @@ def _gathered(moment: Moment, g: Float[ndarray, " n"], weight: Float[ndarray, " 
 def _zonal(problem: Problem, angles_rad: Setting, t: Float[ndarray, " n"], moment: Moment) -> Float[ndarray, " n"]:
     """Return at polar angles the mean of g over the phases, or g of the lowest count."""
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles_rad[2], angles_rad[3]))
-    rings = zones(t, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
+    rings = phase_statistics(t, polar, azimuth, problem.lines, problem.ball_rad, moment.g)
     return moment.g(rings.least) if moment.gathered == "highest" else rings.mean_g
 
 

@@ -39,11 +39,7 @@ class Reference:
 
 
 def reference(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> Reference:
-    """Return the reference J of a setting; see the top of this file.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+    """Return the reference J of a setting; see the top of this file."""
     if is_smooth(problem):
         return smooth_reference(problem, angles_rad)
     drawn = counted_J(loaded, angles_rad, seed=0, points=DRAWN)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from pathlib import Path
 
 from scanwright.design.accuracy.search_trials import search_trials
@@ -18,20 +18,10 @@ from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.task import LoadedTask
 
 
-@dataclass(frozen=True, slots=True)
-class StressReport:
-    """Results of the stiff and extreme cases as lines, and whether all passed."""
-
-    lines: tuple[str, ...]
-    passed: bool
-
-
-def report_stress(loaded: LoadedTask, folder: Path, progress: Progress, more: Iterable[StressRow] = ()) -> StressReport:
-    """Run the stiff and extreme cases on a task, add the rows `more`, and write `stress.csv`.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+def report_stress(
+    loaded: LoadedTask, folder: Path, progress: Progress, more: Iterable[StressRow] = ()
+) -> tuple[list[str], bool]:
+    """Run the stiff cases on a task, add `more`, and write `stress.csv`; return lines, and whether all passed."""
     progress("stiff and extreme cases")
     loaded = as_turning(loaded)
     rows = [*stress_rows(loaded, problem_of(loaded)), *more]
@@ -45,7 +35,7 @@ def report_stress(loaded: LoadedTask, folder: Path, progress: Progress, more: It
         for row in rows
     ]
     end = f"{len(rows) - failed} of {len(rows)} passed; wrote {folder / 'stress.csv'}"
-    return StressReport((*lines, end), failed == 0)
+    return [*lines, end], failed == 0
 
 
 def report_precision(loaded: LoadedTask, folder: Path, progress: Progress) -> list[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from scanwright.design.accuracy.reference import smooth_pieces
 from scanwright.design.arrays import Array
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
-from scanwright.design.density.spin import mean_count, zones
+from scanwright.design.density.spin import mean_count, phase_statistics
 from scanwright.design.errors import TaskError
 from scanwright.design.motion import Spin, Sweep
 from scanwright.design.objective.named_objectives import log
@@ -183,7 +183,7 @@ def _regions(loaded: LoadedTask, problem: Problem) -> list[StressRow]:
     polar, azimuth = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, angles[2], angles[3]))
     at = np.radians([60.0])
     g = problem.objective.moments[0].g
-    expected = float(zones(at, polar, azimuth, problem.lines, problem.ball_rad, g).mean_g[0])
+    expected = float(phase_statistics(at, polar, azimuth, problem.lines, problem.ball_rad, g).mean_g[0])
     axis = [float(np.sin(at[0])), 0.0, float(np.cos(at[0]))]
     return [
         row(f"region of {half:g} deg", "J", expected, score(_with(loaded, problem, [region]), angles).J, allowed)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
+import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -18,12 +19,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from scanwright.design.accuracy.front import dominators
-from scanwright.design.accuracy.machine import this_machine
+from scanwright.design.concurrency.processes import cores
 from scanwright.design.errors import BuildError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.picture_files import save_picture
 
 T = TypeVar("T")
+CPUINFO = Path("/proc/cpuinfo")
 REPEATS = 3  # timed runs after a warm-up
 ROW = 3  # diagrams in one row; more form a square
 MARKS = "osD^vP*X"
@@ -59,6 +61,15 @@ class Trial:
     def median_s(self) -> float:
         """Median of the repeats [s]."""
         return float(np.median(self.seconds))
+
+
+def this_machine() -> str:
+    """Return processor, usable cores, system and Python."""
+    lines = CPUINFO.read_text().splitlines() if CPUINFO.exists() else []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = named[0] if named else platform.processor() or "unnamed processor"
+    system = f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
+    return f"{processor}, {cores()} cores, {system}"
 
 
 def timed(work: Callable[[], T]) -> tuple[T, tuple[float, ...]]:
@@ -111,10 +122,10 @@ def trials_picture(path: Path, trials: Sequence[Trial]) -> None:
         here = [trial for trial in trials if trial.choice == choice]
         floor = min((t.error for t in here if t.error > 0), default=1e-16) / 3
         for i, method in enumerate(dict.fromkeys(trial.method for trial in here)):
-            mine = [trial for trial in here if trial.method == method]
-            x, y = [t.median_s for t in mine], [max(t.error, floor) for t in mine]
+            of_method = [trial for trial in here if trial.method == method]
+            x, y = [t.median_s for t in of_method], [max(t.error, floor) for t in of_method]
             axis.plot(x, y, marker=MARKS[i % 8], color=GREYS[i % 8], label=method, linewidth=1.2, markersize=6)
-            for trial, at in zip(mine, zip(x, y, strict=True), strict=True):
+            for trial, at in zip(of_method, zip(x, y, strict=True), strict=True):
                 axis.annotate(trial.setting, at, textcoords="offset points", xytext=(5, 4), fontsize=6.5)
         for trial in here:
             if trial.chosen:

@@ -1,4 +1,4 @@
-"""The products that a scanner can be made of, by name: the shipped ones, and those of a user's own files.
+"""The products for scanners by name: the shipped ones, and those of a user's own files.
 
 One TOML file per product. Every value is written with its source and whether it was verified:
 
@@ -53,7 +53,7 @@ class Catalogue:
     products: dict[str, Product]
 
     def get(self, name: str, kind: type[P]) -> P:
-        """The product of that name and kind.
+        """Return the product of a name and kind.
 
         Raises:
             TaskError: no such product; the message suggests the nearest name.
@@ -66,17 +66,17 @@ class Catalogue:
         return product
 
     def bearings(self) -> tuple[Bearing, ...]:
-        """All bearings, smallest bore first."""
+        """Return all bearings, smallest bore first."""
         matching = [product for product in self.products.values() if isinstance(product, Bearing)]
         return tuple(sorted(matching, key=lambda bearing: (bearing.bore_mm, bearing.outer_mm, bearing.name)))
 
     def belts(self) -> tuple[Belt, ...]:
-        """All belts, the narrowest first."""
+        """Return all belts, the narrowest first."""
         matching = [product for product in self.products.values() if isinstance(product, Belt)]
         return tuple(sorted(matching, key=lambda belt: (belt.width_mm, belt.pitch_mm, belt.name)))
 
     def named(self, name: str) -> Product:
-        """The product of that name, of whatever kind.
+        """Return the product of a name, of any kind.
 
         Raises:
             TaskError: no such product; the message suggests the nearest name.
@@ -86,28 +86,28 @@ class Catalogue:
         return self.products[name]
 
     def __iter__(self) -> Iterator[Product]:
-        """Products in the order of their kinds, then names."""
+        """Return the products in the order of their kinds, then names."""
         order = list(KINDS.values())
         return iter(sorted(self.products.values(), key=lambda p: (order.index(type(p)), p.name)))
 
 
 def load_catalogue(*extra: Path) -> Catalogue:
-    """The shipped products, then those of the user's own files, which replace products of the same name.
+    """Return the shipped products and those of the user's own files, which replace products of the same name.
 
     Raises:
         TaskError: a file is missing, malformed, or a product lacks a value.
     """
     products = dict(_shipped())
-    complaints = []
+    messages = []
     for path in extra:
         try:
             product = load_product(path)
         except TaskError as error:
-            complaints.append(str(error))
+            messages.append(str(error))
         else:
             products[product.name] = product
-    if complaints:
-        raise TaskError("\n".join(complaints))
+    if messages:
+        raise TaskError("\n".join(messages))
     return Catalogue(products)
 
 
@@ -148,8 +148,7 @@ def load_product(path: Path) -> Product:
 
 def file_of(name: str) -> Path | None:
     """Return the file of a product of the shipped catalogue or of an installed package, to copy and change."""
-    found = (path for path in reversed(_files()) if read_toml(path, "the catalogue file")["name"] == name)
-    return next(found, None)
+    return next((path for path in reversed(_files()) if read_toml(path, "the catalogue file")["name"] == name), None)
 
 
 @cache
@@ -158,12 +157,12 @@ def _shipped() -> dict[str, Product]:
 
 
 def _files() -> list[Path]:
-    """Return all product files; of two with one name the last one counts."""
+    """Return all product files; the last one of a name takes precedence."""
     return [path for folder in (SHIPPED, *_installed()) for path in sorted(folder.glob("*.toml"))]
 
 
 def _installed() -> list[Path]:
-    """Folders of the modules that installed packages name in these groups; the modules themselves stay unloaded."""
+    """Return the folders of the modules of installed packages in these groups, without importing them."""
     modules = {entry.module for group in (LIDAR_GROUP, SERVO_GROUP) for entry in entry_points(group=group)}
     specs = [find_spec(module) for module in sorted(modules)]
     return [Path(spec.origin).parent for spec in specs if spec is not None and spec.origin is not None]

@@ -31,7 +31,7 @@ class Hole(Record):
         axis: out of the device, towards that part: a face, or a vector.
         kind: tapped, self_tapping, through (the nut, or the head, is on the far side), or one that carries no load.
         size: of the screw.
-        depth_mm: of the thread, or of what a screw passes in a through hole.
+        depth_mm: of the thread, or of the material around a through hole.
         head_space_mm: of a through hole: free height for a nut or a head on the far side.
     """
 
@@ -45,14 +45,14 @@ class Hole(Record):
 
 @dataclass(frozen=True, slots=True)
 class HolePattern:
-    """Equal holes in one plane, which hold one part.
+    """Equal holes in one plane, for one part.
 
     Attributes:
         screw: size of the screws.
         kind: of the holes.
         places: x and y of each.
         z_mm: of the plane.
-        depth_mm: of the thread, or of what a screw passes.
+        depth_mm: of the thread, or of the material around a through hole.
     """
 
     screw: Size
@@ -76,7 +76,7 @@ def mounting_holes(holes: Iterable[Hole], face: Face) -> HolePattern:
 
 
 def what_holds(holes: Iterable[Hole]) -> str:
-    """Return the holes in words, for a message: how many of which kind in which face."""
+    """Return the number of holes of each kind and face as text."""
     counts: dict[tuple[str, str, str], int] = {}
     for hole in holes:
         face = hole.axis if isinstance(hole.axis, str) else "an oblique face"
@@ -88,9 +88,8 @@ def what_holds(holes: Iterable[Hole]) -> str:
 def with_holes(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a product file with `holes` in place of the fields of version 0.1.
 
-    Args:
-        table: of a product file; each value a table of value, source and verified. Returned as it is if it states
-            `holes`, or not all of the old fields. The holes are verified if their places and size are.
+    A table that has `holes`, or not all of the old fields, is not changed. The holes are verified if their places and
+    their size are.
     """
     old = OLD_LIDAR if table.get("kind") == "lidar" else OLD_SERVO
     entries = [table.get(field) for field in old]

@@ -23,6 +23,7 @@ from scanwright.design.catalogue.product_base import (
     Triple,
     UsbId,
     absent,
+    no_shape,
 )
 
 
@@ -60,36 +61,24 @@ class Lidar(Product):
     cable_z_mm: float
     cable_diameter_mm: float = Field(gt=0)
     cable_straight_mm: float = Field(ge=0)
-    usb_ids: tuple[UsbId, ...] | None = Field(
-        default=None, exclude=True, description="vendor:product of its port; shapes no part"
-    )
-    family: str | None = Field(default=None, exclude=True, description="who drives it; shapes no part")
-    supply_v: Pair | None = Field(default=None, exclude=True, description="least and most; shapes no part")
-    current_a: float | None = Field(default=None, gt=0, exclude=True, description="as it runs; shapes no part")
-    peak_a: float | None = Field(default=None, gt=0, exclude=True, description="as it starts; shapes no part")
-    inrush_a: float | None = Field(
-        default=None, gt=0, exclude=True, description="for a moment when power comes on; shapes no part"
-    )
-    link: Link | None = Field(default=None, exclude=True, description="how its data leave; shapes no part")
-    signal_v: float | None = Field(
-        default=None, gt=0, exclude=True, description="level of its serial line; shapes no part"
-    )
-    sends_only: bool | None = Field(
-        default=None, exclude=True, description="its serial line has no RX pin; shapes no part"
-    )
-    connector: str | None = Field(default=None, exclude=True, description="shapes no part")
+    usb_ids: tuple[UsbId, ...] | None = no_shape("vendor:product of its port")
+    family: str | None = no_shape("who drives it")
+    supply_v: Pair | None = no_shape("least and most")
+    current_a: float | None = no_shape("as it runs", gt=0)
+    peak_a: float | None = no_shape("as it starts", gt=0)
+    inrush_a: float | None = no_shape("for a moment when power comes on", gt=0)
+    link: Link | None = no_shape("how its data leave")
+    signal_v: float | None = no_shape("level of its serial line", gt=0)
+    sends_only: bool | None = no_shape("its serial line has no RX pin")
+    connector: str | None = no_shape()
     cables: tuple[Cable, ...] | None = Field(
         default=None, min_length=1, exclude_if=absent, description="between the lidar and what it is joined to"
     )
     mass_with_cables: bool | None = Field(
         default=None, exclude_if=absent, description="whether mass_g counts its cables"
     )
-    tied_pins: tuple[TiedPin, ...] | None = Field(
-        default=None, exclude=True, description="pins to join if nothing drives them; shapes no part"
-    )
-    leads: tuple[Lead, ...] | None = Field(
-        default=None, exclude=True, description="colours of its power lead; shapes no part"
-    )
+    tied_pins: tuple[TiedPin, ...] | None = no_shape("pins to join if nothing drives them")
+    leads: tuple[Lead, ...] | None = no_shape("colours of its power lead")
 
     @model_validator(mode="after")
     def _steps_are_ordered(self) -> Lidar:
@@ -102,16 +91,11 @@ class Lidar(Product):
         return self
 
     def lead_colours(self) -> dict[str, tuple[str, ...]]:
-        """Colours that a verified source names for the + and - lead; empty if no source does."""
+        """Return the colours of the + and - lead by a verified source; empty if there is none."""
         origin = self._provenance.get("leads")
         if not self.leads or origin is None or not origin.verified:
             return {}
         return {net: tuple(lead.colour for lead in self.leads if lead.net == net) for net in ("+", "-")}
-
-    @property
-    def body_g(self) -> float:
-        """Mass without its cables."""
-        return self.mass_g - (sum(cable.mass_g for cable in self.cables or ()) if self.mass_with_cables else 0.0)
 
     @property
     def base(self) -> HolePattern:
@@ -120,7 +104,7 @@ class Lidar(Product):
 
     @property
     def half_mm(self) -> Pair:
-        """Half of the rectangle about the optical axis that holds the body with its ears, along x and y."""
+        """Half sides, along x and y, of the rectangle about the optical axis that contains the body and its ears."""
         corners = np.abs(
             [[0.5 * self.body_mm[0], 0.5 * self.body_mm[1], 0.0], *(c for ear in self.ears_mm or () for c in ear)]
         )
@@ -128,19 +112,18 @@ class Lidar(Product):
 
     @property
     def stated_range_m(self) -> float:
-        """The farthest that it sees, as its maker states it."""
+        """Largest range as stated by its maker [m]."""
         return self.range_max_mm / 1000
 
     @property
     def practical_range_m(self) -> float:
-        """The farthest that its users get where that is known, else as stated: what a scanner can count on."""
+        """Largest range that its users get if known, else as stated [m]."""
         return (self.range_practical_mm or self.range_max_mm) / 1000
 
     def sigma_mm(self, range_mm: ArrayLike) -> Float[ndarray, " *n"]:
-        """Noise of a range at ranges: one standard deviation, same shape.
+        """Return the standard deviation of a measured range [mm] at ranges; constant beyond range_max_mm.
 
-        A triangulating sensor measures the place of a spot, which moves with the inverse of the range: its noise grows
-        with the square of it. Beyond range_max_mm the noise is that at range_max_mm.
+        The noise of a triangulating sensor grows with the square of the range.
         """
         range_mm = np.minimum(range_mm, self.range_max_mm)
         points = np.array(self.sigma_by_range_mm or [(self.range_max_mm, self.range_sigma_mm)])
@@ -149,6 +132,6 @@ class Lidar(Product):
         return np.asarray(sigma * beyond**2)
 
     def bearings_rad(self) -> Float[ndarray, " beams"]:
-        """Angle of every beam about the scan-plane normal, 0 to the front, shape (beams,) (SCIP 2.0, p. 5)."""
+        """Return the angle of every beam about the scan-plane normal, 0 to the front (SCIP 2.0, p. 5)."""
         steps = np.arange(self.first_step, self.last_step + 1)
         return (steps - self.front_step) * (2 * np.pi / self.steps_per_turn)

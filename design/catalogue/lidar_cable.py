@@ -1,8 +1,7 @@
-"""Cables of a lidar, and the connectors that take them. Millimetres, grams."""
+"""Cables of a lidar, and their mating connectors. Millimetres, grams."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,11 +28,6 @@ class Cable(Record):
         return self.lengths_mm[0]
 
     @property
-    def volume_mm3(self) -> float:
-        """Volume of its round section."""
-        return math.pi / 4 * self.diameter_mm**2 * self.length_mm
-
-    @property
     def mass_g(self) -> float:
         """Mass without its plug."""
         return self.g_per_m * self.length_mm / 1000
@@ -48,7 +42,7 @@ class Connector:
     """A plug in its socket, ready for use.
 
     Attributes:
-        words: what to buy for the other side of the plug.
+        words: name of the part to buy.
         size_mm: of the mated pair: along the cable, across it, and height.
         mass_g: of the mated pair.
     """
@@ -69,12 +63,7 @@ BLOCK_MM = (25.0, 12.0)  # across it, with the wires in it, and height
 
 
 def connector_for(end: End, poles: int) -> Connector:
-    """Return what takes an end of a cable: its socket, or a terminal block for bare wires.
-
-    Args:
-        end: of the cable.
-        poles: wires of the cable.
-    """
+    """Return the mate of an end of a cable with `poles` wires: a socket, or a terminal block for bare wires."""
     if end != "bare":
         return CONNECTORS[end]
     return Connector(f"terminal block, {poles} poles", (POLE_MM * poles, *BLOCK_MM), POLE_G * poles)

@@ -1,4 +1,4 @@
-"""What all records of the catalogue share: provenance, cables. Millimetres, grams."""
+"""Common parts of the records of the catalogue: base class, provenance, wires. Millimetres, grams."""
 
 from __future__ import annotations
 
@@ -17,12 +17,18 @@ UsbId = Annotated[str, Field(pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")]
 
 
 def absent(value: object) -> bool:
-    """Return whether a field that shapes parts is left out of the record, so that others keep their digest."""
+    """Return whether to omit a new field from the dump, so that products without it keep their digest."""
     return value is None
 
 
+def no_shape(description: str = "", **bounds: float) -> Any:
+    """Return an optional field that affects no part: it is not in the dump, and so not in the digest of a task."""
+    text = f"{description}; shapes no part" if description else "shapes no part"
+    return Field(default=None, exclude=True, description=text, **bounds)  # type: ignore[call-overload]
+
+
 class Provenance(Record):
-    """Where a value comes from. `verified` means: two independent sources, or a drawing of the maker."""
+    """Source of a value. `verified` means: two independent sources, or a drawing of the maker."""
 
     source: str
     verified: bool
@@ -49,12 +55,12 @@ class Product(Record):
         return [field for field, origin in self._provenance.items() if not origin.verified]
 
     def caution(self, field: str) -> str:
-        """Return what a message adds behind an unverified value; empty if it is verified."""
+        """Return the end of a message on an unverified value; empty if it is verified."""
         origin = self._provenance.get(field)
         return "" if origin is None or origin.verified else " (not verified: measure yours)"
 
     def facts(self) -> dict[str, Any]:
-        """Every value, and under `provenance` its source, for a program to read."""
+        """Return every value, and under `provenance` its source, for JSON."""
         sources = {field: origin.model_dump() for field, origin in self._provenance.items()}
         values = {field: to_jsonable_python(getattr(self, field)) for field in type(self).model_fields}
         return {**values, "provenance": sources}
@@ -80,7 +86,7 @@ Link = Literal["usb", "usb-powered", "ethernet", "serial"]
 
 
 class Lead(Record):
-    """One wire of a power lead. A net that has several colours differs from one revision of the cable to the next."""
+    """One wire of a power lead. Several colours of one net are those of different revisions of the cable."""
 
     net: Literal["+", "-"]
     colour: str

@@ -7,11 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from scanwright.design.catalogue.product_base import (
-    Pair,
-    Product,
-    Triple,
-)
+from scanwright.design.catalogue.product_base import Pair, Product, Triple
 
 
 class Bearing(Product):
@@ -76,7 +72,7 @@ class Multibeam(Product):
 
 
 class Printer(Product):
-    """How a part is printed in plastic, and what that costs in millimetres."""
+    """A printer of plastic parts, its accuracy and its limits."""
 
     kind: Literal["printer"]
     screw_clearance_mm: float = Field(ge=0, le=1)

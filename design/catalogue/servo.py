@@ -8,12 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from scanwright.design.catalogue.holes import Hole, HolePattern, mounting_holes
-from scanwright.design.catalogue.product_base import (
-    Pair,
-    Product,
-    Triple,
-    UsbId,
-)
+from scanwright.design.catalogue.product_base import Pair, Product, Triple, UsbId, no_shape
 
 
 class Servo(Product):
@@ -25,12 +20,12 @@ class Servo(Product):
     position_feedback_deg: float = Field(gt=0, le=360)
     mass_g: float = Field(gt=0)
     price_usd: float | None = Field(default=None, gt=0)
-    supply_v: Pair | None = Field(default=None, exclude=True, description="least and most; shapes no part")
+    supply_v: Pair | None = no_shape("least and most")
     rated_v: float = Field(default=12.0, gt=0, exclude=True, description="of torque and speed; shapes no part")
-    idle_a: float | None = Field(default=None, gt=0, exclude=True, description="that it rests with; shapes no part")
-    stall_a: float | None = Field(default=None, gt=0, exclude=True, description="at rated_v; shapes no part")
-    bus: Literal["rs485", "ttl"] | None = Field(default=None, exclude=True, description="shapes no part")
-    connector: str | None = Field(default=None, exclude=True, description="shapes no part")
+    idle_a: float | None = no_shape("that it rests with", gt=0)
+    stall_a: float | None = no_shape("at rated_v", gt=0)
+    bus: Literal["rs485", "ttl"] | None = no_shape()
+    connector: str | None = no_shape()
     stall_torque_nm: float = Field(gt=0)
     no_load_rpm: float = Field(gt=0)
     radial_load_n: float | None = Field(default=None, gt=0)
@@ -53,20 +48,11 @@ class Servo(Product):
         description="of its holes: threads in metal (also if unset), or plain ones in plastic",
     )
     holes: tuple[Hole, ...] = Field(description="of the case; those of the horn are stated by the horn_ fields")
-    usb_ids: tuple[UsbId, ...] | None = Field(
-        default=None,
-        exclude=True,
-        description="vendor:product of the adapters between it and a computer; shapes no part",
-    )
-
-    cable_exit_mm: Triple | None = Field(
-        default=None, exclude=True, description="where its cable leaves the case; shapes no part"
-    )
-    cable_out: Triple | None = Field(default=None, exclude=True, description="unit vector, likewise; shapes no part")
-    cable_diameter_mm: float | None = Field(default=None, gt=0, exclude=True, description="shapes no part")
-    cable_bend_radius_mm: float | None = Field(
-        default=None, gt=0, exclude=True, description="least one of its middle; shapes no part"
-    )
+    usb_ids: tuple[UsbId, ...] | None = no_shape("vendor:product of the adapters between it and a computer")
+    cable_exit_mm: Triple | None = no_shape("where its cable leaves the case")
+    cable_out: Triple | None = no_shape("unit vector, likewise")
+    cable_diameter_mm: float | None = no_shape(gt=0)
+    cable_bend_radius_mm: float | None = no_shape("least one of its middle", gt=0)
     adapter: str | None = Field(default=None, exclude=True, description="between its bus and a computer")
     adapter_usd: float | None = Field(default=None, gt=0, exclude=True, description="price of the adapter")
     cable: str | None = Field(default=None, exclude=True, description="between the adapter and the servo")
@@ -83,7 +69,7 @@ class Servo(Product):
 
     @property
     def continuous_torque_nm(self) -> float:
-        """Torque that it gives continuously: a fifth of its stall torque."""
+        """Continuous torque: a fifth of the stall torque."""
         return self.stall_torque_nm / 5
 
 

@@ -7,13 +7,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from scanwright.design.catalogue.product_base import (
-    Circuits,
-    Pair,
-    Product,
-    Rating,
-    absent,
-)
+from scanwright.design.catalogue.product_base import Circuits, Pair, Product, Rating, absent, no_shape
 from scanwright.design.files.record import Record
 
 
@@ -46,9 +40,7 @@ class SlipRing(Product):
     mass_g: float = Field(gt=0)
     max_rpm: float | None = Field(default=None, gt=0)
     circuits: str
-    ways: tuple[Circuits, ...] | None = Field(
-        default=None, exclude=True, description="circuits by current; shapes no part"
-    )
+    ways: tuple[Circuits, ...] | None = no_shape("circuits by current")
     lead_diameter_mm: float | None = Field(
         default=None, gt=0, exclude_if=absent, description="of all leads of one side as one bundle"
     )
@@ -65,12 +57,12 @@ class SlipRing(Product):
     friction_nm: Pair | None = Field(
         default=None, exclude_if=absent, description="drag of its brushes and seals, least and most"
     )
-    data: Rating | None = Field(default=None, exclude=True, description="fastest data it is rated for; shapes no part")
+    data: Rating | None = no_shape("fastest data it is rated for")
     flange: Flange | None = Field(default=None, exclude_if=absent)
     rotor: Rotor | None = Field(default=None, exclude_if=absent)
 
     def leads_mm(self, outlets: int) -> float:
-        """Return the diameter of the leads to one of some outlets, which share the bundle; 0 if it is unknown."""
+        """Return the diameter of the leads to each of some outlets that share the bundle; 0 if it is unknown."""
         return round((self.lead_diameter_mm or 0.0) / math.sqrt(max(1, outlets)), 2)
 
     @model_validator(mode="after")
@@ -78,7 +70,7 @@ class SlipRing(Product):
         if self.bore_mm > 0:
             return self
         if self.flange is None or self.rotor is None:
-            raise ValueError("bore_mm = 0 is a capsule: tell its flange and rotor, or take a through bore (12.7 mm)")
+            raise ValueError("bore_mm = 0 is a capsule: state its flange and rotor, or use a through bore (12.7 mm)")
         if self.flange.circle_mm + self.flange.hole_mm > self.flange.diameter_mm:
             raise ValueError(f"flange.circle_mm {self.flange.circle_mm:g} leaves no edge around its holes")
         if self.flange.circle_mm - self.flange.hole_mm < self.outer_diameter_mm:

@@ -1,4 +1,4 @@
-"""The catalogue as tables: of each kind of product the figures that one chooses by."""
+"""The catalogue as tables of the most important figures of each kind of product."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Figure:
 
     Attributes:
         title: with its unit.
-        fields: of the record, that it comes from: a doubt about one of them is a doubt about it.
-        value: of a product; None if the product has none.
-        brief: whether a short table has it.
+        fields: fields of the record that it depends on; it is unverified if one of them is.
+        value: returns the figure of a product; None if it has none.
+        brief: whether a short table has this column.
     """
 
     title: str
@@ -118,10 +118,7 @@ def chosen(
     max_mass_g: float | None = None,
     max_price_usd: float | None = None,
 ) -> list[Product]:
-    """The products that keep every bound that is given; a product whose figure is unknown keeps none on it.
-
-    `min_range_m` is asked of the practical range, which is the stated one if unknown better.
-    """
+    """Return the products within all bounds; an unknown figure is outside. `min_range_m` refers to practical ranges."""
 
     def at_most(product: Product, field: str, most: float | None) -> bool:
         value = getattr(product, field, None)
@@ -138,15 +135,10 @@ def chosen(
 
 
 def table_lines(products: Iterable[Product], in_full: bool = True) -> list[str]:
-    """Return a table for each kind, with `MARK` behind unverified values.
-
-    Args:
-        products: what to list.
-        in_full: False for the columns and rows that one chooses by, and only the names if there are several kinds.
-    """
+    """Return a table for each kind; unless `in_full`, of the main columns, or only names if there are several kinds."""
     listed = list(products)
     if not listed:
-        return ["no product of the catalogue is like that"]
+        return ["no product of the catalogue matches"]
     groups = {word.replace("_", " "): [p for p in listed if type(p) is kind] for word, kind in KINDS.items()}
     groups = {word: alike for word, alike in groups.items() if alike}
     if not in_full and len(groups) > 1:

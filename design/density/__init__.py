@@ -1,1 +1,1 @@
-"""Beams per ball: the fan, exact counts of a turning and of a sweeping scanner."""
+"""Beam density: beam directions, and exact counts of the beams within a ball for full turns and sweeps."""

@@ -1,7 +1,7 @@
-"""Exact ball counts of any set of beams: what `design.objective.ball_search` counts, through a grid on the sphere.
+"""Exact counts of beams within balls, for any set of beams, by a grid on the sphere.
 
-Beams are sorted into rows of the polar angle and, within a row, by azimuth cell. The beams that can lie in a ball are
-then one or two unbroken stretches of memory per row, and each is tested.
+Beams are sorted into rows of the polar angle and, within a row, by azimuth cell. The candidates of a ball are then one
+or two contiguous ranges of memory per row.
 """
 
 from __future__ import annotations
@@ -15,22 +15,13 @@ from scanwright.design.arrays import Array
 from scanwright.design.concurrency.parallel import in_chunks
 
 MOST_ROWS = 1440
-CELLS_PER_BALL = 3  # rows and cells across a ball radius: fewer test too many beams, more jump too often
+CELLS_PER_BALL = 3  # rows and cells across a ball radius: a compromise between tested beams and memory ranges
 
 
 def ball_count(
     beams: Float[ndarray, "beams 3"], directions: Float[ndarray, "n 3"], ball_rad: float
 ) -> Int[ndarray, " n"]:
-    """Beams within `ball_rad` of each direction.
-
-    Args:
-        beams: unit vectors, shape (beams, 3).
-        directions: unit vectors, shape (n, 3).
-        ball_rad: angle on the sphere, 0 to pi.
-
-    Returns:
-        Counts, shape (n,).
-    """
+    """Return the number of `beams` within the angle `ball_rad` (0 to pi) of each direction; all are unit vectors."""
     rows = int(min(MOST_ROWS, max(1, np.pi * CELLS_PER_BALL / ball_rad)))
     columns = _columns(rows)
     starts = np.concatenate([[0], np.cumsum(columns)])
@@ -45,7 +36,7 @@ def ball_count(
 
 
 def _columns(rows: int) -> Int64[ndarray, " {rows}"]:
-    """Azimuth cells of each row, about as wide as the row is high, shape (rows,), integers."""
+    """Return the number of azimuth cells of each row; a cell is about as wide as the row is high."""
     middle = (np.arange(rows) + 0.5) * np.pi / rows
     return np.maximum(1, (2 * rows * np.sin(middle)).astype(np.int64))
 
@@ -63,7 +54,7 @@ def _cells(beams: Array, rows: int, columns: Array, starts: Array) -> Array:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _sorted(beams: Array, cells: Array, count: int) -> tuple[Array, Array]:
-    """Beams in the order of their cells, one row per coordinate (3, beams), and where each cell starts."""
+    """Return the beams in the order of their cells, shape (3, beams), and the index of the first beam of each cell."""
     offsets = np.zeros(count + 1, np.int64)
     for i in range(len(cells)):
         offsets[cells[i] + 1] += 1
@@ -85,7 +76,7 @@ def _count(
     out = np.zeros(len(directions), np.int64)
     chord = 4 * np.sin(ball / 2) ** 2
     height = np.pi / rows
-    slack = 1e-9  # beams on a cell's edge may have been rounded to the other side
+    slack = 1e-9  # a beam on the edge of a cell can be rounded to the other side
     for i in range(len(directions)):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
         t = np.arctan2(np.sqrt(x * x + y * y), z)
@@ -115,7 +106,7 @@ def _count(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _widest(t: float, ball: float, low: float, high: float) -> float:
-    """Largest azimuth distance from the centre of a ball at polar angle t to its rim, between two polar angles."""
+    """Return the largest azimuth distance from the centre of a ball at polar angle t to its rim, within low .. high."""
     if t - ball <= 0.0 or t + ball >= np.pi:
         return np.pi
     widest = np.arccos(np.cos(t) / np.cos(ball)) if ball < 0.5 * np.pi else low

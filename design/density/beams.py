@@ -1,4 +1,4 @@
-"""Beams of the 2D lidar in the rotation frame, scan lines of one full turn, and the simulated scan on the sphere."""
+"""Beams of the 2D lidar in the rotation frame, the scan lines of one full turn, and the simulated scan."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from scanwright.design import frames
 class ScanLines:
     """The scan lines of one full turn: line k is at `k * step_rad`, k = 0 .. count - 1.
 
-    `T f` is not rounded: if it is no integer, the gap behind the last line is shorter than `step_rad`.
-    Where the servo stops, each line is measured `repeats` times.
+    If period times scan rate is not an integer, the gap after the last line is shorter than `step_rad`. If the servo
+    stops at each line, each is measured `repeats` times.
     """
 
     count: int
@@ -26,12 +26,12 @@ class ScanLines:
 
     @property
     def angles_rad(self) -> Float[ndarray, " {self.count}"]:
-        """Axis angles of all lines, shape (count,)."""
+        """Axis angles of the lines, shape (count,)."""
         return self.step_rad * np.arange(self.count)
 
 
 def scan_lines(period_s: float, scan_rate_hz: float) -> ScanLines:
-    """Lines of one turn of `period_s` seconds: `gamma_k = 2 pi k / (T f)`, k = 0 .. ceil(T f) - 1."""
+    """Return the lines of one turn in `period_s` = T: `gamma_k = 2 pi k / (T f)`, k = 0 .. ceil(T f) - 1."""
     turns = period_s * scan_rate_hz
     nearest = round(turns)
     if nearest >= 1 and abs(turns - nearest) < 1e-9 * turns:  # 0.07 * 100 is 7 and not 7.000000000000001
@@ -48,10 +48,10 @@ def beam_directions_rot(
     beta_laser_rad: float,
     lever: ArrayLike = NO_LEVER,
 ) -> Float[ndarray, "beams 3"]:
-    """Unit vectors of all beams in the rotation frame, shape (beams, 3): `R_rot_laser Rz(gamma_beam) e_x`.
+    """Return unit vectors of the beams in the rotation frame, shape (beams, 3): `R_rot_laser Rz(gamma_beam) e_x`.
 
-    With a lever arm, `t_rot_laser / range`, they point from the axis to where the beams end at that range. The arm
-    turns with the laser, so the density stays the same all around the axis.
+    With a lever arm, `t_rot_laser / range`, they point from the axis to the ends of the beams at that range. The arm
+    turns with the laser, so the density stays rotationally symmetric about the axis.
     """
     in_laser = np.stack([np.cos(bearings_rad), np.sin(bearings_rad), np.zeros_like(bearings_rad)], axis=1)
     beams = in_laser @ frames.R_rot_laser(alpha_laser_rad, beta_laser_rad).T
@@ -64,17 +64,17 @@ def beam_directions_rot(
 def polar_of_planes(
     bearings_rad: Float[ndarray, " beams"], planes_rad: Float[ndarray, "n 2"]
 ) -> Float[ndarray, "n beams"]:
-    """Polar angles of all beams for many scan planes (alpha_laser, beta_laser) (n, 2), shape (n, beams)."""
+    """Return the polar angles of all beams for scan planes (alpha_laser, beta_laser), shape (n, beams)."""
     R = frames.R_rot_laser(*planes_rad.T)[:, :, :2]
     x, y, z = np.einsum("nij,jb->inb", R, np.stack([np.cos(bearings_rad), np.sin(bearings_rad)]))
     return np.arctan2(np.hypot(x, y), z)
 
 
 def line_spacing(beams: Float[ndarray, "n 3"], plane_rad: ArrayLike) -> float:
-    """Widest distance between neighbouring lines of one family, across them, as a share of the axis step.
+    """Return the widest distance between neighbouring scan lines, perpendicular to them, as a share of the axis step.
 
     Args:
-        beams: in the rotation frame, shape (n, 3).
+        beams: unit vectors in the rotation frame.
         plane_rad: (alpha_laser, beta_laser) of the scan plane.
     """
     normal = frames.R_rot_laser(*np.asarray(plane_rad, dtype=float))[:, 2]
@@ -82,15 +82,15 @@ def line_spacing(beams: Float[ndarray, "n 3"], plane_rad: ArrayLike) -> float:
 
 
 def polar_and_azimuth(directions: Float[ndarray, "n 3"]) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
-    """Angle from z and angle about z of unit vectors, (n, 3) -> (n,), (n,) [rad]; accurate close to the poles."""
+    """Return polar angle and azimuth [rad] of unit vectors, shape (n,) each; accurate close to the poles."""
     x, y, z = directions.T
     return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
 
 
 def is_closed(bearings_rad: Float[ndarray, " beams"]) -> bool:
-    """Whether a fan sees all around: from its last beam to its first it is no farther than between others."""
+    """Return whether a field of view is a full circle: the gap from its last beam to its first is an ordinary step."""
     apart = np.abs(np.diff(bearings_rad))
-    if apart.size < 2 or 2 * np.pi - apart.sum() > 1.5 * apart.max():  # a median takes longer than the rest
+    if apart.size < 2 or 2 * np.pi - apart.sum() > 1.5 * apart.max():  # avoids the slow median
         return False
     return bool(2 * np.pi - apart.sum() <= 1.5 * np.median(apart))
 
@@ -98,14 +98,14 @@ def is_closed(bearings_rad: Float[ndarray, " beams"]) -> bool:
 def blind_zones(
     bearings_rad: Float[ndarray, " beams"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
 ) -> Float[ndarray, "zones 2"]:
-    """Ranges of the polar angle about the axis that lie further than a ball radius from the fan, shape (zones, 2).
+    """Return the ranges of the polar angle about the axis that no beam comes within a ball radius of, shape (zones, 2).
 
-    Between neighbouring beams the fan is continuous (docs/definitions.md, Blind); where beams are missing from the
-    middle of it, as behind a part that turns along, it is several.
+    The field of view counts as continuous between neighbouring beams (docs/definitions.md, Blind), and as several
+    sectors if beams are missing in the middle, such as behind a part that turns with the laser.
     """
     apart = np.diff(bearings_rad)
-    first = np.zeros(1, dtype=int)  # beam of each fan
-    if len(apart) > 1 and not 0 < apart.max() <= 1.5 * apart.min():  # a median costs more than all else here
+    first = np.zeros(1, dtype=int)  # beam of each sector
+    if len(apart) > 1 and not 0 < apart.max() <= 1.5 * apart.min():  # avoids the slow median
         first = np.append(first, np.flatnonzero(apart > 1.5 * np.median(apart)) + 1)
     low, high = (of.reduceat(beam_polar_rad, first) for of in (np.minimum, np.maximum))
     order = np.argsort(low)
@@ -120,10 +120,7 @@ def scan_at(
     angles_rad: ArrayLike,
     lever: ArrayLike = NO_LEVER,
 ) -> Float[ndarray, "n 3"]:
-    """Directions in the world (paper, section 4.1) of all beams at each joint angle, line after line.
-
-    Shape (joint angles * beams, 3).
-    """
+    """Return the world directions of all beams, line after line (paper, section 4.1), shape (k * beams, 3)."""
     alpha_rot, beta_rot, alpha_laser, beta_laser = np.asarray(angles_rad, dtype=float)
     beams = beam_directions_rot(bearings_rad, alpha_laser, beta_laser, lever)
     R = frames.R_world_rot(alpha_rot, beta_rot, joint_rad)

@@ -1,7 +1,8 @@
-"""Compiled: what a ball counts while the start phase of the turn goes by; see `design.density.spin`.
+"""Compiled kernels: statistics of the beam count of a ball over the start phase of a turn (`design.density.spin`).
 
-The unit of azimuth is the step between two lines. The count rises where a line enters the window of a beam and falls
-where it leaves; line k does so k steps behind line 0.
+Azimuths are in steps between lines. A beam lies within a ball if the azimuth of its line lies in a window about the
+beam's own azimuth. With rising start phase the count rises when a line enters a window and falls when a line leaves
+it; line k does so k steps after line 0.
 """
 
 from __future__ import annotations
@@ -14,17 +15,17 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Ints
 from scanwright.design.sphere.shell_sort import sort_indices
 
-TIE = 1e-9  # of a gap: steps this close are one, what is between them is rounding
-NO_LEVEL = 1 << 62
+TIE = 1e-9  # share of a gap: counts over shorter intervals are rounding errors
+NO_LEVEL = 1 << 62  # above every count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def half_width(sin_t: float, cos_t: float, sin_b: float, cos_b: float, sin_ball: float, cos_ball: float) -> float:
-    """Azimuth half-width of the ball about polar angle t on the circle t_b; pi is all of it, -1 none of it.
+    """Return the azimuth half-width [rad] of a ball at polar angle t on the circle at polar angle t_b.
 
-    Sines and cosines are those of half the angles: `sin((ball - (t - t_b)) / 2) sin((ball + (t - t_b)) / 2)` keeps
-    full precision where t is close to t_b and where both are close to a pole, and an arcsine is all that each pair of
-    polar angles costs.
+    It is pi if the circle lies in the ball, and -1 if it misses the ball. The arguments are sines and cosines of half
+    the angles: `sin((ball - (t - t_b)) / 2) sin((ball + (t - t_b)) / 2)` keeps full precision if t is close to t_b or
+    both are close to a pole, and needs one arcsine for each pair.
     """
     apart, along = sin_t * cos_b - cos_t * sin_b, cos_t * cos_b + sin_t * sin_b
     across = (sin_ball * along - cos_ball * apart) * (sin_ball * along + cos_ball * apart)
@@ -36,27 +37,26 @@ def half_width(sin_t: float, cos_t: float, sin_b: float, cos_b: float, sin_ball:
     return 2.0 * np.arcsin(np.sqrt(across / around))
 
 
-def meetings(
+def kernel_inputs(
     polar_rad: Float[ndarray, " n"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
 ) -> tuple[Ints, Array, Array, Array]:
-    """What the kernels take of polar angles about an axis, those of the beams, in order, and the ball.
+    """Return the candidate beams of each ball, as index ranges (2, n), and `half_angles` of balls, beams and radius.
 
-    Returned are the first beam that may be within the ball and the first one behind, (2, n), and sine and cosine of
-    half the polar angles, (2, n), of half those of the beams, (2, beams), and of half the ball, (2,).
+    `beam_polar_rad` must increase.
     """
     ends = np.searchsorted(beam_polar_rad, np.stack([polar_rad - ball_rad - 1e-9, polar_rad + ball_rad + 1e-9]))
-    return ends, halves(polar_rad), halves(beam_polar_rad), halves(ball_rad)
+    return ends, half_angles(polar_rad), half_angles(beam_polar_rad), half_angles(ball_rad)
 
 
-def halves(angle_rad: Array | float) -> Array:
-    """Sine and cosine of half of angles (n,), shape (2, n)."""
+def half_angles(angle_rad: Array | float) -> Array:
+    """Return sine and cosine of half of each angle, shape (2, n)."""
     half = np.asarray(angle_rad) / 2
     return np.stack([np.sin(half), np.cos(half)])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def mean_counts(ends: Ints, polar: Array, beams: Array, ball: Array) -> Array:
-    """Mean share of a turn in which each beam is within the ball, summed over the beams, (polar angles,)."""
+    """Return the share of a turn in which each beam lies within the ball, summed over the beams, shape (n,)."""
     out = np.zeros(polar.shape[1])
     for i in range(len(out)):
         for b in range(ends[0, i], ends[1, i]):
@@ -68,7 +68,7 @@ def mean_counts(ends: Ints, polar: Array, beams: Array, ball: Array) -> Array:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
-    """Indices that sort the first n places, 0 to 1: spread evenly as they are, twice as fast as by comparing."""
+    """Write into `order` the indices that sort the first n values of `at`, 0 to 1; fast if they are spread evenly."""
     for b in range(n + 1):
         starts[b] = 0
     most = 0
@@ -86,15 +86,14 @@ def sort_by_buckets(at: Array, n: int, order: Array, starts: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def windows_at(
+def window_edges(
     i: int, ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, edges: Array
 ) -> tuple[int, int]:
-    """Where line 0 enters the windows of the beams at a polar angle and leaves them, by turns, in `edges` [steps].
+    """Write into `edges` the start and end [steps] of the window of each beam for ball i, not reduced to one turn.
 
-    `beam_steps` are the azimuths of the beams. The edges are not brought back to one turn. Returned: their number, and
-    how many beams see all lines, for which there are none. With sines and cosines of two polar angles, (4, n), the
-    windows are the narrower ones: a half-width has one maximum over the polar angle, so no window between the two
-    angles is narrower.
+    `beam_steps` are the azimuths of the beams. Return the number of edges, and the number of beams whose window is the
+    entire circle and has no edges. If `polar` has the half angles of two polar angles, shape (4, n), each window is
+    the narrower one of the two: the half-width has one maximum over the polar angle, so none in between is narrower.
     """
     n, full = 0, 0
     for b in range(ends[0, i], ends[1, i]):
@@ -111,13 +110,13 @@ def windows_at(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def even_zones(
+def even_statistics(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, count: int, g: Array
 ) -> tuple[Array, Array, Array, Array, Ints]:
-    """Statistics over the start phase if all gaps between lines are equal: one gap represents all.
+    """Return statistics over the start phase if all gaps between lines are equal: one gap represents all.
 
-    Returned are means of g and of the count, lowest and highest count, and the entries of g that each polar angle needs
-    at most, (polar angles,) each. Where g has fewer, the statistics are left 0.
+    These are the means of g and of the count, the lowest and the highest count, and the table entries of g that are
+    needed, shape (n,) each. If g has fewer entries, the statistics are 0.
     """
     n = polar.shape[1]
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -125,7 +124,7 @@ def even_zones(
     at = np.empty(2 * len(beam_steps))
     order, starts = np.empty(len(at), np.int64), np.empty(len(at) + 1, np.int64)
     for i in range(n):
-        edges, full = windows_at(i, ends, polar, beams, ball, beam_steps, count, at)
+        edges, full = window_edges(i, ends, polar, beams, ball, beam_steps, count, at)
         inside, balance = 0.0, 0.0
         for k in range(0, edges, 2):
             inside += at[k + 1] - at[k]
@@ -135,7 +134,7 @@ def even_zones(
         if need[i] > len(g):
             continue
         mean[i] = full * count + inside
-        # what the mean count leaves when all steps are done is open from the start, whatever ties with what
+        # the count at phase 0, from the mean count and all steps: independent of the order of equal steps
         level = full * count + int(np.floor(inside + balance + 0.5))
         sort_by_buckets(at, edges, order, starts)
         here, lowest, highest = 0.0, NO_LEVEL, 0
@@ -156,7 +155,7 @@ def even_zones(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) -> float:
-    """Change the count on some pieces of a gap; returned is what the sum of g over the gap changes by."""
+    """Add `by` to the count on the pieces first .. last of a gap; return the change of the sum of g over the gap."""
     change = 0.0
     for j in range(first, last):
         change += width[j] * (g[level[j] + by] - g[level[j]])
@@ -165,14 +164,15 @@ def _raise(level: Ints, width: Array, first: int, last: int, by: int, g: Array) 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def seam_zones(
+def seam_statistics(
     ends: Ints, polar: Array, beams: Array, ball: Array, beam_steps: Array, turn: float, g: Array
 ) -> tuple[Array, Array, Array, Array, Ints]:
-    """The same if the last gap is shorter than a step; `turn` is the number of steps in a turn, no whole one.
+    """Return the statistics of `even_statistics` if the last gap (the seam) is shorter than the others.
 
-    In each gap an edge makes one step: ahead of it in the turn where the lines come through the seam, behind it later
-    in the gap by what the seam lacks of a whole step. So when the walk passes an edge the count changes on one arc of
-    the gap, which may go on at the start of the next one, and stays what it was on the rest.
+    `turn` is the number of steps in a turn, not an integer. Each window edge changes the count once in every gap of the
+    start phase. In the gaps before that of the edge the lines reach it through the seam, so the place of the change
+    differs (`ahead`) from that in the gaps after it (`behind`). When the loop over the gaps passes an edge, the count
+    changes on the arc between the two places, which can continue at the start of the next gap (`wraps`).
     """
     n = polar.shape[1]
     mean_g, mean, least, most = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -180,11 +180,11 @@ def seam_zones(
     count = int(np.ceil(turn))
     seam = turn - (count - 1)
     size = 4 * len(beam_steps)
-    edge, at, gap, goes_on = np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.bool_)
+    edge, at, gap, wraps = np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.bool_)
     order, rank, starts = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size + 1, np.int64)
     width, level = np.empty(size + 1), np.empty(size + 1, np.int64)
     for i in range(n):
-        edges, full = windows_at(i, ends, polar, beams, ball, beam_steps, turn, edge)
+        edges, full = window_edges(i, ends, polar, beams, ball, beam_steps, turn, edge)
         pieces = 2 * edges + 1
         inside, balance = 0.0, 0.0
         for k in range(0, edges, 2):
@@ -197,14 +197,14 @@ def seam_zones(
             edge[k] -= turn * np.floor(edge[k] / turn)
             gap[k] = min(int(edge[k]), count - 1)
             behind = edge[k] - gap[k]
-            goes_on[k] = behind >= seam
-            ahead = behind - seam if goes_on[k] else behind - seam + 1.0
+            wraps[k] = behind >= seam
+            ahead = behind - seam if wraps[k] else behind - seam + 1.0
             at[k], at[edges + k] = ahead, behind
-            through = gap[k] + goes_on[k]  # lines
+            through = gap[k] + wraps[k]  # lines
             for lines, first_at in ((through, ahead), (count - through, edge[k])):
                 balance += sign * (lines * (turn - first_at) - lines * (lines - 1) / 2)
         mean[i] = full * count + inside * (count / turn)
-        # what the mean count leaves when all steps are done is open from the start, whatever ties with what
+        # the count at phase 0, as in `even_statistics`
         now = full * count + int(np.floor((inside * count - balance) / turn + 0.5))
         sort_by_buckets(at, 2 * edges, order, starts)
         here, total = 0.0, 0.0
@@ -220,29 +220,29 @@ def seam_zones(
             at[k] = edge[k] / turn
         sort_by_buckets(at, edges, order, starts)
         lowest, highest = NO_LEVEL, 0
-        first, last = 0, pieces  # that have changed
-        started, ended, walked = 0, 0, 0
+        first, last = 0, pieces  # range of the changed pieces
+        started, ended, passed = 0, 0, 0
         while True:
             while ended < started:
                 k = order[ended]
-                if goes_on[k]:
+                if wraps[k]:
                     total += _raise(level, width, 0, rank[k] + 1, 1 - 2 * (k % 2), g)
                     first, last = 0, max(last, rank[k] + 1)
                 ended += 1
-            while started < edges and gap[order[started]] <= walked:
+            while started < edges and gap[order[started]] <= passed:
                 k = order[started]
-                start, end_at = rank[edges + k] + 1, pieces if goes_on[k] else rank[k] + 1
+                start, end_at = rank[edges + k] + 1, pieces if wraps[k] else rank[k] + 1
                 total += _raise(level, width, start, end_at, 1 - 2 * (k % 2), g)
                 first, last = min(first, start), max(last, end_at)
                 started += 1
-            if walked == count - 1:
+            if passed == count - 1:
                 break
             for j in range(first, last):
                 if width[j] > TIE:
                     lowest, highest = min(lowest, level[j]), max(highest, level[j])
-            after = walked + 1 if ended < started else (gap[order[started]] if started < edges else count - 1)
-            mean_g[i] += total * (after - walked)
-            walked, first, last = after, pieces, 0
+            after = passed + 1 if ended < started else (gap[order[started]] if started < edges else count - 1)
+            mean_g[i] += total * (after - passed)
+            passed, first, last = after, pieces, 0
         here = 0.0
         for j in range(pieces):
             part = min(here + width[j], seam) - here

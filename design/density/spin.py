@@ -1,13 +1,13 @@
-"""Density of one full scan: beams within a ball about a direction. Closed form, exact counts, and the ball search.
+"""Beam density of one full turn: number of beams within a ball about a direction.
 
-With unlimited rotation at constant speed the density is zonal about the axis: all that a scan-plane setting decides
-is the polar angle t_b and the azimuth p_b of each beam in the rotation frame. At polar angle t beam b meets the ball
-of radius rho within the azimuth half-width `delta_b`,
+If the axis turns at constant speed, the mean density depends on the polar angle t about the axis only. The scan plane
+determines polar angle t_b and azimuth p_b of each beam in the rotation frame. Beam b lies within the ball of radius
+rho at polar angle t over the azimuth half-width `delta_b`,
 
     cos(rho) = cos(t) cos(t_b) + sin(t) sin(t_b) cos(delta_b),
 
-so it adds as many counts at azimuth p as lines lie in [p - p_b - delta_b, p - p_b + delta_b], and
-`count * delta_b / pi` in the mean over the start phase of the turn (docs/definitions.md, Density).
+so its count at azimuth p is the number of lines in [p - p_b - delta_b, p - p_b + delta_b], and `count * delta_b / pi`
+in the mean over the start phase of the turn (docs/definitions.md, Density).
 """
 
 from __future__ import annotations
@@ -22,15 +22,21 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Counts, Ints
 from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.design.density.beams import ScanLines
-from scanwright.design.density.phase_walk import even_zones, halves, mean_counts, meetings, seam_zones
-from scanwright.design.density.value_table import walked
+from scanwright.design.density.phase_walk import (
+    even_statistics,
+    half_angles,
+    kernel_inputs,
+    mean_counts,
+    seam_statistics,
+)
+from scanwright.design.density.value_table import with_value_table
 
-EXACT_TURN = 1e-9  # relative gap difference below which the last gap counts as a full one
+EXACT_TURN = 1e-9  # of a step: closer to an integer number of steps, a turn has no seam
 
 
 @dataclass(frozen=True, slots=True)
-class Zones:
-    """What is seen at polar angles t about the axis; every array has shape (len(t),).
+class PhaseStatistics:
+    """Statistics of the count over the start phase, at n polar angles or directions.
 
     Attributes:
         mean_g: mean over the start phase of g of the true count.
@@ -44,21 +50,21 @@ class Zones:
     least: Float[ndarray, " n"]
     most: Float[ndarray, " n"]
 
-    def of(self, some: slice) -> Zones:
-        """What is seen at some of the angles."""
-        return Zones(self.mean_g[some], self.mean[some], self.least[some], self.most[some])
+    def of(self, some: slice) -> PhaseStatistics:
+        """Return the statistics of a part of the angles."""
+        return PhaseStatistics(self.mean_g[some], self.mean[some], self.least[some], self.most[some])
 
 
 def mean_count(
     polar_rad: Float[ndarray, " n"], beam_polar_rad: Float[ndarray, " beams"], lines: ScanLines, ball_rad: float
 ) -> Float[ndarray, " n"]:
-    """Mean over the start phase of the beams within a ball at polar angles t, in closed form, shape (len(t),)."""
+    """Return the mean count of beams within a ball over the start phase at polar angles t, shape (n,); closed form."""
     beams = np.sort(beam_polar_rad)
-    parts = in_chunks(lambda chunk: mean_counts(*meetings(polar_rad[chunk], beams, ball_rad)), len(polar_rad))
+    parts = in_chunks(lambda chunk: mean_counts(*kernel_inputs(polar_rad[chunk], beams, ball_rad)), len(polar_rad))
     return lines.repeats * lines.count * np.concatenate(parts)
 
 
-def zones(
+def phase_statistics(
     polar_rad: Float[ndarray, " n"],
     beam_polar_rad: Float[ndarray, " beams"],
     beam_azimuth_rad: Float[ndarray, " beams"],
@@ -66,55 +72,35 @@ def zones(
     ball_rad: float,
     g: Callable[[Counts], Array],
     until_rad: Float[ndarray, " n"] | None = None,
-) -> Zones:
-    """Exact statistics over the start phase at polar angles t.
+) -> PhaseStatistics:
+    """Return exact statistics of the count over the start phase at polar angles about the axis.
 
-    The count changes by one where a line enters or leaves a beam's window. Between the lines the same steps come
-    again, at most once broken by the seam of the turn (`design.density.phase_walk`).
-
-    Args:
-        polar_rad: polar angles t about the axis, shape (n,).
-        beam_polar_rad: polar angle of each beam in the rotation frame, shape (beams,).
-        beam_azimuth_rad: azimuth of each beam in the rotation frame, shape (beams,).
-        lines: scan lines of the turn.
-        ball_rad: ball radius.
-        g: of counts of beams, element by element.
-        until_rad: other ends of ranges that begin at `polar_rad`, shape (n,): then `least` is a lower bound of the
-            lowest count in each range, and the rest has no meaning.
+    `g` is a function of the count, element by element. With `until_rad`, the other ends of ranges that begin at
+    `polar_rad`, `least` is a lower bound of the lowest count in each range, and the others have no meaning.
     """
     order = np.argsort(beam_polar_rad, kind="stable")
     polar_b, azimuth_b = beam_polar_rad[order], beam_azimuth_rad[order] % (2 * np.pi)
     turn = 2 * np.pi / lines.step_rad
     even = abs(turn - lines.count) < EXACT_TURN
-
     beam_steps = azimuth_b / lines.step_rad
 
-    def walk(which: Ints, table: Array) -> tuple[Array, Array, Array, Array, Ints]:
-        ends, polar, beams, ball = meetings(polar_rad[which], polar_b, ball_rad)
+    def statistics(which: Ints, table: Array) -> tuple[Array, Array, Array, Array, Ints]:
+        ends, polar, beams, ball = kernel_inputs(polar_rad[which], polar_b, ball_rad)
         if until_rad is not None:
-            polar = np.concatenate([polar, halves(until_rad[which])])
+            polar = np.concatenate([polar, half_angles(until_rad[which])])
         if even:
-            return even_zones(ends, polar, beams, ball, beam_steps, lines.count, table)
-        return seam_zones(ends, polar, beams, ball, beam_steps, turn, table)
+            return even_statistics(ends, polar, beams, ball, beam_steps, lines.count, table)
+        return seam_statistics(ends, polar, beams, ball, beam_steps, turn, table)
 
-    mean_g, mean, least, most = walked(walk, len(polar_rad), g, lines.repeats, smallest=512)
-    return Zones(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
+    mean_g, mean, least, most = with_value_table(statistics, len(polar_rad), g, lines.repeats, smallest=512)
+    return PhaseStatistics(mean_g, lines.repeats * mean, lines.repeats * least, lines.repeats * most)
 
 
 def ball_search(
     beams: Float[ndarray, "beams 3"], directions: Float[ndarray, "n 3"], ball_rad: float
 ) -> Int[ndarray, " n"]:
-    """Beams within `ball_rad` of each direction, the paper's section 4.2: slow, obvious, the oracle of all else.
-
-    Args:
-        beams: unit vectors, shape (beams, 3).
-        directions: unit vectors, shape (n, 3).
-        ball_rad: angle on the sphere.
-
-    Returns:
-        Counts, shape (n,).
-    """
-    from scipy.spatial import cKDTree  # its import takes a third of a second, and no search asks for it
+    """Return the number of `beams` within `ball_rad` of each direction, by a KD-tree (paper, section 4.2)."""
+    from scipy.spatial import cKDTree  # a slow import that no search needs
 
     chord = 2 * np.sin(ball_rad / 2)
     return cKDTree(beams).query_ball_point(directions, chord, return_length=True, workers=-1)

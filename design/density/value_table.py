@@ -1,4 +1,4 @@
-"""Values of g for counts 0, 1, 2 .., as long as a scan needs them: few directions see more than some thousand beams."""
+"""Tables of g(0), g(1), g(2) .. for compiled kernels; few directions see more than some thousand beams."""
 
 from __future__ import annotations
 
@@ -10,33 +10,30 @@ import numpy as np
 from scanwright.design.arrays import Array, Counts, Ints
 from scanwright.design.concurrency.parallel import in_chunks
 
-FIRST = 1 << 14  # entries of the table that all directions are tried with
+FIRST = 1 << 14  # entries of the first table
 
-Walk = Callable[[Ints, Array], tuple[Array, Array, Array, Array, Ints]]
-"""From directions, by their numbers, and a table of g to their statistics, and the entries that each needs."""
+Kernel = Callable[[Ints, Array], tuple[Array, Array, Array, Array, Ints]]
+"""Maps indices of directions (n,) and a table of g to four statistics and the table entries needed, (n,) each."""
 
 
-def walked(walk: Walk, directions: int, g: Callable[[Counts], Array], repeats: int, smallest: int) -> list[Array]:
-    """The four statistics that a walk finds for so many directions, (directions,) each.
+def with_value_table(
+    kernel: Kernel, directions: int, g: Callable[[Counts], Array], repeats: int, smallest: int
+) -> list[Array]:
+    """Return the four statistics of all directions, (directions,) each, with a longer table for those that need it.
 
-    Args:
-        walk: leaves the statistics of a direction open if the table has fewer entries than it needs.
-        directions: their number.
-        g: of counts of beams.
-        repeats: beams of each line that is counted.
-        smallest: number of directions that is worth a thread.
+    `repeats` is the number of measurements of each line, `smallest` that of directions that are worth a thread.
     """
-    result, need = _with_table(walk, np.arange(directions), _table(g, repeats, FIRST), smallest)
+    result, need = _with_table(kernel, np.arange(directions), _table(g, repeats, FIRST), smallest)
     late = np.flatnonzero(need > FIRST)
     if len(late):
-        again, _ = _with_table(walk, late, _table(g, repeats, 1 << int(need.max() - 1).bit_length()), 1)
-        for values, those in zip(result, again, strict=True):
-            values[late] = those
+        again, _ = _with_table(kernel, late, _table(g, repeats, 1 << int(need.max() - 1).bit_length()), 1)
+        for values, replaced in zip(result, again, strict=True):
+            values[late] = replaced
     return result
 
 
-def _with_table(walk: Walk, which: Ints, table: Array, smallest: int) -> tuple[list[Array], Ints]:
-    parts = in_chunks(lambda chunk: walk(which[chunk], table), len(which), smallest=smallest)
+def _with_table(kernel: Kernel, which: Ints, table: Array, smallest: int) -> tuple[list[Array], Ints]:
+    parts = in_chunks(lambda chunk: kernel(which[chunk], table), len(which), smallest=smallest)
     *result, need = (np.concatenate(values) for values in zip(*parts, strict=True))
     return result, need
 

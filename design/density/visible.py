@@ -1,8 +1,8 @@
-"""Density of a scan of which some beams are blocked at some axis angles: by fixed parts near the laser.
+"""Beam density of a scan in which fixed parts block some beams at some axis angles.
 
-Such a density is not zonal, so it is summed beam by beam: beam b sees a direction at polar angle t and azimuth p while
-the joint angle lies within `delta_b(t)` of `p - p_b` (`design.density.spin`). The mean count over the start phase is
-the number of lines in that window whose beam is free, read from a table of lines over the joint angle.
+It is not rotationally symmetric, so it is summed over the beams: beam b lies within the ball at polar angle t and
+azimuth p while the joint angle is within `delta_b(t)` of `p - p_b` (`design.density.spin`). Its mean count over the
+start phase is the number of free lines in that window, from a table over the joint angle.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from numpy import ndarray
 from scanwright.design.arrays import Array, Ints
 from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.design.density.beams import ScanLines, polar_and_azimuth
-from scanwright.design.density.phase_walk import half_width, meetings
+from scanwright.design.density.phase_walk import half_width, kernel_inputs
 from scanwright.design.density.sweep import SweepLines
 
 
 @dataclass(frozen=True, slots=True)
 class FreeLines:
-    """Lines in which each beam is free, counted from the lowest joint angle, in the mean over the start phase.
+    """Mean number of lines over the start phase in which each beam is free, cumulated over the joint angle.
 
     Attributes:
-        low_rad: the lowest joint angle.
-        edges_rad: joint angles above the lowest one, increasing, from 0 to the whole travel; shape (n,).
-        lines: free lines of each beam up to each edge, shape (beams, n).
-        first: place of the first edge in a row of edges of equal steps, in steps.
-        step_rad: of these, in between the first and the last edge.
+        low_rad: lowest joint angle.
+        edges_rad: joint angles relative to the lowest one, increasing from 0.
+        lines: free lines of each beam up to each edge.
+        first: place of the first edge on the regular grid of edges, in steps.
+        step_rad: step of that grid.
     """
 
     low_rad: float
@@ -41,17 +41,14 @@ class FreeLines:
 
 
 def free_lines(blocked: Bool[ndarray, "beams angles"], lines: ScanLines, sweep: SweepLines | None) -> FreeLines:
-    """Count the free lines of beams.
+    """Return the table of free lines of a full turn, or of a sweep.
 
-    Args:
-        blocked: whether a beam is blocked at equal steps of the axis angle from 0, each standing for the step about it.
-        lines: of a full turn, whose last gap may be short.
-        sweep: the trajectory if the servo sweeps.
+    `blocked` states whether a beam is blocked at equal steps of the axis angle from 0.
     """
     steps = blocked.shape[1]
     step = 2 * np.pi / steps
     low, high = (0.0, 2 * np.pi) if sweep is None else np.radians(sweep.motion.limits_deg)
-    first = int(np.floor(low / step + 0.5))  # index of the step that holds the lowest angle
+    first = int(np.floor(low / step + 0.5))  # index of the step of the lowest angle
     last = int(np.ceil(high / step + 0.5)) if high > low else first + 1
     edges = np.clip((np.arange(first, last + 1) - 0.5) * step, low, high)
     if sweep is None:
@@ -67,14 +64,14 @@ def free_lines(blocked: Bool[ndarray, "beams angles"], lines: ScanLines, sweep: 
 def mean_count_free(
     directions_rot: Float[ndarray, "n 3"], beams_rot: Float[ndarray, "beams 3"], free: FreeLines, ball_rad: float
 ) -> Float[ndarray, " n"]:
-    """Mean over the start phase of the free beams within a ball about directions of the rotation frame, shape (n,)."""
+    """Return the mean count of free beams within a ball over the start phase, for each direction, shape (n,)."""
     t, p = polar_and_azimuth(directions_rot)
     t_b, p_b = polar_and_azimuth(beams_rot)
     order = np.argsort(t_b, kind="stable")
     t_b, p_b, lines = t_b[order], p_b[order], free.lines[order]
     parts = in_chunks(
         lambda chunk: _counts(
-            *meetings(t[chunk], t_b, ball_rad),
+            *kernel_inputs(t[chunk], t_b, ball_rad),
             p[chunk] - free.low_rad,
             p_b,
             free.edges_rad,
@@ -89,7 +86,7 @@ def mean_count_free(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _up_to(x: float, edges: Array, lines: Array, first: float, step: float) -> float:
-    """Free lines up to a joint angle above the lowest one; between two edges they are even."""
+    """Return the free lines up to a joint angle x relative to the lowest one, linear between edges."""
     last = len(edges) - 1
     if x <= 0.0:
         return 0.0
@@ -117,7 +114,7 @@ def _counts(
                 out[i] += lines[b, len(edges) - 1]
                 continue
             start = p[i] - p_b[b] - half
-            start -= turn * (np.floor(start / turn) + 1.0)  # the copy below the travel
+            start -= turn * (np.floor(start / turn) + 1.0)  # the copy of the window that starts below the range
             while start <= span:
                 low = _up_to(start, edges, lines[b], first, step)
                 out[i] += _up_to(start + 2 * half, edges, lines[b], first, step) - low

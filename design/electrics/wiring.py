@@ -73,7 +73,7 @@ def network_of(scanner: Scanner) -> Network:
 
 
 def plug_of(lidar: Lidar) -> str:
-    """Return what a lidar's data go into at the computer."""
+    """Return the port of the computer for the data of a lidar."""
     return "USB lidar" if uart_adapter(lidar) else "data port" if lidar.link is None else PLUG[lidar.link]
 
 
@@ -203,7 +203,7 @@ def _boxes(
 
 
 def connectors_of(lidar: Lidar) -> list[tuple[Cable, Connector]]:
-    """Return each cable of a lidar and what takes its far end on the rotor; none if the catalogue has no cables."""
+    """Return each cable of a lidar and the mate of its far end on the rotor; none if the catalogue has no cables."""
     nets = [net for net, _ in _nets(lidar)]
     tied = len({tie.pin for tie in lidar.tied_pins or ()})
     return [

@@ -1,1 +1,1 @@
-"""What one setting comes to: coverage, gaps, poles, comparison, and their pictures."""
+"""Figures of one mount: coverage, gaps, poles, comparison, and their pictures."""

@@ -1,6 +1,6 @@
-"""The view of a scanner as built: without the beams that its own parts block, compared with the reference mounts.
+"""The view of a scanner without the beams that its own parts block, compared with the reference mounts.
 
-Console, report, studio, `evaluate` and `compare` print the numbers of this record, so that all of them state the same.
+Console, report, studio, `evaluate` and `compare` print the numbers of this record.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Seen:
     Attributes:
         J: the objective, rounded to its error.
         J_error: its error.
-        blind: blind spots of the region, in words.
-        blind_weight: share of the weight of the task that is never seen.
-        blind_fraction: share of the sphere outside the masks that is never seen.
-        least: lowest number of beams per ball in the weighted region, at any start phase.
+        blind: descriptions of the blind spots.
+        blind_weight: blind share of the weight of the task.
+        blind_fraction: blind share of the sphere outside the masks.
+        least: lowest number of beams per ball in the weighted region at any start phase.
         line_gap_deg: widest distance between neighbouring scan lines.
     """
 
@@ -49,7 +49,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceMount:
-    """A reference mount on the same task, without parts: what the scanner gains over it, and what it sees."""
+    """A reference mount on the same task, without parts: the gain of the scanner over it, and its view."""
 
     gain: Gain
     seen: Seen
@@ -61,7 +61,7 @@ class ReferenceMount:
 
     @property
     def factor(self) -> float | None:
-        """Beams per direction of the scanner over those of the mount, in the geometric mean; None if J is no log."""
+        """Ratio of the beams per direction (geometric mean) to those of the mount; None for objectives but `log`."""
         return self.gain.factor
 
 
@@ -70,9 +70,9 @@ class AsBuilt:
     """A scanner and the reference mounts.
 
     Attributes:
-        blocked: share of all beams that its parts block; None if the parts are not known, and nothing is left out.
-        own: what it sees.
-        mounts: the reference mounts, the best one first: it has the smallest factor.
+        blocked: share of the beams that its parts block; None without known parts.
+        own: its view.
+        mounts: the reference mounts, the best one, with the smallest factor, first.
     """
 
     blocked: float | None
@@ -81,15 +81,15 @@ class AsBuilt:
 
     @property
     def parts(self) -> str:
-        """Whether the numbers are with the parts, in two words."""
+        """Whether the numbers are with the parts, as text."""
         return "without parts" if self.blocked is None else "with parts"
 
     def verdict(self) -> list[str]:
-        """A sentence about a reference mount that is as good, if there is one."""
+        """Return a sentence about a reference mount that is as good, if there is one."""
         return verdict(tuple(mount.gain for mount in self.mounts))
 
     def lines(self) -> list[str]:
-        """The same, a line for each number."""
+        """Return the numbers as lines of text."""
         own = self.own
         blocked = "" if self.blocked is None else f", which block {percent(self.blocked)} of the beams"
         return [
@@ -101,7 +101,7 @@ class AsBuilt:
         ]
 
     def facts(self) -> dict[str, Any]:
-        """Names with units and values, for JSON."""
+        """Return the numbers by name, for JSON."""
         mounts = [{**mount.gain.facts(), "seen": asdict(mount.seen)} for mount in self.mounts]
         return {
             "with_parts": self.blocked is not None,
@@ -119,19 +119,9 @@ def as_built(
     own: Score | None = None,
     mounts: tuple[TunedMount, ...] | None = None,
 ) -> AsBuilt:
-    """Judge a setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with its parts.
+    """Evaluate (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] without the beams that `shadow` blocks, if known.
 
-    Args:
-        problem: the task as numbers, with the motion that was built.
-        task: the same: the reference mounts are tuned to what it asks.
-        angles_rad: the setting.
-        shadow: the beams that its parts block; None if they are not known.
-        own: its score with the parts, if it is known already.
-        mounts: the reference mounts, if they are known already.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
-        TaskError: no direction has a weight.
+    `own`, the score with the parts, and the reference mounts are computed if they are not given.
     """
     if own is None:
         own = score(problem, angles_rad) if shadow is None else score_with(problem, angles_rad, shadow)
@@ -146,12 +136,7 @@ def as_built(
 
 
 def seen_of(problem: Problem, angles_rad: Setting, result: Score, shadow: SelfOcclusion | None = None) -> Seen:
-    """Return what a setting of a known score sees, without the beams that `shadow` blocks.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
-        TaskError: no direction has a weight.
-    """
+    """Return the view of a mount with a known score, without the beams that `shadow` blocks."""
     moving = problem if shadow is None else problem.behind(shadow)
     spots = holes(moving, angles_rad)
     blind = [spot.words() for spot in spots]

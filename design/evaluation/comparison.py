@@ -1,20 +1,19 @@
 """The optimum of a task compared with other mounts and products.
 
 The reference mounts (`design.search.mounts.reference`) have the lidar, the servo and the period of the task. Two more
-scanners have products, motion and angles of their own: the shipped tasks `SCANNERS`, the one of the paper and the one
-for little money. So a dollar can be weighed: beams per ball on the geometric mean, `exp(-J) - 1`, over the price,
-next to the range and the noise that it buys. Each counts for its own time.
+scanners, the shipped tasks `SCANNERS`, have other products, motion and angles: that of the paper and a cheap one.
+All are compared by beams per ball (geometric mean, `exp(-J) - 1`) per dollar, range and noise, each over its own time.
 
 Ready-made scanners are the `multibeam` products of the catalogue, mounted upright with x ahead. Their layers are cones
-about the axis, so their density is zonal as that of a fan whose bearings are the elevations and whose plane holds the
-axis: all that is true of a fan here is true of them. Each is judged twice, for one turn and for the whole turns that
-fit into the period of the task. Turns are not alike: the speed varies by some 3 rpm, so that the sensor "fills in the
-gaps" over time (VLS-128 User Manual, section 8.3.2); how evenly is not documented. But g is convex, so for any turns,
+about the axis, so they are computed as a field of view whose bearings are the elevations, in a plane that contains the
+axis. Each has two rows: one turn, and the complete turns within the period of the task. The speed varies by some 3 rpm,
+so that the sensor "fills in the gaps" over time (VLS-128 User Manual, section 8.3.2); how evenly is not documented. As
+g is convex, for any turns
 
     g(n mean)  <=  < g(d_1 + .. + d_n) >  <=  < g(n d_1) >,
 
-the left side for turns that interlace to the mean, the right one for turns that repeat each other. J is the middle, and
-half of the distance goes into `J_error`. Not modelled: azimuth offsets of the single lasers, range, dropouts.
+with equality on the left if turns interlace to the mean, and on the right if they repeat. J is the middle, and half of
+the difference is part of `J_error`. Not modelled: azimuth offsets of single lasers, range, dropouts.
 """
 
 from __future__ import annotations
@@ -49,37 +48,37 @@ from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import sample_set, spiral
 from scanwright.design.task.task import LoadedTask, load_task
 
-LAYERED = 5.0  # every layer has edges inside the segments: the usual estimate is too small by up to this
-UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # a fan in the plane x-z that turns about z: bearings are elevations
+LAYERED = 5.0  # factor of the usual error estimate, since every layer has edges inside the segments
+UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # scan plane x-z that turns about z: bearings are elevations
 AS_BUILT = "as built, with parts"
-SCANNERS = ("ground_ahead", "low_cost")  # shipped tasks: their products, motion and allowed angles
-PHASES = 4  # start phases, and directions, for a scanner that sees part of a turn only: it is no longer zonal
-DIRECTIONS = 10_000
+SCANNERS = ("ground_ahead", "low_cost")  # shipped tasks
+PHASES = 4  # start phases for a scanner that sees part of a turn, so is not rotationally symmetric
+DIRECTIONS = 10_000  # for the same
 BLIND_DIRECTIONS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
-    """One candidate over one time.
+    """One candidate over one measuring time.
 
     Attributes:
         name: of the candidate.
         setting: its mounting angles or orientation.
-        time_s: what it measures for; all numbers but points_per_s are of this time.
+        time_s: measuring time, to which all numbers but points_per_s refer.
         turns: of the axis in that time.
         J: the objective of the task.
-        J_error: a bound on its error.
-        blind_fraction: of the unmasked sphere, never seen.
-        blind_weight: share of the weight of the task, never seen.
-        gap_deg: widest distance between neighbouring scan lines or layers, across them.
-        layers: circles about the axis on which beams run: beams of the 2D lidar, lasers of a multibeam.
-        points_per_s: measurements per second; as the maker states it for a multibeam.
-        range_stated_m: farthest, as the maker of the lidar states it; None for a multibeam, whose catalogue has none.
-        range_practical_m: farthest that users of the lidar get, as stated if unknown; None likewise.
+        J_error: bound of its error.
+        blind_fraction: blind share of the unmasked sphere.
+        blind_weight: blind share of the weight of the task.
+        gap_deg: widest distance between neighbouring scan lines or layers, perpendicular to them.
+        layers: beams of the 2D lidar, or lasers of a multibeam.
+        points_per_s: measurements per second; for a multibeam as stated by its maker.
+        range_stated_m: largest range as stated by the maker of the lidar; None for a multibeam (not in the catalogue).
+        range_practical_m: largest range that users of the lidar get, else as stated; None likewise.
         range_sigma_mm: noise of one range; None likewise.
-        beams_per_ball: exp(-J) - 1, the geometric mean; None for an objective that is no logarithm.
-        beams_per_ball_per_usd: None as well where a price is not known.
-        cost_usd: lidar, servo and slip ring, or the scanner; None where a price is not known.
+        beams_per_ball: exp(-J) - 1, the geometric mean; None for objectives other than `log`.
+        beams_per_ball_per_usd: also None if a price is unknown.
+        cost_usd: lidar, servo and slip ring, or the scanner; None if a price is unknown.
     """
 
     name: str
@@ -109,19 +108,9 @@ def compare(
     progress: Progress = no_progress,
     built: tuple[Setting, SelfOcclusion] | None = None,
 ) -> list[ComparisonRow]:
-    """Rows of the answer, the reference mounts, other scanners, and every multibeam of the catalogue.
+    """Return rows of the optimum, the reference mounts, other scanners, and every multibeam of the catalogue.
 
-    Args:
-        loaded: the task.
-        problem: its numbers.
-        best: its answer, the first family of `search`.
-        mounts: the reference mounts.
-        progress: called with each step.
-        built: setting [rad] of a build of the task, and the beams that its parts block: the first row.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
-        TaskError: no direction has a weight.
+    `built`, the angles [rad] of a build and the beams that its parts block, makes the first row.
     """
     rows = [_rotating("optimum", loaded, problem, best.angles_rad, best.score)]
     if built is not None:
@@ -145,15 +134,9 @@ def compare(
 
 
 def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRow:
-    """The row of a multibeam over a number of turns.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
-    if np.ptp(product.azimuth_deg) == 360:
-        J, J_error, blind_fraction, blind_weight = _zonal(problem, product, turns)
-    else:
-        J, J_error, blind_fraction, blind_weight = sampled(problem, product, turns)
+    """Return the row of a multibeam over a number of turns."""
+    figures = _zonal if np.ptp(product.azimuth_deg) == 360 else sampled
+    J, J_error, blind_fraction, blind_weight = figures(problem, product, turns)
     return ComparisonRow(
         name=product.name,
         setting="upright",
@@ -174,14 +157,14 @@ def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRo
 
 
 def layer_lines(product: Multibeam) -> ScanLines:
-    """Directions in azimuth that each layer measures in one turn: a whole number of them, evenly spread."""
+    """Return the azimuths of the measurements of each layer in one turn, with the step rounded to an integer number."""
     span = np.ptp(product.azimuth_deg)
     count = max(1, round(span / product.azimuth_step_deg))
     return ScanLines(count, float(np.radians(span / count)))
 
 
 def multibeam_scan(product: Multibeam, start: float = 0.0) -> Float[ndarray, "n 3"]:
-    """Directions of one turn, upright, shape (lines * layers, 3); `start` is the start phase in azimuth steps."""
+    """Return the directions of one turn, shape (lines * layers, 3); `start` is the start phase in azimuth steps."""
     lines = layer_lines(product)
     azimuth = np.radians(product.azimuth_deg[0]) + lines.angles_rad + start * lines.step_rad
     p, e = np.meshgrid(azimuth, np.radians(product.elevations_deg), indexing="ij")
@@ -189,7 +172,7 @@ def multibeam_scan(product: Multibeam, start: float = 0.0) -> Float[ndarray, "n 
 
 
 def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:
-    """J, J_error, blind share of the sphere and of the weight, by ball search: for azimuths that are no full turn."""
+    """Return J, J_error, blind share of the sphere and of the weight by counting, for less than a full turn."""
     scans = [multibeam_scan(product, (i + 0.5) / PHASES) for i in range(PHASES)]
 
     def counts(directions: Array) -> Counts:
@@ -216,15 +199,10 @@ def sampled(problem: Problem, product: Multibeam, turns: int) -> tuple[float, fl
     unseen = counts(sphere[~problem.field.masked_at(sphere)]).max(axis=0) == 0
     middles = (np.array(uppers) + lowers) / 2
     J, J_error = float(middles.mean()), 0.0
-    if np.isfinite([*uppers, *lowers]).all():  # else it sees nothing: an objective that divides by counts is infinite
+    if np.isfinite([*uppers, *lowers]).all():  # else there are no beams, and the objective divides by counts
         J_error = float(np.mean(uppers) - np.mean(lowers)) / 2
         J_error += 4 * float(np.std(middles, ddof=1)) / len(middles) ** 0.5 if len(middles) > 1 else 0.0
-    return (
-        J,
-        J_error,
-        float(unseen.mean()) if len(unseen) else 0.0,
-        float(np.mean(blind)),
-    )
+    return J, J_error, float(unseen.mean()) if len(unseen) else 0.0, float(np.mean(blind))
 
 
 def _rotating(
@@ -258,25 +236,25 @@ def _rotating(
 
 
 def bought(loaded: LoadedTask) -> list[Lidar | Servo | SlipRing]:
-    """The products of a task whose prices are its cost."""
+    """Return the products whose prices are the cost of a task."""
     ring = loaded.task.slip_ring
     return [loaded.lidar, loaded.servo, *([loaded.products.get(ring, SlipRing)] if ring else [])]
 
 
 def _value(problem: Problem, J: float, cost_usd: float | None) -> dict[str, float | None]:
-    """What a row sees, costs, and sees for a dollar, under the names of its fields."""
+    """Return beams per ball, cost, and their ratio, by the names of the fields of a row."""
     beams = beams_per_ball(problem.objective, J)
     each = None if beams is None or cost_usd is None else beams / cost_usd
     return {"beams_per_ball": beams, "beams_per_ball_per_usd": each, "cost_usd": cost_usd}
 
 
 def _zonal(problem: Problem, product: Multibeam, turns: int) -> tuple[float, float, float, float]:
-    """J, J_error, blind share of the sphere and of the weight, of layers that run all around."""
+    """Return J, J_error, blind share of the sphere and of the weight of a multibeam with a full turn of azimuths."""
     lines = layer_lines(product)
     fan = problem.with_beams(np.radians(product.elevations_deg), replace(lines, repeats=turns))
     judged = score_on(fan, UPRIGHT_RAD, NODES)
     J, half = judged.J, LAYERED * judged.J_error
     if turns > 1:
         J, half = (judged.J + judged.J_lower) / 2, half + (judged.J - judged.J_lower) / 2
-    full = abs(lines.step_rad / np.radians(product.azimuth_step_deg) - 1)  # -ln(1 + d) moves by less than d does
-    return J, half + full, coverage(fan, UPRIGHT_RAD).blind_fraction, judged.blind_weight
+    rounding = abs(lines.step_rad / np.radians(product.azimuth_step_deg) - 1)  # of d; -ln(1 + d) changes by less
+    return J, half + rounding, coverage(fan, UPRIGHT_RAD).blind_fraction, judged.blind_weight

@@ -1,4 +1,4 @@
-"""The picture of a comparison: one line of bars per candidate, readable in grey."""
+"""The picture of a comparison: one row of bars for each candidate."""
 
 from __future__ import annotations
 
@@ -17,12 +17,9 @@ OPTIMUM = {"color": INK}
 
 
 def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
-    """Bars of -J, blind share of the weight, widest gap, cost, and what a dollar sees, one candidate below the other.
+    """Write bars of -J, blind share of the weight, widest gap, cost, and beams per ball and dollar to a PNG and an SVG.
 
-    Args:
-        path: PNG to write; an SVG of the same name is written too.
-        rows: of the comparison, the optimum first; a candidate with two rows gets two bars, the shorter time below.
-        title: line above all.
+    The first row is the optimum; a candidate with two rows gets two bars, the shorter time below.
     """
     names = list(dict.fromkeys(row.name for row in rows))
     longest = {name: max(row.time_s for row in rows if row.name == name) for name in names}
@@ -34,19 +31,19 @@ def compare_picture(path: Path, rows: list[ComparisonRow], title: str) -> None:
     J, blind, gap, cost, value = figure.subplots(1, 5, sharey=True, width_ratios=[2.2, 1.2, 1.2, 1.2, 1.2])
     for row in full:
         y = names.index(row.name)
-        look = OPTIMUM if row is rows[0] else LONG
+        style = OPTIMUM if row is rows[0] else LONG
         place, height = (y - 0.2, 0.38) if row.name in twice else (y, 0.6)
-        J.barh(place, -row.J, height=height, xerr=row.J_error, ecolor="#999999", **look)
+        J.barh(place, -row.J, height=height, xerr=row.J_error, ecolor="#999999", **style)
         J.text(-row.J, place, f" {-row.J + 0.0:.2f}", va="center", fontsize=8)
-        blind.barh(y, 100 * row.blind_weight, height=0.6, **look)
+        blind.barh(y, 100 * row.blind_weight, height=0.6, **style)
         blind.text(100 * row.blind_weight, y, f" {percent(row.blind_weight)}", va="center", fontsize=8)
-        gap.barh(y, row.gap_deg, height=0.6, **look)
+        gap.barh(y, row.gap_deg, height=0.6, **style)
         gap.text(row.gap_deg, y, f" {row.gap_deg:.3g}", va="center", fontsize=8)
         if row.cost_usd is not None:
-            cost.barh(y, row.cost_usd / 1000, height=0.6, **look)
+            cost.barh(y, row.cost_usd / 1000, height=0.6, **style)
         cost.text((row.cost_usd or 0) / 1000, y, _thousands(row.cost_usd), va="center", fontsize=8)
         if row.beams_per_ball_per_usd is not None:
-            value.barh(y, row.beams_per_ball_per_usd, height=0.6, **look)
+            value.barh(y, row.beams_per_ball_per_usd, height=0.6, **style)
             value.text(row.beams_per_ball_per_usd, y, f" {row.beams_per_ball_per_usd:.2g}", va="center", fontsize=8)
     for row in single:
         place = names.index(row.name) + 0.2

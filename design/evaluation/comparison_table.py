@@ -1,4 +1,4 @@
-"""A comparison in words and as CSV."""
+"""A comparison as text and as CSV."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ IN_THE_TABLE = ("scan_rate_hz", "range_max_mm", "range_practical_mm", "range_sig
 
 
 def short_table(rows: list[ComparisonRow]) -> list[str]:
-    """Return the columns that a person chooses by, in at most 100 columns of text."""
+    """Return the most important columns as lines of at most 100 characters."""
     width = min(max(len(row.name) for row in rows), _NAME)
     return [
         f"{'':{width}} time [s] {'J':>8} {'beams':>7} {'blind':>7} gap [deg] noise [mm] {'USD':>7}",
@@ -54,14 +54,14 @@ def table(rows: list[ComparisonRow]) -> list[str]:
 
 
 def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
-    """The meaning of the columns, the J without meaning, and the unverified numbers."""
+    """Return notes on the columns, on candidates without beams in the region, and on unverified numbers."""
     ball = loaded.task.density.ball_radius_deg
     names = {row.name for row in rows}
     blind = dict.fromkeys(row.name for row in rows if row.blind_weight == 1)
     others = [load_task(Path(name)) for name in SCANNERS if name in names]
     products = dict.fromkeys(product for task in (loaded, *others) for product in bought(task))
-    doubts = [(product.name, _doubted(product)) for product in products]
-    doubts += [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam)]
+    unverified = [(product.name, _unverified(product)) for product in products]
+    unverified += [(p.name, p.unverified()) for p in loaded.products if isinstance(p, Multibeam)]
     without = f"all rows but {AS_BUILT!r} are" if AS_BUILT in names else "every row is"
     return [
         f"parts: {without} without parts",
@@ -76,20 +76,20 @@ def notes(loaded: LoadedTask, rows: list[ComparisonRow]) -> list[str]:
         "ready-made scanners are upright; one tilt (pitch or roll) and Bonn (twist) are tuned to this task",
         f"{' and '.join(SCANNERS)}: scanners of the shipped tasks of that name, their products, motion and angles",
         *(f"{name} sees nothing of the weight: its J is that of no beam, and has no error" for name in blind),
-        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in doubts if fields),
+        *(f"not verified of {name}: {', '.join(fields)}" for name, fields in unverified if fields),
     ]
 
 
 def write_csv(path: Path, rows: list[ComparisonRow]) -> None:
-    """The rows under the names of their fields; what is not known is empty."""
+    """Write the rows, with the names of their fields as heading; unknown values are empty."""
     with atomic_write(path, BuildError) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(ComparisonRow)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
 
 
-def _doubted(product: Product) -> list[str]:
-    """Unverified values in the table."""
+def _unverified(product: Product) -> list[str]:
+    """Return the unverified values of the table."""
     return [field for field in product.unverified() if field in IN_THE_TABLE]
 
 

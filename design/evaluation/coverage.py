@@ -1,4 +1,4 @@
-"""What a setting sees and what not, on the unmasked sphere."""
+"""Blind and masked shares of the sphere, mean beam density, and points per square metre of a mount."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from scanwright.design.task.task import LoadedTask
 
 CIRCLES = 10_000
 TABLE = 3601  # polar angles
-UNSEEN = 1e-9  # mean beams in a ball: rounding
-HIDDEN = 0.005  # share of a region behind the masks that is not reported
-MOST_HIDDEN = 0.5  # share of a region above which the scanner misses its purpose
+UNSEEN = 1e-9  # mean beams in a ball that are rounding
+HIDDEN = 0.005  # masked share of a region that is not reported
+MOST_HIDDEN = 0.5  # masked share of a region above which the scanner misses its purpose
 
 
 def hidden_regions(loaded: LoadedTask) -> tuple[Finding, ...]:
@@ -53,11 +53,11 @@ def hidden_regions(loaded: LoadedTask) -> tuple[Finding, ...]:
 def hidden_share(loaded: LoadedTask, region: Region) -> float:
     """Return the share of the weight of one region of the task that the masks hide."""
     unmasked = replace(loaded, task=loaded.task.model_copy(update={"mask": ()}))
-    seen, whole = (
+    seen, unhidden = (
         total_weight(field_of(each, lambda other: float(other is region), background=0.0))
         for each in (loaded, unmasked)
     )
-    return 1 - seen / whole if whole > 0 else 0.0
+    return 1 - seen / unhidden if unhidden > 0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +65,8 @@ class Coverage:
     """Shares of solid angle.
 
     Attributes:
-        blind_fraction: of the unmasked sphere without a beam at any start phase.
-        masked_fraction: of the whole sphere, what the robot hides.
+        blind_fraction: share of the unmasked sphere that is blind at every start phase.
+        masked_fraction: masked share of the sphere.
     """
 
     blind_fraction: float
@@ -74,10 +74,10 @@ class Coverage:
 
 
 def coverage(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None = None) -> Coverage:
-    """Blind and masked share of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], behind its parts.
+    """Return the blind and masked shares for (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
     Raises:
-        BuildError: the shadow is of another number of beams.
+        BuildError: `shadow`, the beams that its parts block, has another number of beams.
     """
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     if problem.sweep is not None or (shadow is not None and shadow.partly().any()):
@@ -94,7 +94,7 @@ def coverage(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None
 
 
 def _on_directions(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Coverage:
-    """Coverage over directions of equal solid angle, for a blind region that is no zone about the axis."""
+    """Return the coverage from directions of equal solid angle, for a density without rotational symmetry."""
     directions = spiral(CIRCLES)
     masked = problem.field.masked_at(directions)
     seen = mean_density_at(problem, angles_rad, directions[~masked], shadow) > UNSEEN
@@ -104,13 +104,9 @@ def _on_directions(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion 
 def mean_density_at(
     problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: SelfOcclusion | None = None
 ) -> Float[ndarray, " n"]:
-    """Return the mean number of beams per ball at unit vectors (n, 3), without the beams that `shadow` blocks.
+    """Return the mean number of beams per ball at unit vectors, without the beams that `shadow` blocks.
 
-    It is read from a table over the polar angle if the axis turns all around and no fixed part blocks a
-    beam.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
+    It is interpolated in a table over the polar angle if the axis makes full turns.
     """
     if shadow is not None:
         return _density_behind(problem, angles_rad, directions, shadow)
@@ -126,7 +122,7 @@ def mean_density_at(
 def _density_behind(
     problem: Problem, angles_rad: Setting, directions: Float[ndarray, "n 3"], shadow: SelfOcclusion
 ) -> Float[ndarray, " n"]:
-    """Mean beams per ball behind parts: beams that are free at every axis angle, and those that are free at some."""
+    """Return `mean_density_at` as the sum over beams that are always free and beams that are free at some angles."""
     seen, partly = problem.behind(shadow), shadow.partly()
     if shadow.stator is None or not partly.any():
         return mean_density_at(seen, angles_rad, directions)
@@ -139,10 +135,7 @@ def _density_behind(
 
 
 def points_per_m2(problem: Problem, angles_rad: Setting, surface: Surface) -> Float[ndarray, "rows columns"]:
-    """Points per square metre of surface in the mean over the start phase, shape (rows, columns); 0 where none is.
-
-    Beams per steradian, from those within the ball, over the square metres that lie behind a steradian.
-    """
+    """Return the mean points per square metre of surface over the start phase; 0 without a surface."""
     area = surface.area_per_sr()
     density = mean_density_at(problem, angles_rad, surface.directions.reshape(-1, 3)).reshape(area.shape)
     per_sr = density / (2 * np.pi * (1 - np.cos(problem.ball_rad)))
@@ -150,7 +143,7 @@ def points_per_m2(problem: Problem, angles_rad: Setting, surface: Surface) -> Fl
 
 
 def on_surfaces(problem: Problem, angles_rad: Setting, surface: Surface) -> dict[str, float]:
-    """Points per square metre in the weighted region: the lowest, and the median by area."""
+    """Return the lowest and the median (by area) points per square metre in the weighted region."""
     density = points_per_m2(problem, angles_rad, surface).ravel()
     directions = surface.directions.reshape(-1, 3)
     solid_angle = np.sqrt(1 - directions[:, 2] ** 2)  # of equal cells in theta and phi
@@ -162,7 +155,7 @@ def on_surfaces(problem: Problem, angles_rad: Setting, surface: Surface) -> dict
 
 
 def _unmasked(problem: Problem, axis: Vector, low_rad: float, high_rad: float) -> float:
-    """Share of the whole sphere that lies between two polar angles and outside the masks."""
+    """Return the share of the sphere between two polar angles about an axis and outside the masks."""
     height = np.cos(low_rad) - np.cos(high_rad)
     z = np.cos(low_rad) - height * (np.arange(CIRCLES) + 0.5) / CIRCLES
     _, shares = problem.field.on_circles(axis, np.arccos(np.clip(z, -1, 1)))

@@ -1,4 +1,4 @@
-"""Pictures of densities: theta down, phi across, the weighted region drawn in."""
+"""Pictures of beam densities over theta and phi, with the weighted region."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STEP_DEG = 0.5
 INK = "#111111"
 SEEN = 1e-9  # mean beams in a ball
 EXTENT = (-180, 180, 180, 0)
-LEAST_FACTOR, MOST_FACTOR = 2.0, 10.0  # at the ends of the colours of a ratio
+LEAST_FACTOR, MOST_FACTOR = 2.0, 10.0  # bounds of the colour scale of a ratio
 ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 
 
@@ -36,18 +36,10 @@ def density_picture(
 def density_figure(
     problem: Problem, settings: Mapping[str, Setting], title: str, shadow: SelfOcclusion | None = None
 ) -> Figure:
-    """Density maps one above the other on one colour scale; of two or more, the first one over the second below them.
+    """Return density maps on one colour scale, and below them the ratio of the first two, if there are two.
 
-    Densities span decades, so that a gain of a half is an invisible shade: the ratio shows its place.
-
-    Args:
-        problem: the task as numbers.
-        settings: title of each map and its (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], from the top.
-        title: line above all.
-        shadow: beams that the parts of the first setting block; none if they are not known.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
+    `settings` maps titles to (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], from the top; `shadow` are the beams
+    that the parts of the first one block.
     """
     theta = np.arange(STEP_DEG / 2, 180, STEP_DEG)
     phi = np.arange(-180 + STEP_DEG / 2, 180, STEP_DEG)
@@ -80,20 +72,16 @@ def density_figure(
         _ratio(axes[-1], own, other, weight * ~masked)
         _frame(axes[-1], phi, theta, weight, masked)
         axes[-1].set_facecolor("#bbbbbb")
-        axes[-1].set_title(f"{_short(first)} over {_short(second)}: how many times the beams", fontsize=10, loc="left")
+        names = f"{first.split(':')[0]} over {second.split(':')[0]}"
+        axes[-1].set_title(f"{names}: how many times the beams", fontsize=10, loc="left")
     axes[-1].set_xlabel("phi [deg] (0 is ahead, 90 is left)")
     axes[-1].set_xticks(range(-180, 181, 45))
     figure.suptitle(title, fontsize=11)
     return figure
 
 
-def _short(title: str) -> str:
-    """The part of a map's title before the colon."""
-    return title.split(":")[0]
-
-
 def _ratio(axis: Axes, own: Array, other: Array, weight: Array) -> None:
-    """One density over another where both see; colours reach as far as the ratio does where it counts."""
+    """Draw the ratio of two densities; the colour scale covers 95 % of the weighted region."""
     both = (own > SEEN) & (other > SEEN)
     ratio = np.ma.masked_where(~both, np.divide(own, other, out=np.ones_like(own), where=both))
     counts = both & (weight > 0)
@@ -109,7 +97,7 @@ def _ratio(axis: Axes, own: Array, other: Array, weight: Array) -> None:
 
 
 def _frame(axis: Axes, phi: Array, theta: Array, weight: Array, masked: Bool[ndarray, "rows columns"]) -> None:
-    """What counts, what is hidden, and the angles."""
+    """Draw the outline of the weighted region, the masks and the axes."""
     axis.set_facecolor("white")
     if np.ptp(weight) > 0:
         levels = np.unique(weight)

@@ -1,4 +1,4 @@
-"""The report on one setting: its figures (`facts`, for programs) and the same in words (`lines`)."""
+"""Evaluation of one mount: its figures, as JSON (`facts`) and as text (`lines`)."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from scanwright.design.task.task import LoadedTask
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """Lever arm: offset (x, y) of the optical centre from the rotation axis, as seen at a range.
+    """Lever arm: offset (x, y) of the optical centre from the rotation axis.
 
     Attributes:
         x_mm: offset along x of the rotation frame.
         y_mm: offset along y of the rotation frame.
-        range_m: range that it is seen at.
+        range_m: range at which its effect is computed.
 
     Raises:
         TaskError: the range is not at least twice the offset.
@@ -54,34 +54,34 @@ class Lever:
             raise TaskError(f"lever: range_m = {self.range_m:g}: must be at least twice the offset, below 1e6")
 
     def shares(self) -> tuple[float, float, float]:
-        """The same as shares of the range: `Problem.lever`."""
+        """Return the offset as a share of the range: `Problem.lever`."""
         return self.x_mm / 1000 / self.range_m, self.y_mm / 1000 / self.range_m, 0.0
 
     def words(self) -> str:
-        """What all figures hold for."""
+        """Return the offset, and the range to which all figures refer, as text."""
         return f"optical centre ({self.x_mm:g}, {self.y_mm:g}) mm off the axis: all figures hold at {self.range_m:g} m"
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """One setting of a task, judged.
+    """Figures of one mount for a task.
 
     Attributes:
         problem: the task as numbers.
-        angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        lever: distance for which they hold, if the optical centre is off the axis.
+        angles_rad: (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        lever: lever arm, if the optical centre is off the axis.
         score: J by the closed form.
-        ball: J by the paper's ball search over simulated scans.
-        holes: blind places of the region.
-        coverage: what is blind and what is masked.
+        ball: J by ball search over simulated scans.
+        holes: blind spots of the region.
+        coverage: blind and masked shares.
         gaps: blind cones, gaps and crossings of scan lines.
-        cap: the largest empty cap of a sweep; None for a spin, whose blind cones say it.
-        interlaced_s: the period whose next turn fills the gaps of this one; None if the axis does not spin.
-        rises: by how much J rises where each angle is 1 deg off.
-        hit: the chance to hit a pole, if the task has one.
+        cap: the largest empty cap of a sweep; None for full turns, which have blind cones.
+        interlaced_s: period at which the lines of the next turn lie between those of this one; None without a spin.
+        rises: rise of J if each angle is 1 deg off.
+        hit: the probability to hit a pole, if requested.
         surfaces: points per square metre, if the task has a scene.
-        cloud: error, gaps and points to expect; with the parts of its build, if there is one.
-        as_built: the same setting with these parts; all else is without parts.
+        cloud: expected error, gaps and points, with the parts if known.
+        as_built: figures with the parts of a build; all others are without parts.
     """
 
     problem: Problem
@@ -101,26 +101,26 @@ class Evaluation:
     as_built: AsBuilt | None
 
     def beam_directions(self) -> Float[ndarray, "n 3"]:
-        """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
+        """Return the directions of the beams of one full scan in the world frame, shape (n, 3)."""
         return simulated_beams(self.problem, self.angles_rad)
 
     @property
     def agree(self) -> bool:
-        """Whether J and its ball search differ by no more than both state."""
+        """Whether J by closed form and by ball search differ by no more than their errors."""
         off = abs(self.score.J - self.ball.J)
         return bool(off <= self.score.J_error + self.ball.J_error) or not np.isfinite(off)
 
-    def _doubts(self) -> list[str]:
+    def _disagreement(self) -> list[str]:
         if self.agree:
             return []
         off = abs(self.score.J - self.ball.J) / (self.score.J_error + self.ball.J_error)
         return [f"J and J_ball differ by {off:.1f} times their errors: do not trust this J, and please report the task"]
 
     def facts(self) -> dict[str, Any]:
-        """Names with units and values, for JSON."""
+        """Return the figures by name, for JSON."""
         return {
             **({} if self.lever is None else {"lever": asdict(self.lever)}),
-            "with_parts": False,  # but `as_built`
+            "with_parts": False,  # except `as_built`
             "J": self.score.J,
             "J_error": self.score.J_error,
             "J_lower": self.score.J_lower,
@@ -143,11 +143,11 @@ class Evaluation:
         }
 
     def lines(self) -> list[str]:
-        """Return the same, one line for each figure."""
+        """Return the figures as lines of text."""
         J, ball, seen, gap = self.score, self.ball, self.coverage, self.gaps
         ball_deg = np.degrees(self.problem.ball_rad)
         lines = [
-            *self._doubts(),
+            *self._disagreement(),
             *([] if self.as_built is None else self.as_built.lines()),
             *self.cloud.lines(),
             "without parts:",
@@ -199,19 +199,11 @@ def evaluate(
     shadow: SelfOcclusion | None = None,
     checks: Sequence[Finding] = (),
 ) -> Evaluation:
-    """Judge the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+    """Evaluate (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
-    Args:
-        loaded: the task.
-        angles_rad: the setting.
-        pole: computes the chance to hit it; None for no pole.
-        lever: offset of the optical centre; None for one on the axis.
-        progress: called with what is being computed.
-        shadow: beams that the parts of this very setting block, if it was built.
-        checks: of these parts.
+    `shadow` are the beams that the parts of this mount block and `checks` the checks of these parts, if it was built.
 
     Raises:
-        BuildError: the shadow is of another number of beams.
         TaskError: no direction has a weight, or the lidar cannot measure the pole.
         NumericalError: J differs from a count over simulated beams.
     """
@@ -249,10 +241,10 @@ def evaluate(
 
 
 def setting_rad(angles_deg: Sequence[float]) -> Setting:
-    """The setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] from degrees.
+    """Return mounting angles (alpha_rot, beta_rot, alpha_laser, beta_laser) in radians.
 
     Raises:
-        TaskError: these are not four angles.
+        TaskError: these are not four angles from -360 to 360 degrees.
     """
     if len(angles_deg) != len(NAMES):
         raise TaskError(f"angles_deg = {tuple(angles_deg)}: four numbers in degrees, such as (0, 90, 0, -90)")
@@ -263,7 +255,7 @@ def setting_rad(angles_deg: Sequence[float]) -> Setting:
 
 
 def simulated_beams(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 3"]:
-    """Directions of the beams of one full scan in the world frame, shape (n, 3)."""
+    """Return the directions of the beams of one full scan in the world frame, shape (n, 3)."""
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
     return scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
 

@@ -1,4 +1,4 @@
-"""The cloud to expect of a mount: the error of its points, its widest gap, and its points on the planes of the task."""
+"""The expected cloud of a mount: error of its points, widest gap, and points on the planes of the task."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ DIRECTIONS = 5000  # of the region, for the mean distance from the axis
 
 @dataclass(frozen=True, slots=True)
 class ExpectedError:
-    """Error of a point of a cloud, root mean square over the region; mounting angles calibrated.
+    """Root mean square error of a point over the region, with calibrated mounting angles.
 
     Attributes:
-        at_m: range that the errors hold at.
+        at_m: range of the point.
         range_noise_mm: noise of the lidar, along the beam.
         encoder_mm: steps of the servo's encoder, before `assemble` smooths them.
-        backlash_mm: half of the servo's backlash, if it moves points against each other; null if unknown.
-        backlash_calibrated: whether `calibrate` can correct it: the servo turns both ways, and gravity turns neither.
-        bending_mm: largest bend by gravity that changes over a turn; null without a build.
-        total_mm: root of the sum of the squares of what is known.
+        backlash_mm: half of the servo's backlash, if it moves points relative to each other; null if unknown.
+        backlash_calibrated: whether `calibrate` can correct it: the servo turns both ways, without load by gravity.
+        bending_mm: largest bending by gravity that changes over a turn; null without a build.
+        total_mm: root of the sum of the squares of the known errors.
         most_mm: the same with the largest backlash of the catalogue in place of an unknown one.
     """
 
@@ -50,7 +50,7 @@ class ExpectedError:
     most_mm: float
 
     def words(self) -> str:
-        """Return the error and its parts in a line."""
+        """Return the error and its parts as text."""
         parts = [f"range noise {_figure(self.range_noise_mm)}"]
         if self.backlash_mm is None:
             parts.append("servo backlash unknown")
@@ -76,7 +76,7 @@ class ExpectedCloud:
     Attributes:
         error: of a point at 3 m.
         far: of a point at 5 m; None if the lidar does not reach it.
-        gap: warning of a gap much wider than the spacing of the lines; None if there is none.
+        gap: warning of a gap much wider than the spacing of the lines, if there is one.
         planes: points on ground, ceiling and walls of the task.
         hidden: regions that the masks hide in part.
     """
@@ -88,7 +88,7 @@ class ExpectedCloud:
     hidden: tuple[Finding, ...]
 
     def lines(self) -> list[str]:
-        """Return the same, one line each."""
+        """Return the record as lines of text."""
         far = "" if self.far is None else f", {self.far.short()}"
         return [
             f"{self.error.words()}{far}",
@@ -115,17 +115,9 @@ def expected_cloud(
     shadow: SelfOcclusion | None = None,
     checks: Sequence[Finding] = (),
 ) -> ExpectedCloud:
-    """Return the cloud to expect of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+    """Return the expected cloud of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
 
-    Args:
-        loaded: the task, with the motion of the setting.
-        problem: the same as numbers.
-        angles_rad: the setting.
-        shadow: beams that its parts block, if they are known.
-        checks: of its build; none before it.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
+    `shadow` are the beams that its parts block and `checks` the checks of these parts, if it was built.
     """
     far = expected_error(loaded, problem, angles_rad, checks, FAR_M)
     return ExpectedCloud(
@@ -140,20 +132,20 @@ def expected_cloud(
 def expected_error(
     loaded: LoadedTask, problem: Problem, angles_rad: Setting, checks: Sequence[Finding] = (), at_m: float = AT_M
 ) -> ExpectedError:
-    """Return the error to expect of a point at a range, or at the lidar's practical range if that is shorter.
+    """Return the expected error of a point at a range, or at the lidar's practical range if that is shorter.
 
-    An error of the joint moves a point by its distance from the axis; the mean square of that is over the region.
-    Arguments as for `expected_cloud`.
+    An error of the joint angle moves a point in proportion to its distance from the axis; the root mean square distance
+    over the region is used. Arguments as for `expected_cloud`.
     """
     lidar, servo = loaded.lidar, loaded.servo
     at_m = min(at_m, lidar.practical_range_m)
     samples = weighted_samples(problem.field, DIRECTIONS)
     along = samples.directions @ R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     off_mm = 1000 * at_m * math.sqrt(float(np.average(1 - along**2, weights=samples.weights)))
-    found = {check.code: check for check in checks}
-    sweeps, flanks, bend = problem.sweep is not None, found.get("flanks"), found.get("deflection_turning")
+    by_code = {check.code: check for check in checks}
+    sweeps, flanks, bend = problem.sweep is not None, by_code.get("flanks"), by_code.get("deflection_turning")
     by_gravity = flanks is not None and flanks.severity != "ok"
-    # "ok" without a limit: gravity holds one flank in both directions of a sweep
+    # "ok" without a limit: gravity keeps the gears on one flank in both directions of a sweep
     loose = by_gravity or (sweeps and (flanks is None or flanks.limit is not None))
     backlash_mm: float | None = 0.0
     if loose:

@@ -1,8 +1,8 @@
-"""What a density does not tell: blind cones, gaps between scan lines, how lines cross, what a half turn misses.
+"""Blind cones, gaps between scan lines, angles at which they cross, and the share that half a turn misses.
 
-All in closed form for a fan that spins at constant speed. With gamma the angle between axis and scan-plane normal, the
-plane meets the circle at polar angle t in at most two bearings phi0 +- sigma, sin(gamma) cos(sigma) = cos(t); each
-that lies in the field of view is a family of scan lines there.
+For full turns these have closed forms. With gamma the angle between axis and scan-plane normal, the scan plane meets
+the circle at polar angle t in at most two bearings phi0 +- sigma, sin(gamma) cos(sigma) = cos(t). Each bearing in the
+field of view makes a family of scan lines there.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from scanwright.design.density.beams import beam_directions_rot, line_spacing, p
 from scanwright.design.evaluation.metres import AT_M
 from scanwright.design.findings import Finding
 from scanwright.design.frames import R_rot_laser, R_world_rot
-from scanwright.design.objective.holes import heading
+from scanwright.design.objective.holes import heading, triple
 from scanwright.design.objective.problem import NODES, Problem
 from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.sphere.directions import weighted_samples
 
 DIRECTIONS = 20_000  # of the region, for a sweep and for the widest gap
 WIDE = 3.0
-"""Gaps this many times as wide as the spacing of lines or beams are holes in the pattern: discs between the corners of
-a regular pattern reach the square root of 2, and twice that at the seam where a turn ends."""
+"""Gaps wider than this times the spacing of lines or beams are reported: empty discs in a regular pattern reach the
+square root of 2, and twice that at the end of a turn."""
 
 
 @dataclass(frozen=True, slots=True)
 class BlindCone:
-    """A cone about the axis that no beam enters: the largest empty caps of a dense scan.
+    """A cone that no beam enters.
 
     Attributes:
-        axis_world: unit vector of its middle in the world.
-        half_angle_deg: from its middle to its edge.
+        axis_world: unit vector of its axis in the world.
+        half_angle_deg: half of its opening angle.
     """
 
     axis_world: tuple[float, float, float]
@@ -45,15 +45,14 @@ class BlindCone:
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Shares are of the weight of the task.
+    """Gaps of one mount; shares are of the weight of the task.
 
     Attributes:
-        blind_cones: about the axis and about its opposite, the wider one first; none where beams reach the axis.
-        line_gap_deg: widest distance between neighbouring scan lines of one family, across the lines.
-        seen_twice: where both families of lines come.
-        crossing_deg: mean angle at which they cross there, 0 to 90; None if nothing is seen twice.
-        half_turn_misses: what half a turn does not see of what a full turn sees, in the mean over its start; None for
-            a sweep.
+        blind_cones: about the axis and its opposite, the wider one first, if beams do not reach the axis.
+        line_gap_deg: widest distance between neighbouring scan lines of one family, perpendicular to them.
+        seen_twice: share that both families of lines cover.
+        crossing_deg: mean angle at which they cross, 0 to 90; None if nothing is seen twice.
+        half_turn_misses: mean share of the view of a full turn that half a turn does not see; None for a sweep.
     """
 
     blind_cones: tuple[BlindCone, ...]
@@ -63,16 +62,12 @@ class Gaps:
     half_turn_misses: float | None
 
     def line_gap_mm(self, range_m: float) -> float:
-        """Widest distance between neighbouring scan lines on a wall that faces the scanner at a range."""
+        """Return the widest distance between neighbouring scan lines on a wall that faces the scanner at a range."""
         return float(np.radians(self.line_gap_deg) * range_m * 1000)
 
 
 def gaps(problem: Problem, angles_rad: Setting) -> Gaps:
-    """Gaps of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+    """Return the gaps of mounting angles (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""
     u = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     beams = problem.beams_rot(angles_rad[2:])
     normal = R_rot_laser(angles_rad[2], angles_rad[3])[:, 2]
@@ -82,7 +77,7 @@ def gaps(problem: Problem, angles_rad: Setting) -> Gaps:
     apart, crossing = _between_families(normal, polar_rad)
     total = float(weights.sum())
     weight_twice = float(weights @ twice)
-    # half a turn sees half of what one family sees, and more by how far the second one is ahead or behind
+    # half a turn sees half of the directions of one family, and more if a second family is ahead or behind in azimuth
     misses = np.where(twice, 0.5 - apart / (2 * np.pi), 0.5) * seen
     return Gaps(
         blind_cones=_blind_cones(u, polar_and_azimuth(beams)[0]),
@@ -94,28 +89,16 @@ def gaps(problem: Problem, angles_rad: Setting) -> Gaps:
 
 
 def empty_cap(scan: Float[ndarray, "n 3"]) -> BlindCone:
-    """The largest cap that holds no beam of a simulated scan, unit vectors (n, 3): exact, from the convex hull.
-
-    The plane of a facet cuts a cap off the sphere, and no beam lies beyond it.
-    """
+    """Return the largest cap without a beam of a simulated scan: no beam lies beyond the facets of the convex hull."""
     planes = ConvexHull(scan).equations
     widest = int(planes[:, 3].argmax())
-    x, y, z = (float(value) + 0.0 for value in planes[widest, :3])
-    return BlindCone((x, y, z), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
+    return BlindCone(triple(planes[widest, :3]), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
 
 
 def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]) -> Finding | None:
-    """Return a warning if the region has a gap much wider than the spacing of lines and beams.
+    """Return a warning if the region has a gap much wider than the spacing of lines and beams, but no blind spot.
 
-    None if there is none, and if the region has a blind spot, which is reported on its own.
-
-    Args:
-        problem: the task.
-        angles_rad: the setting (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        beams: of one full scan, unit vectors of the world.
-
-    Raises:
-        TaskError: no direction has a weight.
+    `beams` are unit vectors of one full scan in the world.
     """
     from scipy.spatial import cKDTree
 
@@ -142,24 +125,20 @@ def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]
 
 
 def interlaced_period_s(period_s: float, scan_rate_hz: float) -> float:
-    """The period nearest to one given whose next turn puts its lines halfway between those of this one."""
+    """Return the nearest period at which the lines of the next turn lie halfway between those of this one."""
     return (np.floor(period_s * scan_rate_hz) + 0.5) / scan_rate_hz
 
 
 def _blind_cones(u: Vector, beam_polar: Float[ndarray, " beams"]) -> tuple[BlindCone, ...]:
     cones = [(u, float(beam_polar.min())), (-u, float(np.pi - beam_polar.max()))]
-    result = [
-        BlindCone((float(a[0]) + 0.0, float(a[1]) + 0.0, float(a[2]) + 0.0), float(np.degrees(h)))
-        for a, h in cones
-        if h > 1e-9
-    ]
+    result = [BlindCone(triple(axis), float(np.degrees(half))) for axis, half in cones if half > 1e-9]
     return tuple(sorted(result, key=lambda cone: -cone.half_angle_deg))
 
 
 def _around(
     problem: Problem, angles_rad: Setting
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Bool[ndarray, "2 n"]]:
-    """Polar angles, their weights, and the families that come there, if the axis turns all around."""
+    """Return polar angles, their weights, and whether each family covers them, for full turns."""
     rule, _, _ = polar_rule(problem, angles_rad, NODES)
     return rule.polar_rad, rule.fine, _families(problem.bearings_rad, angles_rad[2:], rule.polar_rad)[0]
 
@@ -167,7 +146,7 @@ def _around(
 def _within_limits(
     problem: Problem, angles_rad: Setting
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Bool[ndarray, "2 n"]]:
-    """The same at directions, for a sweep: a family comes where the joint angle it needs lies within the limits."""
+    """Return polar angles of directions, their weights, and whether each family covers them within the sweep limits."""
     assert problem.sweep is not None
     samples = weighted_samples(problem.field, DIRECTIONS)
     polar, azimuth = polar_and_azimuth(samples.directions @ R_world_rot(angles_rad[0], angles_rad[1]))
@@ -180,7 +159,7 @@ def _within_limits(
 def _families(
     bearings_rad: Float[ndarray, " beams"], plane_rad: Plane, polar_rad: Float[ndarray, " n"]
 ) -> tuple[Bool[ndarray, "2 n"], Float[ndarray, "2 n"]]:
-    """Whether each of the two bearings of a polar angle lies in the field of view, and the bearings, (2, n) both."""
+    """Return whether each of the two bearings of a polar angle lies in the field of view, and the bearings."""
     alpha, beta = plane_rad
     q = np.array([-np.sin(beta), np.cos(beta) * np.sin(alpha)])
     slope = np.hypot(*q)  # sin(gamma)
@@ -191,21 +170,23 @@ def _families(
     met = np.abs(ratio) <= 1
     sigma = np.arccos(np.clip(ratio, -1, 1))
     both = np.stack([nearest + sigma, nearest - sigma])
-    return met & _in_fan(bearings_rad, both), both
+    return met & _in_field_of_view(bearings_rad, both), both
 
 
-def _in_fan(bearings_rad: Float[ndarray, " beams"], asked_rad: Float[ndarray, "2 n"]) -> Bool[ndarray, "2 n"]:
-    """Whether a beam is no farther than half of the usual step: a fan may have a hole at the housing."""
+def _in_field_of_view(
+    bearings_rad: Float[ndarray, " beams"], tested_rad: Float[ndarray, "2 n"]
+) -> Bool[ndarray, "2 n"]:
+    """Return whether a beam is within half of the usual step: a field of view can have a gap at the housing."""
     turn = 2 * np.pi
-    beams_rad, asked_rad = np.sort(_within_a_turn(bearings_rad)), _within_a_turn(asked_rad)
+    beams_rad, tested_rad = np.sort(_within_a_turn(bearings_rad)), _within_a_turn(tested_rad)
     around_rad = np.concatenate([beams_rad[-1:] - turn, beams_rad, beams_rad[:1] + turn])
-    behind = np.searchsorted(around_rad, asked_rad, "right")
-    nearest_rad = np.minimum(asked_rad - around_rad[behind - 1], around_rad[behind] - asked_rad)
+    behind = np.searchsorted(around_rad, tested_rad, "right")
+    nearest_rad = np.minimum(tested_rad - around_rad[behind - 1], around_rad[behind] - tested_rad)
     return nearest_rad <= np.median(np.diff(np.sort(bearings_rad))) / 2 * (1 + 1e-9)
 
 
 def _within_a_turn(angle_rad: Array) -> Array:
-    """Angles from 0 to below a whole turn: the remainder of what is just below 0 is rounded to a turn."""
+    """Return angles in [0, 2 pi); the remainder of an angle just below 0 would be rounded to 2 pi."""
     rest = angle_rad % (2 * np.pi)
     return np.where(rest < 2 * np.pi, rest, 0.0)
 
@@ -213,10 +194,10 @@ def _within_a_turn(angle_rad: Array) -> Array:
 def _between_families(
     normal: Vector, polar_rad: Float[ndarray, " n"]
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
-    """Azimuth between the two lines through a polar angle, 0 to pi, and the angle at which they cross, 0 to pi/2."""
+    """Return the azimuth between the two lines at a polar angle, 0 to pi, and their crossing angle, 0 to pi/2."""
     slope, upright = np.hypot(normal[0], normal[1]), abs(normal[2])
     sine = np.maximum(np.sin(polar_rad), 1e-12)
-    # in the plane: slope sin(t) cos(azimuth) = -upright cos(t), so the two lie on both sides of the plane's foot
+    # in the scan plane: slope sin(t) cos(azimuth) = -upright cos(t)
     azimuth = np.arccos(np.clip(-upright * np.cos(polar_rad) / np.maximum(slope * sine, 1e-12), -1, 1))
     apart = 2 * np.minimum(azimuth, np.pi - azimuth)
     half = np.arccos(np.clip(upright / sine, -1, 1))

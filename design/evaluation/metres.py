@@ -1,7 +1,6 @@
-"""What one full scan comes to on the planes of a task, in metres: points, gaps, and the smallest thing hit twice.
+"""Points of one full scan on the planes of a task: their density, gaps, and the smallest object that is hit twice.
 
-Every beam of a simulated scan is followed to the plane of a region; the figures come from the points where they end,
-and of what lies within the practical range of the lidar.
+The beams of a simulated scan are intersected with the plane of each region, within the practical range of the lidar.
 """
 
 from __future__ import annotations
@@ -25,36 +24,36 @@ from scanwright.design.sphere.regions import Field
 from scanwright.design.task.shapes import LITTLE, PlaneRegion, beyond_words
 from scanwright.design.task.task import LoadedTask
 
-AT_M = 3.0  # from the optical centre: the distance of the stated gap
-RING = 0.05  # how far from there, as a share of it, the middle of a gap may lie
-CELLS = 64  # along each side of a region, to begin with
+AT_M = 3.0  # distance from the optical centre at which gaps are stated
+RING = 0.05  # relative tolerance of the distance of the centre of a gap
+CELLS = 64  # initial cells along each side of a region
 MOST_CELLS = 200_000
 NO_SPOTS = np.empty((0, 4))
 Nearest = Callable[[Array, list[int]], tuple[Array, Ints]]
-"""Distances from points (n, 3) to those points of a scan that are so many-th nearest, and which they are."""
+"""Maps points (n, 3) and a list of k to the distances to the k-th nearest points of a scan, and their indices."""
 
 Infinite = Annotated[float, WithJsonSchema({"type": ["number", "null"]})]
 """Infinite if there are no points, null in JSON."""
 
 QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
-SPOT = 0.8  # of the widest gap: narrower ones off the axis are listed apart from it
-SLACK = 0.02  # of a diameter: the stated one is at most this much too wide, and never too narrow
+SPOT = 0.8  # gaps off the axis are stated separately if they are narrower than this share of the widest gap
+SLACK = 0.02  # relative error of a stated diameter, which is never too small
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneFigures:
-    """What one full scan leaves on the rectangle of a region.
+    """Points of one full scan on the rectangle of a region.
 
     Attributes:
-        region: in words.
-        range_m: the practical range of the lidar.
-        beyond_range: share of its area that lies beyond; all below refers to the rest.
-        points: beams that end on it.
-        points_per_m2: in the mean over the part of it that no mask hides.
-        at_m: distance from the optical centre to which `gap_cm` refers: `AT_M`, or the nearest to it in the region.
-        gap_cm: diameter of the largest disc without a point whose centre is there; null if there are no points.
-        gap_off_axis_cm: the same without the blind cones around the axis.
-        twice_cm: diameter of the smallest disc that gets two points at any place.
+        region: description of the region.
+        range_m: practical range of the lidar.
+        beyond_range: share of the area beyond that range; the other figures refer to the rest.
+        points: number of points.
+        points_per_m2: mean over the unmasked area.
+        at_m: distance of `gap_cm` from the optical centre: `AT_M`, or the nearest distance within the region.
+        gap_cm: diameter of the largest disc without a point, centred at that distance; null if there are no points.
+        gap_off_axis_cm: the same outside the blind cones around the axis.
+        twice_cm: diameter of the smallest disc that has two points at any place.
     """
 
     region: str
@@ -68,7 +67,7 @@ class PlaneFigures:
     twice_cm: Infinite
 
     def words(self) -> str:
-        """The same in a line."""
+        """Return the figures as a line of text."""
         if self.beyond_range == 1:
             return f"{self.region}: 0 points, as all of it lies beyond the lidar's range of {self.range_m:g} m"
         part = ""
@@ -86,20 +85,16 @@ class PlaneFigures:
 
 
 def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
-    """The regions of a task that are planes and count."""
+    """Return the plane regions of a task with a weight above 0."""
     return [region for region in loaded.task.weight if isinstance(region, PlaneRegion) and region.value > 0]
 
 
 def on_planes(
     loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None = None
 ) -> tuple[PlaneFigures, ...]:
-    """What a full scan of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] leaves on each plane.
+    """Return the points of a full scan of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] on each `planes_of`.
 
-    A region counts if it has a weight above 0. Masked directions are no part of it, and beams that `shadow` blocks do
-    not reach it.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
+    Masked directions do not belong to a region, and beams that `shadow` blocks do not reach it.
     """
     regions = planes_of(loaded)
     if not regions:
@@ -111,11 +106,7 @@ def on_planes(
 
 
 def free_beams(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Float[ndarray, "n 3"]:
-    """Return the beams of one full scan that no mask and no part blocks, unit vectors of the world, shape (n, 3).
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
-    """
+    """Return the beams of one full scan that no mask and no part blocks, as unit vectors in the world, shape (n, 3)."""
     joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
     beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
     free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
@@ -123,9 +114,9 @@ def free_beams(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | No
 
 
 def _spots(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 4"]:
-    """Cones around both ends of the axis that the fan goes around, as direction and cosine; a sweep has none."""
+    """Return the blind cones about both ends of the axis, as direction and cosine; none for a sweep."""
     if problem.sweep is not None:
-        return np.empty((0, 4))
+        return NO_SPOTS
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
     polar, _ = polar_and_azimuth(problem.beams_rot(angles_rad[2:]))
     return np.array([[*axis, np.cos(polar.min())], [*-axis, np.cos(np.pi - polar.max())]])
@@ -138,7 +129,7 @@ def on_plane(
     spots: Float[ndarray, "spots 4"],
     reach_m: float,
 ) -> PlaneFigures:
-    """What beams, unit vectors (n, 3) of the world, leave on one region; `spots` are cones that hold none of them."""
+    """Return the points of beams (unit vectors in the world) on one region; `spots` are cones without beams."""
     corners = np.array(region.corners_m())
     sides = corners[1] - corners[0], corners[3] - corners[0]
     normal = np.cross(*sides)
@@ -158,7 +149,7 @@ def on_plane(
     at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
     from scipy.spatial import cKDTree  # a heavy import that few tasks need
 
-    nearest = cKDTree(ends).query  # what lies just beyond an edge ends a gap too
+    nearest = cKDTree(ends).query  # also of points just outside the region, which limit gaps too
     there = at_m * (1 - RING), at_m * (1 + RING)
     return PlaneFigures(
         region.words(),
@@ -175,7 +166,7 @@ def on_plane(
 
 @dataclass(frozen=True, slots=True)
 class _Plane:
-    """A rectangle: one corner, the sides from there, and what of it does not count: masked, in a cone, out of reach."""
+    """A rectangle: one corner and the sides from it, and its excluded parts: masked, in a cone, or out of reach."""
 
     corner: Vector
     along: Vector
@@ -185,7 +176,7 @@ class _Plane:
     reach_m: float
 
     def near(self) -> _Plane:
-        """The part of it in the square around what is within reach; an empty one if nothing is."""
+        """Return the part of it within the bounding square of its points in reach; empty if there are none."""
         sides = np.stack([self.along, self.across])
         lengths_m = np.linalg.norm(sides, axis=1)
         foot_m = -(sides @ self.corner) / lengths_m
@@ -195,14 +186,14 @@ class _Plane:
         return replace(self, corner=self.corner + low @ sides, along=along, across=across)
 
     def points(self, shares: Float[ndarray, "n 2"]) -> Float[ndarray, "n 3"]:
-        """Points of the rectangle [m] at shares of its sides, 0 .. 1."""
+        """Return the points of the rectangle [m] at shares of its sides, 0 .. 1."""
         return self.corner + shares[:, :1] * self.along + shares[:, 1:] * self.across
 
     def widest(self, nearest: Nearest, k: int, away_m: tuple[float, float]) -> float:
-        """Radius of the widest disc with fewer than k points inside, its middle so far away, at most `SLACK` too wide.
+        """Return the radius [m] of the widest disc with fewer than k points, centred at a distance within `away_m`.
 
-        The distance to the k-th nearest point changes by no more than one goes: cells that can hold no wider disc than
-        the widest that is known are dropped, the others are cut in four.
+        Branch and bound: the distance to the k-th nearest point changes by at most the distance moved, so cells that
+        cannot contain the centre of a wider disc are dropped, and the others are divided into four.
         """
         shares, half = _grid(CELLS), 0.5 / CELLS
         best = bound = 0.0
@@ -215,7 +206,7 @@ class _Plane:
             there = (away_m[0] <= away) & (away <= away_m[1]) & ~masked
             best = max(best, float(result[there].max(initial=0.0)))
             near = (away_m[0] - reach <= away) & (away <= away_m[1] + reach) & (result + reach > best * (1 + SLACK))
-            if masked.any():  # a cell in the midst of what is hidden has no place for a disc
+            if masked.any():  # drop cells that are entirely excluded
                 near &= ~np.all([masked, *(self.hidden(shares + half * step) for step in QUARTERS)], axis=0)
             if not near.any():
                 return best * (1 + SLACK)
@@ -226,7 +217,7 @@ class _Plane:
             shares = (shares[near][:, None] + half * QUARTERS).reshape(-1, 2)
 
     def hidden(self, shares: Float[ndarray, "n 2"]) -> Bool[ndarray, " n"]:
-        """Whether points, given as shares of the sides, are hidden by a mask or a spot, or lie out of reach."""
+        """Return whether points, given as shares of the sides, are masked, in a blind cone, or out of reach."""
         points = self.points(shares)
         away_m = np.linalg.norm(points, axis=1)
         directions = points / away_m[:, None]
@@ -235,11 +226,11 @@ class _Plane:
 
 
 def _grid(cells: int) -> Float[ndarray, "n 2"]:
-    """Middles of cells of a unit square, shape (cells^2, 2)."""
+    """Return the centres of the cells of a unit square, shape (cells^2, 2)."""
     each = (np.arange(cells) + 0.5) / cells
     return np.stack(np.meshgrid(each, each, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def rounded(value: float) -> str:
-    """Two digits, never as a power of ten if the number is large."""
+    """Return a number with two digits, without an exponent if it is large."""
     return f"{value:.2g}" if value < 100 else f"{float(f'{value:.2g}'):,.0f}"

@@ -1,9 +1,9 @@
-"""The chance to hit a thin upright pole: where scan lines run along it, a fast turn passes it by (paper, Fig. 3).
+"""Probability to hit a thin upright pole, which scan lines parallel to it can miss (paper, Fig. 3).
 
-The pole's middle is at the height of the optical centre. Seen from there it fills the azimuths within
-`asin(width / (2 range))` of its own and the elevations within `atan(height / (2 range))` of the horizon; beams are
-lines without a width. For one simulated scan the poles that get at least n beams are in a union of intervals of
-azimuth, one for every n hits in a row, so only the start phase is drawn.
+The middle of the pole is at the height of the optical centre. It covers the azimuths within `asin(width / (2 range))`
+of its own and the elevations within `atan(height / (2 range))` of the horizon; beams have no width. For one simulated
+scan the poles with at least n beams form a union of intervals of azimuth, one for every n successive hits, so only the
+start phase is drawn.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from scanwright.design.density.beams import scan_at
 from scanwright.design.errors import TaskError
 from scanwright.design.objective.problem import Problem
 
-BEAMS = 1, 3  # that a pole is asked for: to be seen at all, and to be more than a stray point
+BEAMS = 1, 3  # required beams: a hit, and more than a stray point
 PHASES = 24
 CELLS = 18_000  # of azimuth, for the weights
-HEIGHTS = 9  # at which a pole's weight is looked up
+HEIGHTS = 9  # elevations at which the weight of a pole is evaluated
 SEED = 0
 
 
@@ -57,7 +57,7 @@ class Pole:
 
 @dataclass(frozen=True, slots=True)
 class Chance:
-    """That a pole gets at least `beams` beams in one full scan, over its azimuth and the start phase.
+    """Probability that a pole gets at least `beams` beams in one full scan, over its azimuth and the start phase.
 
     Attributes:
         beams: required number of beams.
@@ -76,8 +76,8 @@ class PoleChances:
 
     Attributes:
         chances: for each of `BEAMS`.
-        stands: places of the poles: "weighted" by the weight of the task along them; "unmasked" if the region does not
-            reach them, then everywhere outside the masks.
+        stands: distribution of the azimuth of the pole: "weighted" by the weight of the task; or "unmasked", uniform
+            outside the masks, if the region does not contain any of the pole.
     """
 
     chances: tuple[Chance, ...]
@@ -85,7 +85,7 @@ class PoleChances:
 
 
 def require_in_range(pole: Pole, lidar: Lidar) -> None:
-    """Refuse a pole that the lidar cannot measure.
+    """Reject a pole that the lidar cannot measure.
 
     Raises:
         TaskError: it is too near or too far away.
@@ -96,12 +96,12 @@ def require_in_range(pole: Pole, lidar: Lidar) -> None:
 
 
 def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChances:
-    """The chance of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] to hit a pole.
+    """Return the probability of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] to hit a pole.
 
     Raises:
         TaskError: the robot hides every azimuth.
     """
-    weights, stands = _standing(problem, pole)
+    weights, distribution = _azimuth_weights(problem, pole)
     total = float(weights.sum())
     if not total > 0:
         raise TaskError("pole: the robot hides every azimuth at that height; choose a higher or a farther pole")
@@ -110,17 +110,17 @@ def pole_chances(problem: Problem, angles_rad: Setting, pole: Pole) -> PoleChanc
     per_phase = []
     for i in range(PHASES):
         azimuths = _hits(problem, angles_rad, pole, (i + rng.random()) / PHASES, rng)
-        need = [-(-beams // problem.lines.repeats) for beams in BEAMS]  # each is measured that often
+        need = [-(-beams // problem.lines.repeats) for beams in BEAMS]  # each line is measured `repeats` times
         per_phase.append([_share(azimuths, n, pole.half_width_rad, below) for n in need])
-    found = np.array(per_phase)
+    shares = np.array(per_phase)
     cell = 1 / np.count_nonzero(weights)
-    errors = 4 * found.std(axis=0, ddof=1) / PHASES**0.5 + cell
-    chances = [Chance(n, float(p), float(e)) for n, p, e in zip(BEAMS, found.mean(axis=0), errors, strict=True)]
-    return PoleChances(tuple(chances), stands)
+    errors = 4 * shares.std(axis=0, ddof=1) / PHASES**0.5 + cell
+    chances = [Chance(n, float(p), float(e)) for n, p, e in zip(BEAMS, shares.mean(axis=0), errors, strict=True)]
+    return PoleChances(tuple(chances), distribution)
 
 
-def _standing(problem: Problem, pole: Pole) -> tuple[Array, str]:
-    """Probability of a pole in each cell of azimuth, from -pi on, shape (cells,), and its source."""
+def _azimuth_weights(problem: Problem, pole: Pole) -> tuple[Array, str]:
+    """Return the relative probability of a pole in each cell of azimuth from -pi, and the distribution's name."""
     azimuth = -np.pi + 2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS
     elevation = pole.half_height_rad * ((np.arange(HEIGHTS) + 0.5) * 2 / HEIGHTS - 1)
     p, e = (grid.ravel() for grid in np.meshgrid(azimuth, elevation, indexing="ij"))
@@ -132,7 +132,7 @@ def _standing(problem: Problem, pole: Pole) -> tuple[Array, str]:
 
 
 def _hits(problem: Problem, angles_rad: Setting, pole: Pole, start: float, rng: np.random.Generator) -> Array:
-    """Sorted azimuths, -pi to pi, of the beams of one scan that pass at the height of the pole."""
+    """Return the sorted azimuths, -pi to pi, of the unmasked beams of one scan within the height of the pole."""
     if problem.sweep is not None:
         joint = problem.sweep.angles_rad(start)
     else:  # a start anywhere in the turn: between two lines by `start`, and at any of them
@@ -144,23 +144,23 @@ def _hits(problem: Problem, angles_rad: Setting, pole: Pole, start: float, rng: 
 
 
 def _share(azimuths: Array, beams: int, half_rad: float, below: Array) -> float:
-    """Share of the poles within `half_rad` of at least `beams` hits; `below` is the share up to each cell's edge."""
+    """Return the share of the poles within `half_rad` of at least `beams` hits; `below` cumulates it over the cells."""
     if len(azimuths) < beams:
         return 0.0
     around = np.concatenate([azimuths, azimuths[: beams - 1] + 2 * np.pi])
     first, last = around[: len(azimuths)], around[beams - 1 :]
     start, end = last - half_rad, first + half_rad
     start, end = start[end > start], end[end > start]
-    # both rise: each interval adds what lies behind the end of the one before, and before the first one's next turn
+    # starts and ends increase: cut each interval at the end of the one before, and the last at the start of the first
     if not len(start):
         return 0.0
     start = np.maximum(start, np.concatenate([start[:1], end[:-1]]))
     end = np.minimum(end, start[0] + 2 * np.pi)
     start = np.minimum(start, end)
-    return float((_turned(end, below) - _turned(start, below)).sum())
+    return float((_cumulated(end, below) - _cumulated(start, below)).sum())
 
 
-def _turned(azimuth_rad: Array, below: Array) -> Array:
-    """Share of the poles from -pi up to azimuths beyond the turn, going on around."""
+def _cumulated(azimuth_rad: Array, below: Array) -> Array:
+    """Return the share of the poles from -pi up to azimuths of any number of turns."""
     turns, rest = np.divmod((azimuth_rad + np.pi) / (2 * np.pi), 1.0)
     return turns + np.interp(rest, np.linspace(0, 1, len(below)), below)

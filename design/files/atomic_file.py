@@ -26,15 +26,10 @@ def check_place(path: Path, refusal: type[ScanwrightError]) -> None:
 
 
 def place_in(folder: Path, name: str, refusal: type[ScanwrightError]) -> Path:
-    """Return `folder / name` for writing or removing, if no part of `name` is a symbolic link.
+    """Return `folder / name` for writing or removing, if no part of `name`, relative without `..`, is a symbolic link.
 
-    The folder itself can be a link, which the user chose. A link below it can come with a folder of another author;
-    a write or a removal through it would change files outside of the folder.
-
-    Args:
-        folder: the folder of a build, a study, or another result.
-        name: relative to the folder, without `..`.
-        refusal: the error to raise.
+    The folder itself can be a link, which the user chose. A link below it can come with a folder of another author; a
+    write or a removal through it would change files outside of the folder.
 
     Raises:
         ScanwrightError: `refusal`: the file or a folder above it is a symbolic link.

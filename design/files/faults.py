@@ -41,9 +41,7 @@ def format_validation_error(error: ValidationError, source: Path | str, model: t
 def format_faults(faults: Sequence[Fault], source: Path | str) -> str:
     """Return one line for each fault in the order of the file, at most `MOST_REPORTED` and the number of the others.
 
-    Args:
-        faults: the faults.
-        source: a file, whose line numbers are added if it is TOML; or its name.
+    `source` is a file, whose line numbers are added if it is TOML, or its name.
     """
     lines = _key_lines(source) if isinstance(source, Path) and source.suffix == ".toml" else {}
     first = min(lines.values(), default=0)

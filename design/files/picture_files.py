@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from scanwright.design.errors import BuildError
 from scanwright.design.files.atomic_file import atomic_write
 
-DPI = 110  # of the PNG, and of what the SVG holds as pixels: maps and dense meshes
+DPI = 110  # of the PNG, and of pixel images in the SVG
 NO_DATE = {"Date": None, "Creator": None}
 
 
@@ -28,7 +28,7 @@ def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
 
 
 def svg_bytes(figure: Figure, dpi: float = DPI) -> bytes:
-    """A figure as SVG; its letters are outlines, so that no font is missing."""
+    """Return a figure as SVG, with letters as outlines, so that no font is missing."""
     stream = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "scanwright"}):  # its names are random otherwise
         figure.savefig(stream, format="svg", dpi=dpi, metadata=NO_DATE)

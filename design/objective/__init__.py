@@ -1,1 +1,1 @@
-"""What a setting is judged by: the problem, objectives, quadrature, the score, and the ball search as oracle."""
+"""Score of a mount: problem, objectives, quadrature, score, and independent counts."""

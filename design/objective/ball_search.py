@@ -1,7 +1,8 @@
-"""J by the paper's own way, the ball search over a simulated scan: slow, obvious, shares no density with the rest."""
+"""J by the method of the paper, a ball search over simulated scans: an independent check of the closed form."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,71 +17,49 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.sphere.directions import sample_set
 
 PHASES = 8
-SETS = 4  # of directions for every phase: 32 estimates of J, so that their spread is known well enough
-DIRECTIONS = 4000  # for every phase
+SETS = 4  # of directions at each phase: 32 estimates of J, enough to estimate their spread
+DIRECTIONS = 4000  # at each phase
 
 
 @dataclass(frozen=True, slots=True)
 class BallScore:
-    """Mean of the estimates of J, and four standard errors of that mean."""
+    """Mean of the estimates of J, and four standard errors of the mean."""
 
     J: float
     J_error: float
 
 
 def ball_score(problem: Problem, angles_rad: Setting, directions: int = DIRECTIONS) -> BallScore:
-    """Ball search of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], mean over 8 start phases.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
-    if problem.sweep is not None:
-        return _swept_score(problem, angles_rad, directions)
-    return ball_score_on(scan_tree(problem, angles_rad), problem, angles_rad, directions)
+    """Return J of mounting angles (alpha_rot, beta_rot, alpha_laser, beta_laser) by ball search at 8 start phases."""
+    if problem.sweep is None:
+        return ball_score_on(scan_tree(problem, angles_rad), problem, angles_rad, directions)
+    joints = [problem.sweep.angles_rad((i + 0.5) / PHASES) for i in range(PHASES)]
+    return _score(problem, ((scan_tree(problem, angles_rad, joint), np.eye(3)) for joint in joints), directions)
 
 
-def scan_tree(problem: Problem, angles_rad: Setting) -> cKDTree:
-    """The simulated full scan of a setting, ready to be searched; it depends on beams and lines only."""
-    return _tree(scan_at(problem.bearings_rad, problem.lines.angles_rad, angles_rad, problem.lever))
+def scan_tree(problem: Problem, angles_rad: Setting, joint_rad: Array | None = None) -> cKDTree:
+    """Return a search tree of the beams at joint angles, by default of one simulated turn."""
+    joint_rad = problem.lines.angles_rad if joint_rad is None else joint_rad
+    scan = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
+    return cKDTree(scan, balanced_tree=False, compact_nodes=False)
 
 
 def ball_score_on(tree: cKDTree, problem: Problem, angles_rad: Setting, directions: int = DIRECTIONS) -> BallScore:
-    """As `ball_score`, for a scan of a full turn that is there already.
-
-    Another start phase is the same scan turned about the axis, so the directions are turned back instead.
-    """
+    """Return `ball_score` from the tree of a full turn; for other start phases the directions are rotated instead."""
     axis = R_world_rot(angles_rad[0], angles_rad[1])[:, 2]
-    estimates = []
-    for i, phase in enumerate(start_phases(problem.lines.count, problem.lines.step_rad)):
-        back = rotvec_to_matrix(axis * phase)  # rows times R(phase): columns turned back
-        for k in range(SETS):
-            estimates.append(_estimate(tree, problem, back, directions // SETS, SETS * i + k))
-    return _score(problem, estimates)
+    phases = start_phases(problem.lines.count, problem.lines.step_rad)
+    # row vectors times R(phase) are rotated by -phase
+    return _score(problem, ((tree, rotvec_to_matrix(axis * phase)) for phase in phases), directions)
 
 
 def start_phases(lines: int, step_rad: float) -> Float[ndarray, " n"]:
-    """Eight phases spread over the turn and, at once, evenly over the gap between two lines, shape (8,)."""
+    """Return eight start phases [rad] that are spread evenly over the turn and over the gap between two lines."""
     i = np.arange(PHASES)
     return step_rad * (np.round(i * lines / PHASES) + (i + 0.5) / PHASES)
 
 
-def _swept_score(problem: Problem, angles_rad: Setting, directions: int) -> BallScore:
-    assert problem.sweep is not None
-    estimates = []
-    for i in range(PHASES):
-        joint = problem.sweep.angles_rad((i + 0.5) / PHASES)
-        tree = _tree(scan_at(problem.bearings_rad, joint, angles_rad, problem.lever))
-        for k in range(SETS):
-            estimates.append(_estimate(tree, problem, np.eye(3), directions // SETS, SETS * i + k))
-    return _score(problem, estimates)
-
-
-def _tree(scan: Float[ndarray, "n 3"]) -> cKDTree:
-    return cKDTree(scan, balanced_tree=False, compact_nodes=False)
-
-
 def _estimate(tree: cKDTree, problem: Problem, back: Rotation, wanted: int, index: int) -> Float[ndarray, " moments"]:
-    """Each moment over one set of directions, at one start phase, shape (moments,)."""
+    """Return each moment over one set of directions at one start phase."""
     chord = 2 * np.sin(problem.ball_rad / 2)
     values = []
     for moment in problem.objective.moments:
@@ -92,7 +71,13 @@ def _estimate(tree: cKDTree, problem: Problem, back: Rotation, wanted: int, inde
     return np.array(values)
 
 
-def _score(problem: Problem, estimates: list[Array]) -> BallScore:
+def _score(problem: Problem, scans: Iterable[tuple[cKDTree, Rotation]], directions: int) -> BallScore:
+    """Return the score from the tree of each start phase, and the rotation of the directions for it."""
+    estimates = [
+        _estimate(tree, problem, back, directions // SETS, SETS * i + k)
+        for i, (tree, back) in enumerate(scans)
+        for k in range(SETS)
+    ]
     moments = np.array(estimates).T
     each = problem.objective.join(moments)
     highest = [moment.gathered == "highest" for moment in problem.objective.moments]

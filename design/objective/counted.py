@@ -1,14 +1,14 @@
-"""J by counting: random directions at random start phases, line by line, for any field, motion and objective.
+"""J by counting beams at random directions and start phases, line by line, for any weights, motion and objective.
 
-It shares nothing with what it judges but the numbers of the task, the beam table, what the rays into a mesh hit, and
-the beams that parts block: rotations are Rodrigues', windows come from the law of cosines, weights are painted region
-by region, no sum is zonal. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
-three dimensions); the spread of independent shifts is its error.
-With `quadrature = "equal_angle"` the directions are nodes of the paper's grid: all, if as many are wanted.
+It is independent of the closed form: rotations use Rodrigues' formula, azimuth windows the law of cosines, and weights
+are painted region by region. Both share only the numbers of the task, the beam table, the hits of rays on meshes, and
+the beams that parts block. Directions and phases are the points of a shifted Sobol net (Joe and Kuo 2008; its first
+three dimensions); the spread of independent shifts is the error. With `quadrature = "equal_angle"` the directions are
+nodes of the paper's grid.
 
-If the axis turns, each direction is counted at several start phases, which share its windows. The mean count over all
-phases is the sum of the window widths, so the deviation of a count from it is a control variate: g minus its slope
-times that deviation has the same mean as g and a smaller variance.
+For full turns each direction is counted at several start phases. The mean count over all phases is the sum of the
+window widths, so the deviation of a count from it is a control variate: g minus its slope times that deviation has the
+same mean as g and a smaller variance.
 """
 
 from __future__ import annotations
@@ -29,45 +29,47 @@ from scanwright.design.sphere.directions import EMPTY
 from scanwright.design.task.task import LoadedTask
 
 COUNTED = ("log", "kl", "required", "homogeneity", "worst")  # objectives with a formula in `_moments` and `_joined`
-SETS, POINTS = 8, 2**15  # shifts, and directions that each draws
-LOWEST, LOOKS, NEARER = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # points looked about, how often, how near: of `worst`
+SETS, POINTS = 8, 2**15  # shifts, and directions of each
+LOWEST, TRIES, REACHES = 64, 256, (1e-2, 3e-3, 1e-3, 1e-4)  # of `worst`: lowest points, draws about each, distances
 SMALL_RAD = 1e-3  # of a ball
-PILOT, LEAST = 2**10, 2**4  # directions drawn in each region to see how much weight it has; and of the count, at least
-PHASES = 2048  # of the lines of a sweep; if the start phase turns them all alike, it is continuous
+PILOT, LEAST = 2**10, 2**4  # directions of each region: to estimate its weight; at least, for the count
+PHASES = 2048  # start phases of a sweep; those of a turn are continuous
 MOST_LISTED = 1_000_000  # lines of all phases of a sweep
-EACH = 2  # start phases of each direction, the golden section of a span apart
+EACH = 2  # start phases of each direction, a golden section apart
 GOLDEN = (5**0.5 - 1) / 2
-SPARSEST = 256.0  # times more directions are drawn, if few have a weight
+SPARSEST = 256.0  # largest increase of the number of directions if few have a weight
 BITS = 32  # of a coordinate of the net
 X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """J, three standard errors of it, the least count met, and the share of weight without any.
+    """Result of a count.
 
-    Of `worst` the error is 0: the least count that was found. It is infinite if that of some set is: it met no beam.
-    `weighted` is the share of the directions drawn that have a weight.
+    Attributes:
+        J: the objective; for `worst` a lower bound of it.
+        J_error: three standard errors; infinite if a set of directions has no beam, 0 for `worst`.
+        least: lowest count of all directions.
+        weighted: share of the drawn directions that have a weight.
     """
 
     J: float
     J_error: float
     least: int
-    none: float
     weighted: float
 
 
 @dataclass(frozen=True, slots=True)
 class _Sample:
-    """Directions that have a weight, and what is counted there.
+    """Directions with a weight, and their counts.
 
     Attributes:
         counts: at several start phases, shape (n, phases).
-        mean: over all start phases, shape (n,); NaN if it has no closed form.
+        mean: mean count over all start phases, shape (n,); NaN without a closed form.
         value: weight, shape (n,).
-        area: that each direction represents, shape (n,).
-        required: count that is required, shape (n,).
-        keep: which of all drawn directions these are, shape (drawn,).
+        area: solid angle that each direction represents, shape (n,).
+        required: required count, shape (n,).
+        keep: whether each drawn direction is one of these, shape (drawn,).
     """
 
     counts: Ints
@@ -88,22 +90,14 @@ def counted_J(
     shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Counted:
-    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+    """Return J of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], counted at `sets` shifts of the net.
 
-    Args:
-        loaded: the task.
-        angles_rad: the setting.
-        seed: of the shifts.
-        points: about how many directions each shift draws, in each region by its share of the weight, and more if few
-            of them have a weight; of the paper's grid so many nodes, or all with as many start phases as make up that
-            number.
-        sets: number of shifts.
-        bearings_rad: of the beams, shape (n,), if they are not all those of the lidar.
-        shadow: the beams that the parts of the scanner block, if they are to be left out.
-        lever: the optical centre off the axis, in the rotation frame, as a share of the range.
+    Each shift has about `points` directions, divided among the regions by their weight; more if few have a weight. For
+    the paper's grid they are nodes, or start phases times nodes if it has fewer. `bearings_rad` replaces those of the
+    lidar.
 
     Raises:
-        TaskError: next to no direction that is drawn has a weight, or the objective is not one of `COUNTED`.
+        TaskError: hardly any drawn direction has a weight, or the objective is not one of `COUNTED`.
     """
     if loaded.task.density.objective not in COUNTED:
         raise TaskError(f"density.objective = '{loaded.task.density.objective}': only {', '.join(COUNTED)} are counted")
@@ -119,10 +113,10 @@ def counted_J(
     beams = _turned(_turned(in_laser, X, alpha_laser), Y, beta_laser) + lever
     beams /= np.linalg.norm(beams, axis=1, keepdims=True)
     order = np.argsort(np.arccos(np.clip(beams[:, 2], -1, 1)))
-    to_rot = _turned(_turned(np.eye(3), X, -alpha_rot), Y, -beta_rot)  # of the three axes
+    to_rot = _turned(_turned(np.eye(3), X, -alpha_rot), Y, -beta_rot)
     lines, first, repeats, span = _lines(loaded)
     objective = density.objective
-    moments, least, none, weighted = [], np.iinfo(int).max, 0.0, 0.0
+    moments, least, weighted = [], np.iinfo(int).max, 0.0
 
     def counted(cubes: list[Array]) -> _Sample:
         directions, value, area, required, phase = (
@@ -134,7 +128,7 @@ def counted_J(
         counts, mean = _counts(
             directions[keep] @ to_rot, beams[order], phases * span, listed, lines, first, ball, blocked[order]
         )
-        if len(first) > 2 or blocked.shape[1] > 1:  # of a sweep, or of free lines only, it has no closed form here
+        if len(first) > 2 or blocked.shape[1] > 1:  # a sweep, or lines that are partly blocked: no closed form
             mean[:] = np.nan
         return _Sample(repeats * counts, repeats * mean, value[keep], area[keep], required[keep], keep)
 
@@ -151,7 +145,7 @@ def counted_J(
         if nodes is None:
             cubes = [_net(n, rng) for n in numbers]
         else:
-            count = min(points, len(nodes.value))  # one of each so many
+            count = min(points, len(nodes.value))
             place = np.arange(count) + rng.uniform(1e-9, 1 - 1e-9, count)
             cubes = [np.column_stack([place / count, rng.uniform(size=count)])]
         sample = counted(cubes)
@@ -160,26 +154,24 @@ def counted_J(
         moments.append(_moments(objective, sample))
         weighted += float(sample.keep.mean()) / sets
         least = min(least, int(sample.counts.min()))
-        weight = sample.value * sample.area
-        none += float(weight @ (sample.counts == 0).mean(axis=1) / weight.sum()) / sets
-        for reach in NEARER if objective == "worst" else ():
+        for reach in REACHES if objective == "worst" else ():
             lowest = np.full(len(sample.keep), np.inf)
             lowest[sample.keep] = sample.counts.min(axis=1)
-            cubes = _about_the_lowest(cubes, lowest, reach, max(1, LOOKS // each), rng)
+            cubes = _about_the_lowest(cubes, lowest, reach, max(1, TRIES // each), rng)
             sample = counted(cubes)
             least = min(least, int(sample.counts.min(initial=least)))
     if len(moments) < 2:
         raise TaskError(EMPTY)
     if objective == "worst":
-        return Counted(-float(np.log(1 + least)), 0.0, least, none, weighted)
+        return Counted(-float(np.log(1 + least)), 0.0, least, weighted)
     J = _joined(objective, np.mean(moments, axis=0))
-    with np.errstate(divide="ignore", invalid="ignore"):  # a set in which nothing has a weight, or nothing is seen
+    with np.errstate(divide="ignore", invalid="ignore"):  # sets without weight or without beams
         J_error = float(3 * np.std([_joined(objective, m) for m in moments], ddof=1) / sets**0.5)
-    return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, none, weighted)
+    return Counted(J, J_error if np.isfinite(J_error) else np.inf, least, weighted)
 
 
 def _numbers(layers: tuple[list[Layer], list[Layer]], points: int, seed: int) -> list[int]:
-    """How many directions to draw in each region: by its share of the weight, powers of two, as a net has points."""
+    """Return the number of directions to draw in each region, by its share of the weight; powers of two."""
     regions = len(drawn_in(layers))
     rng = np.random.default_rng([seed, SETS])
     _, value, area, _, _ = _weighted(layers, [_net(PILOT, rng) for _ in range(regions)])
@@ -190,13 +182,13 @@ def _numbers(layers: tuple[list[Layer], list[Layer]], points: int, seed: int) ->
 
 
 def _turned(vectors: Array, axis: Array, angle_rad: float) -> Array:
-    """Vectors (n, 3) turned about a unit axis by Rodrigues' formula."""
+    """Return vectors rotated about a unit axis by Rodrigues' formula."""
     along = np.outer(vectors @ axis, axis)
     return along + np.cos(angle_rad) * (vectors - along) + np.sin(angle_rad) * np.cross(axis, vectors)
 
 
 def _net(count: int, rng: np.random.Generator) -> Array:
-    """The first points of a Sobol net in three dimensions, shifted digit by digit, shape (count, 3), 0 to below 1."""
+    """Return the first points of a Sobol net in the unit cube, with a random digital shift, shape (count, 3)."""
     return ((_digits(count) ^ rng.integers(1 << BITS, size=3, dtype=np.uint64)) + 0.5) / float(1 << BITS)
 
 
@@ -218,40 +210,41 @@ def _digits(count: int) -> Array:
 def _about_the_lowest(
     cubes: list[Array], counts: Array, reach: float, tries: int, rng: np.random.Generator
 ) -> list[Array]:
-    """Draw points of the unit cubes about those of the lowest counts: chance seldom meets a lowest count."""
+    """Return points of the unit cubes drawn near those with the lowest counts, where a lower count is likely."""
     owner = np.repeat(np.arange(len(cubes)), [len(cube) for cube in cubes])
     lowest = np.argsort(counts, kind="stable")[:LOWEST]
     near = [np.repeat(np.concatenate(cubes)[lowest[owner[lowest] == i]], tries, axis=0) for i in range(len(cubes))]
     moved = [cube + reach * rng.uniform(-1, 1, cube.shape) for cube in near]
-    if near[0].shape[1] == 2:  # nodes stay, at any phase
+    if near[0].shape[1] == 2:  # nodes of the grid are fixed: draw their phases
         moved = [np.column_stack([cube[:, 0], rng.uniform(0, 1, len(cube))]) for cube in near]
     return [np.clip(cube, 0, 1 - 1e-12) for cube in moved]
 
 
 def _at_nodes(nodes: Nodes, cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
-    """What `_weighted` returns, for nodes of the paper's grid, each of which counts the same."""
+    """Return the result of `_weighted` for nodes of the paper's grid, which have equal areas."""
     at = (cubes[0][:, 0] * len(nodes.value)).astype(int)
     value = nodes.value[at]
     return nodes.directions[at], value, np.ones(len(at)), nodes.required[at], cubes[0][:, 1]
 
 
 def _weighted(layers: tuple[list[Layer], list[Layer]], cubes: list[Array]) -> tuple[Array, Array, Array, Array, Array]:
-    """Directions drawn from every region; of each its weight, its area, what is required, and a phase."""
+    """Return directions drawn in all regions, with their weights, areas, required counts and phases."""
     drawing = drawn_in(layers)
     drawn = [one.drawn(u) for one, u in zip(drawing, cubes, strict=True)]
     d = np.concatenate([directions for directions, _ in drawn])
-    # as often as all regions together draw it: where they overlap, each of their directions has less area
-    often = sum(len(u) * one.chance(d, area) for one, u, (_, area) in zip(drawing, cubes, drawn, strict=True))
+    # directions per steradian of all regions together, since regions can overlap
+    per_sr = sum(len(u) * one.chance(d, area) for one, u, (_, area) in zip(drawing, cubes, drawn, strict=True))
     value, required = value_and_required(layers, d)
     phase = np.concatenate(cubes)[:, 2]
-    seen = often > 0  # rounding may put a direction outside the edge that it was drawn at
-    return d, np.where(seen, value, 0.0), 1 / np.where(seen, often, np.inf), required, phase
+    inside = per_sr > 0  # rounding can put a direction outside the edge of its region
+    return d, np.where(inside, value, 0.0), 1 / np.where(inside, per_sr, np.inf), required, phase
 
 
 def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
-    """Sorted joint angles [rad, 0 .. 2 pi] of start phases, one after the other; where each begins; repeats.
+    """Return the joint angles [0 .. 2 pi] of all lines, sorted within each start phase, and how they repeat.
 
-    And how far the start phase turns all lines alike: a grid of phases would beat with that of the lines.
+    Also the index of the first line of each phase, the measurements of each line, and the angle over which a continuous
+    start phase turns all lines (a grid of phases would beat with the grid of lines).
     """
     motion, rate = loaded.task.motion, loaded.lidar.scan_rate_hz
     listed, span = [], 0.0
@@ -284,13 +277,13 @@ def _lines(loaded: LoadedTask) -> tuple[Array, Ints, int, float]:
 
 @njit(cache=True, error_model="numpy")
 def _before(lines: Array, angle: float, step: float) -> int:
-    """Lines before an angle: by division if they are `step` apart, by a search if that is 0."""
+    """Return the number of lines before an angle; `step` is their distance, or 0 if it varies."""
     return min(len(lines), int(np.ceil(angle / step))) if step > 0 else int(np.searchsorted(lines, angle))
 
 
 @njit(cache=True, error_model="numpy")
 def _free(lines: Array, first: int, last: int, turned: float, blocked: Mask) -> int:
-    """Lines of one beam, of those from `first` to `last`, at whose joint angle it is free."""
+    """Return the number of the lines first .. last at whose joint angle the beam is free."""
     steps = len(blocked)
     if steps == 1:
         return last - first
@@ -311,17 +304,17 @@ def _counts(
     ball: float,
     blocked: Mask,
 ) -> tuple[Ints, Array]:
-    """Free beams within the ball of each direction at its phases, (n, phases), and the mean over all phases, (n,).
+    """Return the free beams within the ball of each direction at its phases, (n, phases), and the mean count, (n,).
 
-    `blocked` is at equal steps of the axis angle, (beams, steps). The mean is that of lines which the start phase turns
-    all alike, all of them free.
+    `blocked` is at equal steps of the axis angle, (beams, steps). The mean is over all start phases of a turn without
+    blocked lines.
     """
     counts, mean = np.zeros(turned.shape, np.int64), np.zeros(len(directions))
     polar = np.arccos(np.minimum(1.0, np.maximum(-1.0, beams[:, 2])))
     azimuth = np.arctan2(beams[:, 1], beams[:, 0])
     flat, upright, cos_ball = np.sin(polar), np.cos(polar), np.cos(ball)
     turn, count = 2 * np.pi, first[1]
-    step = lines[1] - lines[0] if len(first) == 2 and count > 1 else 0.0  # of a sweep they have no equal steps
+    step = lines[1] - lines[0] if len(first) == 2 and count > 1 else 0.0  # lines of a sweep are not evenly spaced
     for i in range(len(directions)):
         x, y, z = directions[i]
         across = np.hypot(x, y)
@@ -334,7 +327,7 @@ def _counts(
                 continue
             # the law of cosines: cos(ball) = z z_b + across across_b cos(azimuth between them at the edge of the ball)
             free = 2 * (z * upright[b] + across * flat[b] - cos_ball)
-            if ball < SMALL_RAD:  # the same without a difference of cosines, which would lose digits
+            if ball < SMALL_RAD:  # without a difference of cosines, which loses digits
                 free = 4 * (np.sin(ball / 2) ** 2 - np.sin((t - polar[b]) / 2) ** 2)
             around = 4 * across * flat[b]
             if free < 0:
@@ -343,24 +336,26 @@ def _counts(
             start = p - azimuth[b] - half
             mean[i] += count * half / np.pi
             for k in range(turned.shape[1]):
-                mine = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
+                phase_lines = lines[first[listed[i, k]] : first[listed[i, k] + 1]]
                 low = (start - turned[i, k]) % turn
                 high = low + 2 * half
-                before = _before(mine, low, step), _before(mine, high, step)
-                counts[i, k] += _free(mine, *before, turned[i, k], blocked[b])
+                before = _before(phase_lines, low, step), _before(phase_lines, high, step)
+                counts[i, k] += _free(phase_lines, *before, turned[i, k], blocked[b])
                 if high > turn:
-                    counts[i, k] += _free(mine, 0, _before(mine, high - turn, step), turned[i, k], blocked[b])
+                    counts[i, k] += _free(
+                        phase_lines, 0, _before(phase_lines, high - turn, step), turned[i, k], blocked[b]
+                    )
     return counts, mean
 
 
 def _moments(objective: str, sample: _Sample) -> Array:
-    """What `_joined` takes: integrals over the weight, and over what has one."""
+    """Return the integrals that `_joined` combines to J."""
     value, area = sample.value, sample.area
     required = sample.required[:, None]
     weight = value * area
 
     def mean_of(g: Callable[[Array], Array]) -> Array:
-        """Mean of g over the start phases, shape (n,): the count's deviation from its mean is a control variate."""
+        """Return the mean of g over the start phases, shape (n,); the deviation of the count is a control variate."""
         mean = sample.mean[:, None]
         slope = g(mean + 0.5) - g(mean - 0.5)
         control = np.where(np.isnan(mean), 0.0, slope * (sample.counts - mean))

@@ -1,4 +1,4 @@
-"""The regions of a task painted one by one, and directions drawn in each; `counted` counts there."""
+"""The regions of a task, evaluated one by one, and directions drawn in each, for `design.objective.counted`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from scanwright.design.task.shapes import AllRegion, BandRegion, BoxRegion, Cone
 from scanwright.design.task.task import LoadedTask
 
 ROUNDING = 1e-12
-BY_WEIGHT = 0.75  # of the cells drawn; the others are drawn by area
-ON_EDGE = ON_EDGE_DEG = ON_EDGE_M = 1e-9  # edges are inclusive: nodes of the paper's grid lie on them, but for rounding
+BY_WEIGHT = 0.75  # share of cells that are drawn by weight; the others by area
+ON_EDGE = ON_EDGE_DEG = ON_EDGE_M = 1e-9  # tolerance of inclusive edges, on which nodes of the paper's grid can lie
 
 
 @dataclass(frozen=True, slots=True)
 class Nodes:
-    """Nodes of the paper's grid that have a weight: directions (n, 3), weights (n,), what is required there (n,)."""
+    """Nodes of the paper's grid with a weight: directions (n, 3), weights (n,) and required counts (n,)."""
 
     directions: Array
     value: Array
@@ -26,14 +26,14 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One region: which directions it holds, its value there, what it requires; directions drawn in it, their area.
+    """One region of a task.
 
     Attributes:
-        region: shape of the task; None for a surface.
-        table: values of cells, shape (rows, columns), if it is made of cells.
+        region: its shape; None for the surfaces of a scene.
+        table: values of its cells, shape (rows, columns); None if it has no cells.
         value: of the region; entries of the table are multiplied by it.
-        required: count, a number or a table like `table`.
-        chances: of drawing each cell of the table, shape (rows, columns).
+        required: required count, a number or a table like `table`.
+        chances: probability of drawing each cell of the table, shape (rows, columns).
     """
 
     region: object
@@ -43,7 +43,7 @@ class Layer:
     chances: Array | None = None
 
     def holds(self, d: Array) -> Mask:
-        """Whether directions (n, 3) lie in it, shape (n,)."""
+        """Return whether directions lie in the region, shape (n,)."""
         region = self.region
         if isinstance(region, ConeRegion):
             axis = np.array(region.axis) / np.linalg.norm(region.axis)
@@ -54,22 +54,22 @@ class Layer:
             ahead = (np.degrees(np.arctan2(d[:, 1], d[:, 0])) - region.phi_deg[0] + ON_EDGE_DEG) % 360
             low, high = region.theta_deg
             inside = (low - ON_EDGE_DEG <= theta) & (theta <= high + ON_EDGE_DEG)
-            pole = np.hypot(d[:, 0], d[:, 1]) < ROUNDING  # has no heading: it belongs to all
+            pole = np.hypot(d[:, 0], d[:, 1]) < ROUNDING  # belongs to all headings
             return inside & (pole | (ahead <= region.phi_deg[1] - region.phi_deg[0] + 2 * ON_EDGE_DEG))
         if isinstance(region, PlaneRegion):
             return _On(region).holds(d)
         return np.ones(len(d), dtype=bool)
 
     def value_at(self, d: Array) -> Array:
-        """Its value at directions (n, 3), shape (n,)."""
+        """Return its value at directions, shape (n,)."""
         return np.full(len(d), self.value) if self.table is None else self.value * _of_cells(self.table, d)
 
     def required_at(self, d: Array) -> Array:
-        """What it requires at directions (n, 3), shape (n,)."""
+        """Return the required count at directions, shape (n,)."""
         return _of_cells(self.required, d) if isinstance(self.required, np.ndarray) else np.full(len(d), self.required)
 
     def drawn(self, u: Array) -> tuple[Array, float]:
-        """Directions (n, 3) for points of the unit cube (n, 3), and its area [sr], if they are drawn evenly."""
+        """Return a direction for each point of the unit cube (n, 3), and the solid angle if they are drawn evenly."""
         region = self.region
         if isinstance(region, ConeRegion):
             half = np.radians(region.half_angle_deg)
@@ -97,12 +97,11 @@ class Layer:
             r, c = np.divmod(cell, columns)
             z_drawn = z_edges[r + 1] + np.clip(inside, 0, 1) * (z_edges[r] - z_edges[r + 1])
             return _at(z_drawn, 2 * np.pi * (c + u[:, 1]) / columns), float("nan")
-        return _at(z[0] + (z[1] - z[0]) * u[:, 0], phi[0] + (phi[1] - phi[0]) * u[:, 1]), (z[1] - z[0]) * (
-            phi[1] - phi[0]
-        )
+        height, width = z[1] - z[0], phi[1] - phi[0]
+        return _at(z[0] + height * u[:, 0], phi[0] + width * u[:, 1]), height * width
 
     def chance(self, d: Array, area: float) -> Array:
-        """Probability of drawing each direction, per steradian."""
+        """Return the probability density of drawing each direction [1/sr]."""
         if isinstance(self.region, PlaneRegion):
             return _On(self.region).chance(d)
         if self.chances is None:
@@ -111,13 +110,13 @@ class Layer:
 
 
 def _cell_areas(rows: int, columns: int) -> Array:
-    """Area of a cell in each row [sr], shape (rows, 1)."""
+    """Return the solid angle of a cell in each row, shape (rows, 1)."""
     edges = np.cos(np.pi * np.arange(rows + 1) / rows)
     return (edges[:-1] - edges[1:])[:, None] * 2 * np.pi / columns
 
 
 def _chances(table: Array) -> Array:
-    """Chance of drawing each cell: by its weight, and a share by its area alone, which the objective `kl` needs."""
+    """Return the probability of drawing each cell: by weight, and partly by area, which the objective `kl` needs."""
     areas = np.where(table > 0, _cell_areas(*table.shape), 0.0)
     weights = areas * table
     total = weights.sum()
@@ -125,7 +124,7 @@ def _chances(table: Array) -> Array:
 
 
 def _of_cells(table: Array, d: Array) -> Array:
-    """Entries of the cells of a table that hold directions (n, 3), shape (n,)."""
+    """Return the entries of a table of cells at directions, shape (n,)."""
     rows, columns = table.shape
     across = np.hypot(d[:, 0], d[:, 1])
     phi = np.where(across < ROUNDING, 0.0, np.arctan2(d[:, 1], d[:, 0]))  # a pole has no heading
@@ -135,9 +134,9 @@ def _of_cells(table: Array, d: Array) -> Array:
 
 
 class _On:
-    """A rectangle on a plane, by where rays meet that plane.
+    """A rectangle on a plane, evaluated by the intersections of rays with the plane.
 
-    A point of it is drawn by two angles, one in a plane through its first side's direction, one across.
+    Points are drawn by two angles: in the plane of its normal and its first side, and perpendicular to that.
     """
 
     def __init__(self, region: PlaneRegion) -> None:
@@ -182,9 +181,9 @@ def _at(z: Array, phi: Array) -> Array:
 
 
 def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
-    """Weights in painting order, the background first, and masks."""
+    """Return the weights in painting order, the background first, and the masks."""
     task, maps = loaded.task, list(loaded.maps)
-    asked = task.density.required or 0.0
+    required_everywhere = task.density.required or 0.0
     every = AllRegion(shape="all")
 
     def layer(region: object, value: float, required: float) -> Layer:
@@ -192,8 +191,8 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
         table = maps.pop(0) if mapped else None
         return Layer(region, table, value, required, None if table is None else _chances(table))
 
-    weights = [Layer(every, None, task.density.background, asked)]
-    weights += [layer(r, r.value, asked if r.required is None else r.required) for r in task.weight]
+    weights = [Layer(every, None, task.density.background, required_everywhere)]
+    weights += [layer(r, r.value, required_everywhere if r.required is None else r.required) for r in task.weight]
     masks = [layer(r, 1.0, 0.0) for r in task.mask]
     surface = loaded.surface
     if surface is None:
@@ -210,8 +209,7 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
             painted = np.where(here, one.value_at(d), painted)
         required = np.where(here, one.required, required)
     lidar = loaded.lidar
-    reach = lidar.practical_range_m
-    in_range = (surface.range_m >= lidar.range_min_mm / 1000) & (surface.range_m <= reach)
+    in_range = (surface.range_m >= lidar.range_min_mm / 1000) & (surface.range_m <= lidar.practical_range_m)
     hidden = np.zeros(len(d), dtype=bool)
     for one in masks:
         hidden |= one.holds(d) & (one.value_at(d) > 0)
@@ -220,7 +218,7 @@ def layers_of(loaded: LoadedTask) -> tuple[list[Layer], list[Layer]]:
 
 
 def value_and_required(layers: tuple[list[Layer], list[Layer]], d: Array) -> tuple[Array, Array]:
-    """Weight at directions (n, 3), 0 where a mask holds them, and what is required there, both of shape (n,)."""
+    """Return the weight at directions, 0 if masked, and the required count, shape (n,) each."""
     value, required = np.zeros(len(d)), np.zeros(len(d))
     for one in layers[0]:
         here = one.holds(d)
@@ -231,7 +229,7 @@ def value_and_required(layers: tuple[list[Layer], list[Layer]], d: Array) -> tup
 
 
 def nodes_in(layers: tuple[list[Layer], list[Layer]], step_deg: float) -> Nodes:
-    """The nodes of the paper's grid of theta and phi that have a weight, those of the poles once for every phi."""
+    """Return the nodes of the paper's grid with a weight; the poles are in it once for every phi."""
     theta = np.pi * np.arange(round(180 / step_deg) + 1) / round(180 / step_deg)
     phi = 2 * np.pi * np.arange(round(360 / step_deg)) / round(360 / step_deg)
     t, p = np.repeat(theta, len(phi)), np.tile(phi, len(theta))
@@ -241,5 +239,5 @@ def nodes_in(layers: tuple[list[Layer], list[Layer]], step_deg: float) -> Nodes:
 
 
 def drawn_in(layers: tuple[list[Layer], list[Layer]]) -> list[Layer]:
-    """Regions that directions are drawn in."""
+    """Return the regions in which directions are drawn: those with a weight."""
     return [one for one in layers[0] if one.value > 0 and (one.table is None or one.table.any())]

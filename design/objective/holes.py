@@ -1,4 +1,4 @@
-"""Where a setting is blind in its region, and the same in words: what J alone does not tell."""
+"""Blind spots: weighted directions that a mount never sees, and their description."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.objective.score import blind_share, blind_to_sweep
 from scanwright.design.sphere.directions import weighted_samples
 
-NO_BLIND_WEIGHT = 1e-9  # share of the weight: what a fan and a region reach is rounded
+NO_BLIND_WEIGHT = 1e-9  # share of the weight that is rounding
 DIRECTIONS = 20_000  # of the region, for a sweep
 POINTS = (
     "ahead",
@@ -27,7 +27,7 @@ POINTS = (
     "to the right",
     "ahead on the right",
 )
-UPRIGHT_DEG = 80.0  # beyond it a heading has no meaning
+UPRIGHT_DEG = 80.0  # elevation above which no heading is stated
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class BlindSpot:
     weight: float
 
     def words(self) -> str:
-        """Return its place and width."""
+        """Return its place, width and weight as text."""
         x, y, z = self.centre
         angle, wide = f"{self.half_angle_deg:.2f} deg", ""
         if self.inner_deg:
@@ -61,11 +61,7 @@ class BlindSpot:
 
 
 def holes(problem: Problem, angles_rad: Setting) -> tuple[BlindSpot, ...]:
-    """Where the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] is blind in the region, the worst first.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+    """Return the blind spots of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], the largest weight first."""
     result = _of_spin(problem, angles_rad) if problem.sweep is None else _of_sweep(problem, angles_rad)
     return tuple(sorted((hole for hole in result if hole.weight > NO_BLIND_WEIGHT), key=lambda hole: -hole.weight))
 
@@ -80,13 +76,13 @@ def _of_spin(problem: Problem, angles_rad: Setting) -> list[BlindSpot]:
         about_back = low > 0 and np.pi - low < high  # the nearer end of the axis
         inner, outer = (np.pi - high, np.pi - low) if about_back else (low, high)
         out.append(
-            BlindSpot(_three(-axis if about_back else axis), float(np.degrees(outer)), float(np.degrees(inner)), weight)
+            BlindSpot(triple(-axis if about_back else axis), float(np.degrees(outer)), float(np.degrees(inner)), weight)
         )
     return out
 
 
 def _of_sweep(problem: Problem, angles_rad: Setting) -> list[BlindSpot]:
-    """All that is blind, as one cone about its middle."""
+    """Return all blind directions as one cone about their mean."""
     samples = weighted_samples(problem.field, DIRECTIONS)
     R = R_world_rot(angles_rad[0], angles_rad[1])
     blind = blind_to_sweep(problem, samples.directions @ R, problem.beams_rot(angles_rad[2:]))
@@ -96,11 +92,11 @@ def _of_sweep(problem: Problem, angles_rad: Setting) -> list[BlindSpot]:
         return []
     off = np.arccos(np.clip(samples.directions[blind] @ middle / length, -1, 1))
     share = blind_share(samples.weights, blind)
-    return [BlindSpot(_three(middle / length), float(np.degrees(off.max())), 0.0, share)]
+    return [BlindSpot(triple(middle / length), float(np.degrees(off.max())), 0.0, share)]
 
 
 def heading(direction: Vector) -> str:
-    """A direction of the world in words: x is ahead, y to the left, z up."""
+    """Return a direction of the world as text: x is ahead, y to the left, z up."""
     x, y, z = direction
     up_deg = float(np.degrees(np.arctan2(z, np.hypot(x, y))))
     if abs(up_deg) > UPRIGHT_DEG:
@@ -110,12 +106,13 @@ def heading(direction: Vector) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in percent that is never written as 0 if there is something."""
+    """Return a share in percent; a positive one is never printed as 0."""
     if 0 < share < 1e-6:
         return "below 0.0001%"
     return f"{100 * share:.2g}%" if share < 0.1 else f"{share:.1%}"
 
 
-def _three(v: Float[ndarray, " 3"]) -> tuple[float, float, float]:
+def triple(v: Float[ndarray, " 3"]) -> tuple[float, float, float]:
+    """Return a vector as a tuple without negative zeros."""
     x, y, z = (float(value) + 0.0 for value in v)
     return x, y, z

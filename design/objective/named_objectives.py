@@ -1,10 +1,10 @@
-"""What the search minimises. Each objective is one function `(field, loaded) -> Objective` below, with its formula.
+"""Objectives of the search. Each is one function `(field, loaded) -> Objective` below, with its formula.
 
-`design.task.objective_names` lists them; installed packages add theirs by entry points. An objective is a few moments
-of the density, joined: `J = join(m_1, m_2, ..)`. A moment is the mean of g(d) over a weight and over the start phase of
-the turn, or the highest g(d) anywhere in it. Every g is convex and every join rises with every moment whose g bends, so
-J of the mean counts is a lower bound of J: the search orders its work by it. Weights that differ from region to region
-(`required`) are split by their levels: exact, one moment a level. When to use which: `docs/definitions.md`.
+`design.task.objective_names` lists them; installed packages add theirs by entry points. An objective combines a few
+moments of the density: `J = join(m_1, m_2, ..)`. A moment is the mean of g(d) over a weight and over the start phase of
+the turn, or the highest g(d). Every g is convex, and no join falls if a moment of a nonlinear g rises, so J of the mean
+counts is a lower bound of J, which the search uses. If regions require different densities (`required`), each level is
+one moment. When to use which: `docs/definitions.md`.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from scanwright.design.task.task import LoadedTask
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """One number about a density.
+    """A mean or an extreme value of a function of the count over a weight.
 
     Attributes:
         field: the weights, masks included.
-        g: of counts, convex.
-        gathered: over the field: the mean, or the highest at any start phase.
-        share: of the whole weight of the task that this moment speaks for; 0 where another one does already.
+        g: convex function of the count.
+        gathered: whether it is the mean of g, or the highest g at any start phase.
+        share: share of the weight of the task that this moment represents; 0 if another moment represents it.
     """
 
     field: Field
@@ -45,9 +45,14 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """Moments and how they become J: `join` takes them along the first axis, and is off by `join_error` at most.
+    """An objective.
 
-    `field` is the weight of the task.
+    Attributes:
+        name: of the objective.
+        field: the weight of the task.
+        moments: that J is computed from.
+        join: maps moments, shape (moments, ...), to J, shape (...).
+        join_error: bound of the error of `join`.
     """
 
     name: str
@@ -58,7 +63,7 @@ class Objective:
 
 
 def log_density(counts: Counts) -> Array:
-    """`g(d) = -ln(1 + d)`: rewards every direction's first beams most (the paper's logarithm, with its sign)."""
+    """Return `g(d) = -ln(1 + d)`, the logarithm of the paper with its sign: the first beams count most."""
     return -np.log1p(counts)
 
 
@@ -71,35 +76,34 @@ def objective_of(loaded: LoadedTask, field: Field) -> Objective:
     entry = objectives(loaded.task.density.objective)[loaded.task.density.objective]
     try:
         make: Callable[[Field, LoadedTask], Objective] = entry.load()
-    except Exception as error:  # import of an installed package: it can raise anything
+    except Exception as error:  # importing a package can raise anything
         where = f"{loaded.source}: density.objective = '{entry.name}'"
         raise TaskError(f"{where}: cannot load {entry.value} of an installed package: {error}") from error
     return make(field, loaded)
 
 
 def log(field: Field, _loaded: LoadedTask | None = None) -> Objective:
-    """`J = mean_w <-ln(1 + d)>`: `exp(J_other - J)` times more beams per ball, on the geometric mean."""
+    """`J = mean_w <-ln(1 + d)>`: `exp(J_other - J)` is the ratio of the beams per ball in the geometric mean."""
     return Objective("log", field, (Moment(field, log_density),), _first)
 
 
 def beams_per_ball(objective: Objective, J: float) -> float | None:
-    """`exp(-J) - 1`: beams per ball on the geometric mean of 1 + d; None for an objective that is no logarithm."""
+    """Return `exp(-J) - 1`, the beams per ball by the geometric mean of 1 + d; None for objectives other than `log`."""
     return float(np.expm1(-J)) + 0.0 if objective.name == "log" else None
 
 
 def kl(field: Field, loaded: LoadedTask) -> Objective:
-    """Distance to the target distribution [nat], 0 if the density is spread just as the weights are.
+    """Kullback-Leibler divergence [nat] of the density from the weights: 0 if 1 + d is proportional to the weight.
 
-    `J = int p ln(p / q) dO` over the directions that have a weight, p = w / int w, q = (1 + d) / int (1 + d): only how
-    the beams are shared out counts, not how many they are. The phase mean is taken of the logarithm, and of the
-    normaliser by itself.
+    `J = int p ln(p / q) dO` over the directions with a weight, p = w / int w, q = (1 + d) / int (1 + d). It does not
+    depend on the number of beams. Logarithm and normaliser are averaged over the start phase separately.
     """
     grid_step_deg = _grid_step_deg(loaded)
     support = _mapped(field, lambda w: (w > 0).astype(float))
-    least = _least(field)  # in units of it no weight has a negative logarithm
+    least = _least(field)  # as the unit of weights it keeps all logarithms positive
     logarithms = _mapped(field, lambda w: w * (np.log(np.where(w > 0, w, least)) - np.log(least)))
-    logs, full, held = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
-    shift = logs / full + np.log(least) - np.log(full / held)
+    logs, full, solid_angle = (_summed(one, grid_step_deg) for one in (logarithms, field, support))
+    shift = logs / full + np.log(least) - np.log(full / solid_angle)
     moments = (Moment(field, log_density), Moment(support, _one_more, share=0.0))
     error = 0.0 if grid_step_deg else RELATIVE_ERROR * (2 * abs(logs / full) + 2)
     return Objective("kl", field, moments, lambda m: m[0] + np.log(m[1]) + shift, error)
@@ -107,19 +111,19 @@ def kl(field: Field, loaded: LoadedTask) -> Objective:
 
 def required(field: Field, loaded: LoadedTask) -> Objective:
     """Mean shortfall, 0 to 1: `J = mean_w <max(0, 1 - d / r)>` with the density r that each region requires."""
-    asked, grid_step_deg = loaded.task.density.required, _grid_step_deg(loaded)
-    wanted = [asked if region.required is None else region.required for region in loaded.task.weight]
-    wanted += [asked] if loaded.task.density.background > 0 else []
-    lacking = [i for i, r in enumerate(wanted) if r is None]
-    if lacking or not wanted:
-        where = f"weight.{lacking[0]}.required" if lacking and lacking[0] < len(loaded.task.weight) else "required"
+    default, grid_step_deg = loaded.task.density.required, _grid_step_deg(loaded)
+    levels = [default if region.required is None else region.required for region in loaded.task.weight]
+    levels += [default] if loaded.task.density.background > 0 else []
+    missing = [i for i, r in enumerate(levels) if r is None]
+    if missing or not levels:
+        where = f"weight.{missing[0]}.required" if missing and missing[0] < len(loaded.task.weight) else "required"
         raise TaskError(
-            f"{loaded.source}: density.objective = 'required': {where}: say how many beams per ball, for all "
+            f"{loaded.source}: density.objective = 'required': {where}: set the number of beams per ball, for all "
             "regions (density.required) or in each ([[weight]] required)"
         )
     moments = []
-    for level in sorted({r for r in wanted if r is not None}):
-        part = field_of(loaded, _asking(level, asked), loaded.task.density.background * (asked == level))
+    for level in sorted({r for r in levels if r is not None}):
+        part = field_of(loaded, _weight_at_level(level, default), loaded.task.density.background * (default == level))
         if len(part.patches):
             moments.append(Moment(part, _shortfall(level), share=_summed(part, grid_step_deg)))
     total = sum(moment.share for moment in moments)
@@ -132,17 +136,17 @@ def required(field: Field, loaded: LoadedTask) -> Objective:
 
 
 def homogeneity(field: Field, _loaded: LoadedTask | None = None) -> Objective:
-    """Evenness in the region, 0 where every ball holds the same count: `J = ln(mean_w <d^2> / (mean_w <d>)^2)`.
+    """Variation of the count in the region: `J = ln(mean_w <d^2> / (mean_w <d>)^2)`, 0 if all counts are equal.
 
-    The second moment of counts in balls is the spherical Ripley function, integrated over the overlap of two balls;
-    unlike it, it includes weights, masks and the phase of the turn.
+    The second moment is the spherical Ripley function integrated over the overlap of two balls, but with weights,
+    masks and the start phase of the turn.
     """
     moments = (Moment(field, np.square), Moment(field, _itself, share=0.0))
     return Objective("homogeneity", field, moments, _dispersion)
 
 
 def worst(field: Field, _loaded: LoadedTask | None = None) -> Objective:
-    """`J = -ln(1 + least)`, least = the fewest beams per ball anywhere in the region, at any start phase."""
+    """`J = -ln(1 + least)` with the lowest number of beams per ball in the region at any start phase."""
     return Objective("worst", field, (Moment(field, log_density, "highest"),), _first)
 
 
@@ -153,7 +157,7 @@ def _grid_step_deg(loaded: LoadedTask) -> float | None:
 
 
 def _summed(field: Field, grid_step_deg: float | None) -> float:
-    """All the weight of a field, as its moments are summed: over solid angle, or over the nodes of the paper's grid."""
+    """Return the total weight of a field: over solid angle, or over the nodes of the paper's grid."""
     return float(field.weight_at(equal_angle_grid(grid_step_deg)).sum()) if grid_step_deg else total_weight(field)
 
 
@@ -169,9 +173,9 @@ def _one_more(counts: Counts) -> Array:
     return 1.0 + counts
 
 
-def _asking(level: float, otherwise: float | None) -> Callable[[Region], float]:
-    """Weight of the regions that require just this density."""
-    return lambda region: region.value if (region.required or otherwise) == level else 0.0
+def _weight_at_level(level: float, default: float | None) -> Callable[[Region], float]:
+    """Return the function that maps regions to their weight, or to 0 if they require another density than `level`."""
+    return lambda region: region.value if (region.required or default) == level else 0.0
 
 
 def _shortfall(level: float) -> Callable[[Counts], Array]:
@@ -184,7 +188,7 @@ def _dispersion(moments: Array) -> Array:
 
 
 def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
-    """The field with every weight passed through a function."""
+    """Return the field with a function applied to every weight."""
     rows, tables = field.weight.rows.copy(), field.weight.tables.copy()
     maps = rows[:, 0] == MAP
     for row in rows[maps]:
@@ -195,7 +199,7 @@ def _mapped(field: Field, function: Callable[[Array], Array]) -> Field:
 
 
 def _least(field: Field) -> float:
-    """The smallest weight that any region paints."""
+    """Return the smallest positive weight of any region."""
     rows = field.patches
     painted = [rows[rows[:, 0] != MAP, VALUE]]
     painted += [row[VALUE] * field.weight.tables[int(row[1])].ravel() for row in rows[rows[:, 0] == MAP]]

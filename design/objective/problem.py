@@ -1,4 +1,4 @@
-"""A task as numbers: what the density and every search of it are computed from."""
+"""A task as numbers, from which density and J are computed."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from scanwright.design.sphere.regions import Field, field_of
 from scanwright.design.task.task import LoadedTask
 
 FRONT = Path(__file__).parent / "front.csv"
-MANY_LINES = 100  # of a turn: one more or less is less than what their number decides
-NODES = 6561  # per setting, spread over the segments
+MANY_LINES = 100  # of a turn: rounding the number to an integer hardly changes J
+NODES = 6561  # of the quadrature of one mount
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +31,16 @@ class Problem:
     """A task as numbers.
 
     Attributes:
-        bearings_rad: of the beams, shape (beams,).
-        lines: of one full turn; of a sweep, as many as one period has, the widest step apart.
+        bearings_rad: of the beams.
+        lines: of one full turn; of a sweep, as many as one period has, at the widest step.
         sweep: the trajectory, if the servo sweeps.
-        scan_rate_hz: scans of the lidar in a second.
+        scan_rate_hz: scan rate of the lidar.
         ball_rad: ball radius.
-        objective: what is minimised.
+        objective: to minimise.
         grid_step_deg: step of the paper's equal-angle sum, or None for solid angles.
-        nodes: quadrature nodes that a score starts with, from the task's `tolerance` or `budget_s`.
-        tolerance: a score takes more nodes as long as it states a larger error.
-        lever: of the optical centre off the axis, `t_rot_laser / range`. By design 0; the search takes it for 0.
+        nodes: initial quadrature nodes of a score, from the task's `tolerance` or `budget_s`.
+        tolerance: largest error of J; a score uses more nodes until its error is smaller.
+        lever: offset of the optical centre from the axis, `t_rot_laser / range`; 0 by design and in the search.
     """
 
     bearings_rad: Float[ndarray, " beams"]
@@ -55,11 +55,11 @@ class Problem:
     lever: tuple[float, float, float] = NO_LEVER
 
     def beams_rot(self, plane_rad: Plane) -> Float[ndarray, "beams 3"]:
-        """Unit vectors of the beams in the rotation frame for (alpha_laser, beta_laser), shape (beams, 3)."""
+        """Return unit vectors of the beams in the rotation frame for (alpha_laser, beta_laser)."""
         return beam_directions_rot(self.bearings_rad, plane_rad[0], plane_rad[1], self.lever)
 
     def blind_zones(self, beam_polar_rad: Float[ndarray, " beams"]) -> Float[ndarray, "zones 2"]:
-        """Ranges of the polar angle about the axis that no start phase brings a beam to, shape (zones, 2)."""
+        """Return the ranges of the polar angle about the axis that are blind at every start phase."""
         return blind_zones(self.bearings_rad, beam_polar_rad, self.ball_rad)
 
     @property
@@ -68,9 +68,9 @@ class Problem:
         return self.objective.field
 
     def without_seam(self) -> Problem:
-        """The same with the nearest whole number of lines, if they are many: J differs, but nearly alike everywhere.
+        """Return the problem with the nearest integer number of lines, if they are many.
 
-        Counts at a seam take ten times as long.
+        This changes J of all mounts nearly equally, and counts without a seam are ten times as fast.
         """
         if self.sweep is not None or self.lines.count < MANY_LINES:
             return self
@@ -78,14 +78,14 @@ class Problem:
         return replace(self, lines=replace(self.lines, count=count, step_rad=2 * np.pi / count))
 
     def with_objective(self, objective: Objective) -> Problem:
-        """The same scanner with another aim."""
+        """Return the problem with another objective."""
         return replace(self, objective=objective)
 
     def behind(self, shadow: SelfOcclusion) -> Problem:
-        """The same task for the beams that no part blocks that turns with the laser.
+        """Return the problem without the beams that are blocked by parts that turn with the laser.
 
         Raises:
-            BuildError: the shadow is of another number of beams.
+            BuildError: the mask has another number of beams.
         """
         if len(shadow.beams) != len(self.bearings_rad):
             raise BuildError(
@@ -97,15 +97,15 @@ class Problem:
     def with_beams(
         self, bearings_rad: Float[ndarray, " beams"], lines: ScanLines, sweep: SweepLines | None = None
     ) -> Problem:
-        """The same task for other beams on other lines."""
+        """Return the problem with other beams and lines."""
         return replace(self, bearings_rad=bearings_rad, lines=lines, sweep=sweep)
 
 
 def problem_of(loaded: LoadedTask) -> Problem:
-    """The numbers that decide J.
+    """Return the numbers of a task that determine J.
 
     Raises:
-        TaskError: no direction has a weight, or the tolerance or the budget cannot be kept.
+        TaskError: no direction has a weight, or the tolerance or the budget cannot be met.
     """
     density = loaded.task.density
     field = field_of(loaded)
@@ -134,7 +134,7 @@ def problem_of(loaded: LoadedTask) -> Problem:
 
 
 def with_scanner(problem: Problem, lidar: Lidar, motion: Motion | Shortest) -> Problem:
-    """The same weights and objective, seen by another lidar on another motion."""
+    """Return the problem with another lidar and motion."""
     rate_hz = lidar.scan_rate_hz
     sweep = SweepLines(motion, rate_hz) if isinstance(motion, Sweep) else None
     seen = problem.with_beams(lidar.bearings_rad(), motion_lines(motion, rate_hz), sweep)
@@ -142,7 +142,7 @@ def with_scanner(problem: Problem, lidar: Lidar, motion: Motion | Shortest) -> P
 
 
 def motion_lines(motion: Motion | Shortest, scan_rate_hz: float) -> ScanLines:
-    """The scan lines of a motion; of a sweep as many as one period holds, the widest step apart."""
+    """Return the scan lines of a motion; for a sweep as many as one period has, at the widest step."""
     if isinstance(motion, StopAndGo):
         repeats = max(1, int(motion.dwell_s * scan_rate_hz + 1e-9))
         return ScanLines(motion.stops, 2 * np.pi / motion.stops, repeats)
@@ -153,20 +153,20 @@ def motion_lines(motion: Motion | Shortest, scan_rate_hz: float) -> ScanLines:
 
 
 def nodes_for(tolerance: float | None, budget_s: float | None) -> int:
-    """The cheapest nodes that keep a tolerance of J, or the most that a budget pays for, from the measured front.
+    """Return the fewest nodes within a tolerance of J, or else the most within a time budget.
 
-    `design/objective/front.csv` is the front; `benchmarks/design/front.py` measures it.
+    Errors and times are in `design/objective/front.csv`, measured by `benchmarks/design/front.py`.
 
     Raises:
-        TaskError: nothing on the front is that near, or that fast.
+        TaskError: no number of nodes is that accurate, or that fast.
     """
     if tolerance is None and budget_s is None:
         return NODES
     front = np.loadtxt(FRONT, delimiter=",", skiprows=1)
     paid = front[front[:, 2] <= (np.inf if budget_s is None else budget_s)]
     if not len(paid):
-        raise TaskError(f"density.budget_s = {budget_s:g}: the fastest score takes {front[:, 2].min():g} s")
+        raise TaskError(f"density.budget_s = {budget_s:g}: the fastest score needs {front[:, 2].min():g} s")
     near = paid[paid[:, 1] <= (np.inf if tolerance is None else tolerance)]
     if not len(near):
-        raise TaskError(f"density.tolerance = {tolerance:g}: the nearest that can be had is {paid[:, 1].min():g}")
+        raise TaskError(f"density.tolerance = {tolerance:g}: the smallest possible is {paid[:, 1].min():g}")
     return int(near[-1, 0] if tolerance is None else near[0, 0])

@@ -1,4 +1,4 @@
-"""Quadrature of one setting: the polar rule of its weights, broken at the breaks of its density too."""
+"""Quadrature of one mount: the polar rule of the weights, with further breaks for the density."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scanwright.design.sphere.regions import Field
 def polar_rule(
     problem: Problem, angles_rad: Setting, nodes: int, field: Field | None = None
 ) -> tuple[PolarRule, Float[ndarray, " beams"], Float[ndarray, " beams"]]:
-    """Quadrature for one setting over the weights of the task, or another field, and the beams' polar angles, azimuths.
+    """Return the quadrature of one mount over the weights of `field` (the task's), and polar and azimuth of its beams.
 
     Raises:
         TaskError: no direction has a weight.
@@ -38,7 +38,7 @@ def polar_rule(
 
 
 def _grid_rule(field: Field, step_deg: float, axis: Vector) -> PolarRule:
-    """The paper's sum: every grid node counts the same, poles and all."""
+    """Return the sum of the paper as a rule: every grid node has the same area, also at the poles."""
     grid = equal_angle_grid(step_deg)
     weights = field.weight_at(grid)
     hit = weights > 0
@@ -51,9 +51,9 @@ def _grid_rule(field: Field, step_deg: float, axis: Vector) -> PolarRule:
 def _density_breaks(
     bearings_rad: Float[ndarray, " beams"], beam_polar_rad: Float[ndarray, " beams"], ball_rad: float
 ) -> Float[ndarray, " n"]:
-    """Polar angles where a density starts, ends or peaks: a ball radius from the fan's extremes and its two ends.
+    """Return the polar angles at which a density starts, ends or peaks.
 
-    A fan all around has no ends: between its last beam and its first it goes on as between any two.
+    They are within a ball radius of the extremes of the field of view and of its ends, if it is not a full circle.
     """
     marks = np.array([beam_polar_rad.min(), beam_polar_rad.max()])
     if not is_closed(bearings_rad):

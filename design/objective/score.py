@@ -1,10 +1,9 @@
-"""J of one setting, with the error of its own quadrature, for any objective of `design.objective.named_objectives`.
+"""J of one mount and its numerical error, for any objective of `design.objective.named_objectives`.
 
-In coordinates about the axis each moment `int w <g(d)> dO / int w dO` is one-dimensional: the zonal `<g(d)>`
-(`design.density.spin`) times the mean weight of each circle (`design.sphere.regions`), both exact at every polar angle.
-What is left is the quadrature over that angle. Its segments end where a circle touches an edge of the region or passes
-a corner of it; the rule with a third of the nodes is inside the full one, and their difference measures the error.
-A sweep is not zonal: its moments are means over sets of directions that share none, and their spread is the error.
+For full turns each moment `int w <g(d)> dO / int w dO` is one-dimensional in the polar angle about the axis: `<g(d)>`
+(`design.density.spin`) times the mean weight of each circle (`design.sphere.regions`), both exact. The quadrature over
+the polar angle contains a rule with a third of the nodes, and their difference measures the error. For sweeps the
+moments are means over disjoint sets of directions, and their spread is the error.
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ from jaxtyping import Bool, Float, Int64
 from numpy import ndarray
 
 from scanwright.design.arrays import Setting
-from scanwright.design.density.spin import Zones, zones
-from scanwright.design.density.sweep import mean_count_swept, zones_swept
+from scanwright.design.density.spin import PhaseStatistics, phase_statistics
+from scanwright.design.density.sweep import mean_count_swept, phase_statistics_swept
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.named_objectives import Moment
 from scanwright.design.objective.problem import Problem
@@ -28,28 +27,28 @@ from scanwright.design.sphere.polar_rule import PolarRule
 from scanwright.design.sphere.total_weight import require_drawn
 
 MOST_NODES = 200_000
-ROUNDING = 1e-6  # floor of the stated error
-# shares of `_misfit` that are stated: of nodes further apart than `FAR` steps between beams, which may meet all beams
-# at nearly the same phase, and of closer ones (`benchmarks.design.claims stated`)
+ROUNDING = 1e-6  # smallest stated error
+# share of `_misfit` that is stated, for nodes more than `FAR` steps between beams apart, which can meet all beams at
+# nearly the same phase, and for closer nodes (`benchmarks.design.claims stated`)
 ERROR_SHARE, FAR = (0.7, 0.2), 0.6
-BENDS = 1.6  # weight of bends against differences of rules, whose finer one is off by a third to a ninth of them
-MISSED_AGAIN = 3.0  # times what a third of the nodes misses: each further third finds less
-RANGE = 16  # nodes of a range of polar angles that the search for the lowest count begins with
+BENDS = 1.6  # weight of bends relative to differences of rules, which are 3 to 9 times the error of the finer rule
+THIRD_FACTOR = 3.0  # error of a highest value, in units of the error of a third of the nodes
+RANGE = 16  # nodes of the first ranges of the search for the lowest count
 MOST_RANGES, SLIVER_RAD = 2048, 1e-6
 SETS = 8  # of directions for a sweep
-SURE = 4.5  # standard errors of their mean: by Student's t three in a thousand are further off
+SURE = 4.5  # standard errors of their mean: exceeded in 0.3 % of cases (Student's t)
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """J of one setting.
+    """J of one mount.
 
     Attributes:
         J: the objective.
-        J_error: estimate of its numerical error, on the safe side (`score_on`); of a lowest count one at least.
-        J_lower: with g of the mean counts, a lower bound of J as g is convex.
-        least: lowest count in the weighted region at any start phase, beams per ball.
-        blind_weight: share of the weight that is blind: beyond a ball radius of all that the fan passes over.
+        J_error: conservative estimate of its numerical error (`score_on`).
+        J_lower: J of the mean counts, a lower bound of J since g is convex.
+        least: lowest count of beams per ball in the weighted region at any start phase.
+        blind_weight: share of the weight farther than a ball radius from all scan lines.
     """
 
     J: float
@@ -60,35 +59,24 @@ class Score:
 
 
 def score(problem: Problem, angles_rad: Setting) -> Score:
-    """J of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], on as many nodes as its tolerance needs.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+    """Return J of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], with nodes added until the tolerance is met."""
     nodes, before = problem.nodes, None
     while True:
         result = score_on(problem, angles_rad, nodes)
         if result.J_error <= problem.tolerance or nodes >= MOST_NODES or problem.grid_step_deg:
             return result
-        if (result.J, result.J_error) == before:  # a whole count, which no nodes make smaller
+        if (result.J, result.J_error) == before:  # the error is that of one count: more nodes do not reduce it
             return result
         nodes, before = nodes * 3, (result.J, result.J_error)
 
 
 def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool = True) -> Score:
-    """J of a setting on a number of nodes; `J_error` and `J_lower` are NaN if they are not stated.
-
-    `ERROR_SHARE` of `_misfit` is stated. A missing weight changes a mean by how far g is from the mean there, so g
-    counts from it.
-
-    Raises:
-        TaskError: no direction has a weight.
-    """
+    """Return J of a mount on a number of nodes; without `stated`, `J_error` and `J_lower` are NaN."""
     join, moments = problem.objective.join, problem.objective.moments
     if problem.sweep is None:
-        result = [_moment_on_circles(problem, k, angles_rad, nodes, stated) for k in range(len(moments))]
+        result = [_moment_on_circles(problem, moment, angles_rad, nodes, stated) for moment in moments]
     else:
-        result = [_moment_on_directions(problem, k, angles_rad, nodes) for k in range(len(moments))]
+        result = [_moment_on_directions(problem, moment, angles_rad, nodes) for moment in moments]
     values = np.array([moment.value for moment in result])
     J = float(join(values))
     J_error = J_lower = np.nan
@@ -97,32 +85,30 @@ def score_on(problem: Problem, angles_rad: Setting, nodes: int, *, stated: bool 
         moved = np.array([join(np.where(each == k, m.value + m.error, values)) for k, m in enumerate(result)])
         J_error = float(np.linalg.norm(moved - J)) + problem.objective.join_error + ROUNDING if np.isfinite(J) else 0.0
         J_lower = float(join(np.array([moment.lower for moment in result])))
-    spoken = [(moment.share, m) for moment, m in zip(moments, result, strict=True) if moment.share > 0]
+    shares = [(moment.share, m) for moment, m in zip(moments, result, strict=True) if moment.share > 0]
     return Score(
         J=J,
         J_error=J_error,
         J_lower=J_lower,
-        least=min(m.least for _, m in spoken),
-        blind_weight=min(1.0, sum(share * m.blind for share, m in spoken)),
+        least=min(m.least for _, m in shares),
+        blind_weight=min(1.0, sum(share * m.blind for share, m in shares)),
     )
 
 
 def quick_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
-    """J alone, as `score` computes it: for searches that call it often."""
+    """Return J without its error, for searches that need it often."""
     return score_on(problem, angles_rad, nodes, stated=False).J
 
 
 def bound_J(problem: Problem, angles_rad: Setting, nodes: int) -> float:
-    """J of the mean counts of a sweep, a lower bound of J that takes a fraction of its time: for searches."""
-    values = [
-        _moment_on_directions(problem, k, angles_rad, nodes, exact=False).value
-        for k in range(len(problem.objective.moments))
-    ]
+    """Return J of the mean counts of a sweep, a lower bound of J that is much faster."""
+    moments = problem.objective.moments
+    values = [_moment_on_directions(problem, moment, angles_rad, nodes, exact=False).value for moment in moments]
     return float(problem.objective.join(np.array(values)))
 
 
 def blind_share(weights: Float[ndarray, " n"], blind: Bool[ndarray, " n"]) -> float:
-    """Share of weights (n,) that is blind, 0 .. 1: both sums are made alike, so all of it is 1 and no part is more."""
+    """Return the share of the weights that is blind; equal summation makes it exactly 1 if all are blind."""
     return float(np.where(blind, weights, 0.0).sum() / weights.sum())
 
 
@@ -132,12 +118,12 @@ def blind_to_sweep(
     beams_rot: Float[ndarray, "beams 3"],
     mean: Float[ndarray, " n"] | None = None,
 ) -> Bool[ndarray, " n"]:
-    """Whether directions of the rotation frame (n, 3) lie beyond a ball radius of all that a sweep passes over.
+    """Return whether directions of the rotation frame are farther than a ball radius from all lines of a sweep.
 
-    `mean` are their mean counts within the ball of the problem, if they are known.
+    `mean` are their mean counts within the ball of the problem, if known.
     """
     assert problem.sweep is not None
-    # between two beams the fan is continuous: no ball is smaller than half their step
+    # the field of view counts as continuous between beams: no ball is smaller than half their step
     ball_rad = max(problem.ball_rad, float(np.median(np.diff(problem.bearings_rad))) / 2 + 1e-9)
     if mean is None or ball_rad > problem.ball_rad:
         mean = mean_count_swept(directions_rot, beams_rot, problem.sweep, ball_rad)
@@ -146,7 +132,7 @@ def blind_to_sweep(
 
 @dataclass(frozen=True, slots=True)
 class _MomentValue:
-    """A moment of one setting, with the least count, the share that is blind, and its error and its lower bound."""
+    """A moment of one mount, its lowest count, blind share of the weight, error, and lower bound."""
 
     value: float
     least: int
@@ -155,16 +141,15 @@ class _MomentValue:
     lower: float = np.nan
 
 
-def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes: int, stated: bool) -> _MomentValue:
-    """A moment by quadrature over the polar angle."""
-    moment = problem.objective.moments[index]
+def _moment_on_circles(problem: Problem, moment: Moment, angles_rad: Setting, nodes: int, stated: bool) -> _MomentValue:
+    """Return a moment by quadrature over the polar angle."""
     rule, polar, azimuth = polar_rule(problem, angles_rad, nodes, moment.field)
 
-    def seen(polar_rad: Float[ndarray, " n"], until_rad: Float[ndarray, " n"] | None = None) -> Zones:
-        return zones(polar_rad, polar, azimuth, problem.lines, problem.ball_rad, moment.g, until_rad)
+    def seen(polar_rad: Float[ndarray, " n"], until_rad: Float[ndarray, " n"] | None = None) -> PhaseStatistics:
+        return phase_statistics(polar_rad, polar, azimuth, problem.lines, problem.ball_rad, moment.g, until_rad)
 
     z = seen(rule.polar_rad)
-    if stated and not problem.grid_step_deg:  # of the paper's grid nothing between the nodes counts
+    if stated and not problem.grid_step_deg:  # the paper's grid has no weight between nodes
         z = replace(z, least=_with_lowest(seen, rule, z))
     blind = np.zeros(len(rule.polar_rad), dtype=bool)
     for low, high in problem.blind_zones(polar):
@@ -183,11 +168,11 @@ def _moment_on_circles(problem: Problem, index: int, angles_rad: Setting, nodes:
 
 
 def _misfit(rule: PolarRule, share: Float[ndarray, " n"], g: Float[ndarray, " n"]) -> float:
-    """What a rule may be off by: the rule with a third of its nodes, and the bends of g from node to node.
+    """Return an error measure of a rule: differences from the rule with a third of its nodes, and bends of g.
 
-    Both rules may miss a step or a bend between two nodes alike; those that nodes meet show how large one may be, and
-    a step is a bend, too. The differences of the rules count in all, and half of each segment's, as they may cancel by
-    chance.
+    `g` is relative to its mean, since a missing weight changes the mean by g minus the mean. Both rules can miss the
+    same step between two nodes; second differences of g show how large such steps are. The difference in each segment
+    is included by half, since differences can cancel by chance.
     """
     by_segment = np.bincount(rule.segment, (share - rule.coarse / rule.fine.sum()) * g)
     pairs = np.maximum(share[1:], share[:-1])
@@ -196,19 +181,21 @@ def _misfit(rule: PolarRule, share: Float[ndarray, " n"], g: Float[ndarray, " n"
 
 
 def _widest_rad(rule: PolarRule) -> float:
-    """The widest distance between neighbouring nodes with weight."""
+    """Return the widest distance between neighbouring nodes with weight."""
     inside = (rule.segment[1:] == rule.segment[:-1]) & (rule.fine[1:] > 0) & (rule.fine[:-1] > 0)
     return float(np.diff(rule.polar_rad)[inside].max(initial=0.0))
 
 
 def _with_lowest(
-    seen: Callable[[Float[ndarray, " n"], Float[ndarray, " n"] | None], Zones], rule: PolarRule, z: Zones
+    seen: Callable[[Float[ndarray, " n"], Float[ndarray, " n"] | None], PhaseStatistics],
+    rule: PolarRule,
+    z: PhaseStatistics,
 ) -> Float[ndarray, " n"]:
-    """Lowest counts at the nodes, that of the lowest node replaced by the lowest of the whole region, shape (n,).
+    """Return the lowest counts at the nodes, with that of the lowest node replaced by the lowest of the entire region.
 
-    A count dips where windows of several beams begin and end within less than a node. Branch and bound over ranges of
-    the polar angle: those whose bound is not below the lowest count so far are done, the others are halved until they
-    are shorter than `SLIVER_RAD`. Of more than `MOST_RANGES` those of the highest bounds are dropped.
+    Between nodes the count can be lower. Branch and bound over ranges of the polar angle: ranges whose bound is below
+    the lowest count are halved until they are shorter than `SLIVER_RAD`. If there are more than `MOST_RANGES`, those
+    with the highest bounds are dropped.
     """
     t, there = rule.polar_rad, rule.fine > 0
     lowest = np.flatnonzero(there)[np.argmin(z.least[there])]
@@ -231,12 +218,12 @@ def _with_lowest(
 def _weighted_ranges(
     t: Float[ndarray, " n"], there: Bool[ndarray, " n"], segment: Int64[ndarray, " n"]
 ) -> tuple[Float[ndarray, " ranges"], Float[ndarray, " ranges"]]:
-    """Ranges of some nodes each that together are all segments with weight: their lower and their upper ends."""
+    """Return the lower and the upper ends of ranges of `RANGE` nodes that cover all segments with weight."""
     apart = (segment[1:] != segment[:-1]) | ~there[1:] | ~there[:-1]
     first, last = np.flatnonzero(np.append(True, apart)), np.flatnonzero(np.append(apart, True))
     first, last = first[last > first], last[last > first]
     ends = [
-        # nodes crowd at the ends of a segment: the first is an eighth of a step from it
+        # nodes are dense at the ends of a segment: the first is an eighth of a step from its end
         np.array([t[i] - (t[i + 1] - t[i]) / 8, *t[i + RANGE : k : RANGE], t[k] + (t[k] - t[k - 1]) / 8])
         for i, k in zip(first, last, strict=True)
     ]
@@ -245,14 +232,13 @@ def _weighted_ranges(
 
 
 def _moment_on_directions(
-    problem: Problem, index: int, angles_rad: Setting, nodes: int, *, exact: bool = True
+    problem: Problem, moment: Moment, angles_rad: Setting, nodes: int, *, exact: bool = True
 ) -> _MomentValue:
-    """A moment over `SETS` sets of directions, of which `SURE` standard errors are its error, or over the grid.
+    """Return a moment over `SETS` sets of directions, or over the grid; of the mean counts if not `exact`.
 
-    If it is not to be exact, it is that of the mean counts.
+    Its error is `SURE` standard errors of the mean over the sets.
     """
     assert problem.sweep is not None
-    moment = problem.objective.moments[index]
     R = R_world_rot(angles_rad[0], angles_rad[1])
     beams = problem.beams_rot(angles_rad[2:])
     sets = sample_sets(moment.field, problem.grid_step_deg, nodes // SETS, SETS)
@@ -260,10 +246,10 @@ def _moment_on_directions(
         require_drawn(moment.field, np.concatenate([samples.weights for samples in sets]) / SETS)
     directions = np.concatenate([samples.directions for samples in sets]) @ R
     if exact:
-        z = zones_swept(directions, beams, problem.sweep, problem.ball_rad, moment.g)
+        z = phase_statistics_swept(directions, beams, problem.sweep, problem.ball_rad, moment.g)
     else:
         mean = mean_count_swept(directions, beams, problem.sweep, problem.ball_rad)
-        z = Zones(moment.g(mean), mean, mean, mean)
+        z = PhaseStatistics(moment.g(mean), mean, mean, mean)
     blind = blind_to_sweep(problem, directions, beams, z.mean)
     lower = moment.g(z.mean)
     result, first = [], 0
@@ -293,14 +279,14 @@ def _moment_on_directions(
 
 def _highest(
     moment: Moment,
-    z: Zones,
+    z: PhaseStatistics,
     lower: Float[ndarray, " n"],
     fine: Float[ndarray, " n"],
     blind: Bool[ndarray, " n"],
 ) -> _MomentValue:
-    """The highest g anywhere; the mean error of every third node gives that of all.
+    """Return the highest g, with an error from the three subsets of every third node.
 
-    All thirds may meet the same count where a sliver between two nodes has one less, so that is the least error.
+    All subsets can contain the same count, and a sliver between two nodes one less: that is the smallest error.
     """
     g = np.where(fine > 0, moment.g(z.least), -np.inf)
     least = int(z.least[fine > 0].min())
@@ -308,7 +294,7 @@ def _highest(
     thirds = [highest for highest in (g[i::3].max(initial=-np.inf) for i in range(3)) if np.isfinite(highest)]
     return _MomentValue(
         value=value,
-        error=max(MISSED_AGAIN * (value - float(np.mean(thirds))), _one_less(moment, least)),
+        error=max(THIRD_FACTOR * (value - float(np.mean(thirds))), _one_less(moment, least)),
         lower=float(lower[fine > 0].max()),
         least=least,
         blind=blind_share(fine, blind),
@@ -316,7 +302,7 @@ def _highest(
 
 
 def _one_less(moment: Moment, least: int) -> float:
-    """How much g rises if a count is one less than `least`; 0 if there is none less."""
+    """Return the rise of g if the count is one less than `least`; 0 if `least` is 0."""
     if not least:
         return 0.0
     fewer, now = moment.g(np.array([least - 1.0, least]))

@@ -1,7 +1,6 @@
-"""What is reported is counted first: J of a setting against a brute-force count over its simulated beams.
+"""Check of a reported J by a brute-force count over simulated beams, before parts are made from the angles.
 
-The count (`design.objective.counted`) shares neither regions nor quadrature with J, so that no fault of either leaves
-the program as an answer: angles are cut into parts.
+The count (`design.objective.counted`) shares neither regions nor quadrature with J.
 """
 
 from __future__ import annotations
@@ -20,14 +19,14 @@ from scanwright.design.objective.score import Score, score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import LoadedTask
 
-SURE = 4.0 / 3.0  # times the three standard errors that a count states
-NEAR = 5e-3  # a wrong field is off by far more
+SURE = 4.0 / 3.0  # four standard errors, in units of the three that a count states
+NEAR = 5e-3  # error of the count to aim at; wrong weights change J by far more
 SETS = 16
-FIRST = 256  # directions of each set, in all regions together: their spread decides how many are needed
-AIM = 0.8  # of NEAR: the spread of few directions is itself uncertain
-MOST_WORK = 2.4e5  # directions of one set times what each costs: 0.3 s of processor in all
-PER_LAYER = 4.0  # what a direction costs for each region that may contain it, in beams
-AGAIN = 8  # times more before a difference is an error: one count in a thousand is off by more than it states
+FIRST = 256  # directions of each set at first; their spread shows how many are needed
+AIM = 0.8  # of NEAR, since the spread of few directions is uncertain
+MOST_WORK = 2.4e5  # directions of one set times the cost of each: 0.3 s of processor time in all
+PER_LAYER = 4.0  # cost of a direction for each region, in beams
+AGAIN = 8  # increase of directions before a difference is an error: one count in 1000 exceeds its error
 
 
 def require_counted(
@@ -37,21 +36,15 @@ def require_counted(
     shadow: SelfOcclusion | None = None,
     lever: tuple[float, float, float] = NO_LEVER,
 ) -> None:
-    """Compare the score of the setting (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with a count.
+    """Compare the score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad] with a count of simulated beams.
 
-    Of the objective `worst` a count finds an upper bound only, and objectives of installed packages have no formula
-    for counts: J of `log` is compared, which uses the same beams, regions and lines.
-
-    Args:
-        loaded: the task, with the motion of the score.
-        angles_rad: the setting.
-        result: its score, with the parts if `shadow` is given.
-        shadow: the beams that its parts block.
-        lever: of the optical centre off the axis, as in `design.objective.problem.Problem`.
+    `result` is the score without the beams that `shadow` blocks. For the objective `worst` a count gives a bound only,
+    and objectives of installed packages have no formula for counts: then J of `log` is compared, which uses the same
+    beams, regions and lines.
 
     Raises:
         NumericalError: they differ by more than their errors.
-        TaskError: the masks leave next to nothing of the regions.
+        TaskError: the masks leave too little of the regions.
     """
     objective = loaded.task.density.objective
     if objective == "worst" or objective not in COUNTED:
@@ -61,7 +54,7 @@ def require_counted(
             _require_log(loaded, angles_rad)
         return
     J, J_error, points = _counted(loaded, angles_rad, shadow, lever)
-    if not np.isfinite(J_error):  # a set of directions without beams: only the objective `log` is finite then
+    if not np.isfinite(J_error):  # a set of directions has no beams: only `log` is finite then
         if shadow is None and lever == NO_LEVER:
             _require_log(loaded, angles_rad)
         return
@@ -83,7 +76,7 @@ def _agree(J: float, result: Score, J_error: float) -> bool:
 def _counted(
     loaded: LoadedTask, angles_rad: Setting, shadow: SelfOcclusion | None, lever: tuple[float, float, float]
 ) -> tuple[float, float, int]:
-    """J by counting, four standard errors of it, and the directions of each set that it took."""
+    """Return J by counting, four standard errors, and the directions of each set."""
     task = loaded.task
     points = FIRST
     try:
@@ -93,7 +86,7 @@ def _counted(
     near = max(4.0, len(loaded.lidar.bearings_rad()) * min(1.0, task.density.ball_radius_deg / 60))
     cost = near + PER_LAYER * (len(task.weight) + len(task.mask)) / max(count.weighted, 1e-3)
     while SURE * count.J_error > NEAR and 2 * points * cost <= MOST_WORK:
-        # the error of a net falls nearly as the number of its points, which is a power of two
+        # the error of a net is nearly inversely proportional to the number of its points, a power of two
         needed = np.ceil(np.log2(SURE * count.J_error / (AIM * NEAR)))
         points *= 2 ** int(min(needed, np.log2(MOST_WORK / cost / points)))
         count = counted_J(loaded, angles_rad, points, points, SETS, shadow=shadow, lever=lever)

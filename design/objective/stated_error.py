@@ -1,4 +1,4 @@
-"""Error bounds as printed: one digit, rounded up, the same everywhere."""
+"""Error bounds as printed: one digit, rounded up."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def rounded_to_error(value: float, error: float) -> tuple[float, float]:
-    """A value rounded to one digit of its error, and the error rounded up to hold the rounding too."""
+    """Return a value rounded to the first digit of its error, and the error rounded up to include the rounding."""
     if not error > 0:
         return value, error
     digits = -int(np.floor(np.log10(error)))
@@ -17,5 +17,5 @@ def rounded_to_error(value: float, error: float) -> tuple[float, float]:
 
 
 def error_words(value: float, error: float) -> str:
-    """The bound on the error of a value in one digit; it also holds if the value is rounded to that digit."""
+    """Return the bound of an error with one digit, which includes rounding the value to that digit."""
     return f"{rounded_to_error(value, error)[1]:.0e}"

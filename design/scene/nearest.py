@@ -25,7 +25,7 @@ Nearest: TypeAlias = Callable[[Array, Array], tuple[NDArray[np.int32], Array]]
 """Origins and unit directions, both (n, 3), to the row of the triangle that each ray hits first and its range, both
 (n,); the row is -1 if there is nothing."""
 
-_BATCH = 1 << 12  # rays; each may have hundreds of candidates, and each of those takes some 300 bytes
+_BATCH = 1 << 12  # rays; each may have hundreds of candidates, of some 300 bytes each
 _SLACK = 1e-9  # of the size of the triangle or of the scene
 _NO_SLOPE = 1e-300  # replaces 0, so that a ray parallel to a face has a finite intersection
 
@@ -66,7 +66,7 @@ def by_boxes(triangles: Array) -> Nearest:
     tree: Any = Index((np.arange(len(triangles)), low, high), properties=Property(dimension=3))
     low, high = low.min(axis=0), high.max(axis=0)
     slack = _SLACK * float((high - low).max())
-    steps = 1 + isqrt(len(triangles)) // 60  # among many triangles a long slanting box holds too many of them
+    steps = 1 + isqrt(len(triangles)) // 60  # among many triangles the box of a long ray contains too many of them
 
     def nearest_of_batch(origins: Array, directions: Array, triangle: NDArray[np.int32], range_m: Array) -> None:
         slope = np.where(directions == 0, _NO_SLOPE, directions)
@@ -103,7 +103,7 @@ def _meeting(tree: Any, low: Array, high: Array) -> tuple[Ints, Ints]:
     if int(np.__version__.split(".")[0]) > 1:
         triangle, count = tree.intersection_v(low, high)
         return triangle, count.astype(int)
-    # rtree 1.4.1 cannot allocate its result with NumPy 1; one box at a time takes four times as long
+    # rtree 1.4.1 cannot allocate its result with NumPy 1; one box at a time is four times slower
     met = [list(tree.intersection(box)) for box in np.concatenate([low, high], axis=1).tolist()]
     return np.array([i for each in met for i in each], int), np.array([len(each) for each in met], int)
 

@@ -85,15 +85,10 @@ class ParallelView:
 def view_of(
     corners_m: Array, size: tuple[int, int], yaw_rad: float, pitch_rad: float, margin: float, R: Rotation | None = None
 ) -> ParallelView:
-    """Return the view that shows all of the points.
+    """Return the view that shows all of the points, shape (n, 3), in `size` columns and rows.
 
-    Args:
-        corners_m: the points, shape (n, 3).
-        size: pixels, columns and rows.
-        yaw_rad: of the viewer about z, from x.
-        pitch_rad: of the viewer above the horizontal.
-        margin: width of the picture over the width of the points.
-        R: the frame in which z is upright, its axes as columns; the points' own by default.
+    The viewer is at `yaw_rad` about z from x, and `pitch_rad` above the horizontal. `margin` is the width of the
+    picture over that of the points. The columns of `R` are the axes of the frame in which z is upright.
     """
     cy, sy, cp, sp = np.cos(yaw_rad), np.sin(yaw_rad), np.cos(pitch_rad), np.sin(pitch_rad)
     axes = np.array([[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]])

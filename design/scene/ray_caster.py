@@ -114,13 +114,7 @@ def build_scene(triangles_m: Float[ndarray, "t 3 3"], name: str = "scene") -> Sc
 
 
 def cast(scene: Scene, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
-    """Return the nearest surface along each ray.
-
-    Args:
-        scene: the surfaces.
-        origins_m: where the rays start, shape (n, 3), or (3,) for all.
-        directions: unit vectors, shape (n, 3).
-    """
+    """Return the nearest surface along rays from origins, shape (n, 3) or (3,), in unit directions, shape (n, 3)."""
     directions = np.asarray(directions, dtype=float)
     origins = np.broadcast_to(np.asarray(origins_m, dtype=float), directions.shape)
     hits = Hits(

@@ -1,7 +1,7 @@
-"""Where coarse J is computed: at polar angles about the axis, or at directions of the rotation frame if it sweeps.
+"""Nodes of coarse J: polar angles about the axis for full turns, directions of the rotation frame for sweeps.
 
-A moment of a scan plane about an axis is its `<g(d)>` over the nodes times the weight about the axis over them. The
-density of a sweep differs all around the axis, so the twist of the servo about it counts and nothing folds.
+The density of a sweep is not symmetric about the axis, so the orientation of the servo about it matters, and the grid
+has no symmetries.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from scanwright.design.arrays import Array, Counts, Ints
 from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, polar_of_planes
-from scanwright.design.density.spin import Zones, mean_count, zones
-from scanwright.design.density.sweep import mean_count_swept, zones_swept
+from scanwright.design.density.spin import PhaseStatistics, mean_count, phase_statistics
+from scanwright.design.density.sweep import mean_count_swept, phase_statistics_swept
 from scanwright.design.errors import TaskError
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.named_objectives import Moment
@@ -27,21 +27,21 @@ from scanwright.design.sphere.outline import reach_about
 from scanwright.design.sphere.polar_weights import weights_over_polar
 from scanwright.design.sphere.regions import Field
 
-FEW_AXES = 4000  # up to here the polar angle gets a node every 0.5 deg, beyond every 1 deg
+FEW_AXES = 4000  # up to this number nodes are 0.5 deg apart, above 1 deg
 MOST_NODES = 1441  # for balls below half a degree
-DIRECTIONS = 3000  # of the rotation frame, at least: one every 3.7 deg
+DIRECTIONS = 3000  # fewest of the rotation frame: one every 3.7 deg
 MOST_DIRECTIONS = 20_000
-IN_REGION = 600  # of them, if it takes no more than the most
+IN_REGION = 600  # directions wanted in the region
 MOST_SETTINGS = 50_000_000
 
 
 class Circles:
-    """Polar angles about the axis of a turn, evenly from 0 to pi; planes and axes are classes of the grid.
+    """Equally spaced polar angles about the axis, for full turns; planes and axes are classes of the grid.
 
     Attributes:
-        batch: planes whose exact densities are computed before the bound is compared again.
-        turns: whether a plane turned round has its nodes in the opposite order.
-        orientations: makes a moment of planes about axes, both ways round.
+        batch: planes whose exact densities are computed at once.
+        turns: whether a flipped plane has its nodes in the opposite order.
+        orientations: computes a moment of planes about axes, not flipped and flipped.
     """
 
     batch, turns = 64, True
@@ -49,26 +49,26 @@ class Circles:
 
     def __init__(self, space: SearchSpace, fineness: float) -> None:
         self._problem, self._axes = space.problem, space.axes.representatives
-        # caustics are as wide as the ball: a node every quarter of it, and every 0.5 deg at least
+        # caustics are as wide as the ball: nodes are at most a quarter of it apart
         usual = max(180, 2 * np.pi / self._problem.ball_rad) if len(self._axes) <= FEW_AXES else 90
         half = min((MOST_NODES - 1) // 2, int(fineness * usual))
-        self._polar = np.linspace(0, np.pi, 2 * half + 1)  # odd: the one at the equator stays when it is turned round
+        self._polar = np.linspace(0, np.pi, 2 * half + 1)  # odd, so that a flip keeps the node at the equator
         self._planes_rad = np.radians(space.planes.settings_deg[space.planes.first])
         self._fans = fan_reach(self._problem, self._planes_rad)
 
     def weights(self, field: Field) -> Array:
-        """Share of a weight at the nodes, shape (axes, nodes)."""
+        """Return the share of a weight at the nodes, shape (axes, nodes)."""
         nodes = len(self._polar)
-        return weights_over_polar(field, self._axes, nodes, nodes - 1, self._problem.grid_step_deg)
+        return weights_over_polar(field, self._axes, nodes, self._problem.grid_step_deg)
 
     def inside(self, weights: Array) -> Array:
-        """Nodes that lie in the region and not at its edge, 1 or 0, shape (axes, nodes)."""
+        """Return 1 for nodes inside the region and not at its edge, else 0, shape (axes, nodes)."""
         there = weights > 0
         there[:, 1:-1] &= there[:, :-2] & there[:, 2:]
         return there.astype(np.float32)
 
     def means(self) -> Array:
-        """Mean counts, shape (planes, nodes)."""
+        """Return the mean counts, shape (planes, nodes)."""
         problem = self._problem
 
         def of(chunk: slice) -> Array:
@@ -78,29 +78,30 @@ class Circles:
         return np.concatenate(in_chunks(of, len(self._planes_rad), smallest=8))
 
     def exact(self, planes: Ints) -> tuple[Array, Array]:
-        """`<g(d)>` of some planes, shape (moments, n, nodes), and the least counts, shape (n, nodes)."""
+        """Return `<g(d)>` of some planes, shape (moments, n, nodes), and the lowest counts, shape (n, nodes)."""
         problem, planes_rad = self._problem, self._planes_rad[planes]
 
         def of(plane: Array) -> tuple[Array, Array]:
             beams = polar_and_azimuth(beam_directions_rot(problem.bearings_rad, *plane))
             return _rows(
-                problem.objective.moments, lambda g: zones(self._polar, *beams, problem.lines, problem.ball_rad, g)
+                problem.objective.moments,
+                lambda g: phase_statistics(self._polar, *beams, problem.lines, problem.ball_rad, g),
             )
 
         parts = in_chunks(lambda chunk: [of(plane) for plane in planes_rad[chunk]], len(planes_rad), smallest=1)
         return _stacked([row for part in parts for row in part])
 
-    def blind(self, means: Array) -> Array:  # noqa: ARG002, of a sweep it depends on them
-        """Nodes beyond a ball radius of all that the fan passes over, 1 or 0, shape (planes, nodes)."""
+    def blind(self, means: Array) -> Array:  # noqa: ARG002, used for sweeps
+        """Return 1 for blind nodes, else 0, shape (planes, nodes)."""
         return ((self._polar < self._fans[:, :1]) | (self._polar > self._fans[:, 1:])).astype(np.float32)
 
-    def no_hole(self, field: Field, blind: Array, weights: Array) -> Constraint:  # noqa: ARG002, of a sweep, too
-        """The constraint that no part of a field is blind."""
+    def no_hole(self, field: Field, blind: Array, weights: Array) -> Constraint:  # noqa: ARG002, used for sweeps
+        """Return the constraint that no part of a field is blind."""
         return NoHole(self._fans, reach_about(field, self._axes))
 
 
 class Directions:
-    """Directions of the rotation frame, evenly over the sphere, for a sweep."""
+    """Directions of the rotation frame that cover the sphere evenly, for sweeps; see `Circles`."""
 
     batch, turns = 16, False
     orientations = staticmethod(one_orientation)
@@ -109,8 +110,8 @@ class Directions:
         settings = len(space.planes.first) * len(space.axes.first)
         if settings > MOST_SETTINGS:
             raise TaskError(
-                f"angles.step_deg: {settings:,} settings: nothing folds when the servo sweeps, at most "
-                f"{MOST_SETTINGS:,}: take a larger step_deg, or fix an angle"
+                f"angles.step_deg: {settings:,} settings, at most {MOST_SETTINGS:,} for a sweep, which has no "
+                "symmetries: use a larger step_deg, or fix an angle"
             )
         self._problem = space.problem
         share = float((space.problem.field.weight_at(spiral(MOST_DIRECTIONS)) > 0).mean())
@@ -136,7 +137,7 @@ class Directions:
         return rows / total
 
     def _weights_nearby(self, field: Field) -> Array:
-        """The same for a region between the directions: each of its own directions counts at the nearest one."""
+        """Return the weights of a small region: each direction of the region counts at the nearest node."""
         from scipy.spatial import cKDTree  # a heavy import that few tasks need
 
         samples = weighted_samples(field, IN_REGION)
@@ -166,7 +167,8 @@ class Directions:
 
         def of(beams: Array) -> tuple[Array, Array]:
             return _rows(
-                problem.objective.moments, lambda g: zones_swept(self._directions, beams, sweep, problem.ball_rad, g)
+                problem.objective.moments,
+                lambda g: phase_statistics_swept(self._directions, beams, sweep, problem.ball_rad, g),
             )
 
         return _stacked([of(self._beams[plane]) for plane in planes])
@@ -177,13 +179,15 @@ class Directions:
         hidden = [blind_to_sweep(self._problem, self._directions, beams, row) for beams, row in rows]
         return np.stack(hidden).astype(np.float32)
 
-    def no_hole(self, field: Field, blind: Array, weights: Array) -> Constraint:  # noqa: ARG002, of a turn it counts
+    def no_hole(self, field: Field, blind: Array, weights: Array) -> Constraint:  # noqa: ARG002, used for turns
         """See `Circles`."""
         return AtMost(blind, (weights > 0).astype(np.float32), 0.5, turns=False)
 
 
-def _rows(moments: tuple[Moment, ...], seen: Callable[[Callable[[Counts], Array]], Zones]) -> tuple[Array, Array]:
-    """What one plane gives each moment at the nodes, shape (moments, nodes), and the least count there."""
+def _rows(
+    moments: tuple[Moment, ...], seen: Callable[[Callable[[Counts], Array]], PhaseStatistics]
+) -> tuple[Array, Array]:
+    """Return g of one plane for each moment, shape (moments, nodes), and the lowest counts at the nodes."""
     rows = []
     for moment in moments:
         z = seen(moment.g)

@@ -1,9 +1,9 @@
-"""What scan planes, and pairs of scan planes and axes, must keep whatever their J, for the whole grid at once.
+"""Constraints on scan planes, and on pairs of a scan plane and an axis, evaluated for the entire grid.
 
-A plane alone decides its line gaps and its blind cones, so the search never computes J of planes that break their
-limits. A pair has no hole if its fan, a ball radius wider, reaches from the lowest polar angle of the region about the
-axis to the highest: two comparisons a pair. A lowest density, a share that may be blind, and all that a sweep must not
-miss are sums over nodes: one more product each.
+Line gaps and blind cones depend on the scan plane only, so planes that break their limits are removed from the grid. A
+pair has no blind spot if the polar angles of its field of view, widened by a ball radius, contain those of the region
+about the axis. A lowest density, a blind share of the weight, and blind spots of a sweep are sums over nodes: one
+matrix product each.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.search.grid_classes import Folded
 from scanwright.design.task.task import Limits
 
-TOUCHING_RAD = 1e-6  # rounding of what a fan and a region reach
-PIECE = 512  # planes, at least, whose beams are looked at together
+TOUCHING_RAD = 1e-6  # rounding error of the polar angles of field of view and region
+PIECE = 512  # fewest planes of one thread
 
 
 class Constraint(Protocol):
-    """What pairs of planes and axes must keep."""
+    """A constraint on pairs of planes and axes."""
 
     def broken(self, planes: slice, axes: slice) -> tuple[Mask, Mask]:
-        """Pairs of some planes with some axes that break it, straight and with the planes turned round."""
+        """Return whether pairs of planes and axes break it, with the planes not flipped, and flipped."""
         ...
 
     def of(self, planes: slice | Ints, axes: slice) -> Constraint:
-        """The same of some planes and some axes."""
+        """Return the constraint for some of the planes and axes."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class NoHole:
-    """Lowest and highest polar angle about the axis: of the fan and a ball, (planes, 2); of weight, (axes, 2)."""
+    """The field of view, widened by a ball radius, contains the lowest and highest polar angle of the region."""
 
     fan_rad: Float[ndarray, "planes 2"]
     region_rad: Float[ndarray, "axes 2"]
@@ -62,9 +62,9 @@ class NoHole:
 
 @dataclass(frozen=True, slots=True)
 class AtMost:
-    """A sum over nodes that may not be more than `most`: of planes (planes, nodes) times axes (axes, nodes).
+    """The sum of `of_planes` (planes, nodes) times `of_axes` (axes, nodes) over the nodes is at most `most`.
 
-    Turned round, a plane has its nodes in the opposite order; where nothing turns round both ways are the same.
+    If `turns`, a flipped plane has its nodes in the opposite order; else flipped planes are the same.
     """
 
     of_planes: Array
@@ -85,13 +85,13 @@ class AtMost:
 
 
 def fan_reach(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
-    """Lowest and highest polar angle that the fans of scan planes (n, 2) and a ball reach, shape (n, 2)."""
+    """Return the lowest and highest polar angle of the field of view of scan planes, widened by a ball radius."""
     reach = in_chunks(lambda chunk: _extremes(problem.bearings_rad, planes_rad[chunk]), len(planes_rad), PIECE)
     return np.concatenate(reach) + np.array([-problem.ball_rad, problem.ball_rad])
 
 
 def _extremes(bearings_rad: Float[ndarray, " beams"], planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, "n 2"]:
-    """Lowest and highest polar angle of the beams: the cosine tells whose they are, and costs a tenth of the angle."""
+    """Return the lowest and highest polar angle of the beams; finding them by cosines is ten times as fast."""
     R = R_rot_laser(*planes_rad.T)[:, :, :2]
     along = product(R[:, 2], np.stack([np.cos(bearings_rad), np.sin(bearings_rad)]))
     ends = bearings_rad[np.stack([along.argmax(axis=1), along.argmin(axis=1)])]
@@ -100,10 +100,10 @@ def _extremes(bearings_rad: Float[ndarray, " beams"], planes_rad: Float[ndarray,
 
 
 def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
-    """The scan planes of the grid that keep the limits on gaps and blind cones.
+    """Return the scan planes of the grid that meet the limits on gaps and blind cones.
 
     Raises:
-        TaskError: none does.
+        TaskError: there are none.
     """
     if limits.max_line_gap_deg is None and limits.max_blind_cone_deg is None:
         return planes
@@ -123,14 +123,14 @@ def allowed_planes(problem: Problem, planes: Folded, limits: Limits) -> Folded:
 
 
 def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str:
-    """Why limits on the scan plane leave parts of the region blind, from the best setting without that sees all."""
+    """Return the message for scan-plane limits that blind all mounts; without them `angles_deg` would be best."""
     planes_rad = np.radians(angles_deg[None, 2:])
     gap_deg, cone_deg = float(line_gaps_deg(problem, planes_rad)[0]), float(blind_cones_deg(problem, planes_rad)[0])
     if limits.max_line_gap_deg is not None and gap_deg > limits.max_line_gap_deg:
         limit = f"max_line_gap_deg = {limits.max_line_gap_deg:g}"
         lines = np.ceil(2 * np.pi / problem.lines.step_rad * gap_deg / limits.max_line_gap_deg - 1e-9)
         period = f"{lines:.0f} lines in a turn, a period_s of {lines / problem.scan_rate_hz:.6g}"
-        cure = f"lines {gap_deg:.3g} deg apart: the limit takes {period}"
+        cure = f"lines {gap_deg:.3g} deg apart: the limit requires {period}"
     else:
         limit = f"max_blind_cone_deg = {limits.max_blind_cone_deg:g}"
         cure = f"a blind cone of {cone_deg:.3g} deg that the region does not reach"
@@ -141,7 +141,7 @@ def blinding_words(problem: Problem, limits: Limits, angles_deg: Setting) -> str
 
 
 def planes_keep(problem: Problem, planes_rad: Float[ndarray, "n 2"], limits: Limits) -> Bool[ndarray, " n"]:
-    """Whether scan planes (n, 2) keep the limits on gaps and blind cones, shape (n,)."""
+    """Return whether scan planes meet the limits on gaps and blind cones, shape (n,)."""
     keep = np.ones(len(planes_rad), dtype=bool)
     if limits.max_line_gap_deg is not None:
         keep &= line_gaps_deg(problem, planes_rad) <= limits.max_line_gap_deg * (1 + 1e-9)
@@ -151,19 +151,19 @@ def planes_keep(problem: Problem, planes_rad: Float[ndarray, "n 2"], limits: Lim
 
 
 def blind_cones_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
-    """Half angle of the wider blind cone about the axis, of scan planes (n, 2), shape (n,)."""
+    """Return the half angle of the wider blind cone about the axis of each scan plane, shape (n,)."""
     polar = polar_of_planes(problem.bearings_rad, planes_rad)
     return np.degrees(np.maximum(polar.min(axis=1), np.pi - polar.max(axis=1)))
 
 
 def line_gaps_deg(problem: Problem, planes_rad: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
-    """Widest distance between neighbouring scan lines of one family, across them, of scan planes (n, 2), shape (n,)."""
+    """Return the widest distance between neighbouring scan lines of each scan plane, shape (n,)."""
     spacings = [line_spacing(beam_directions_rot(problem.bearings_rad, *plane), plane) for plane in planes_rad]
     return np.degrees(problem.lines.step_rad * np.array(spacings))
 
 
 def _only(planes: Folded, keep: Bool[ndarray, " classes"]) -> Folded:
-    """The classes that are kept, with their settings."""
+    """Return the selected classes with their settings."""
     numbers = np.cumsum(keep) - 1
     feasible = keep[planes.classes]
     places = np.cumsum(feasible) - 1

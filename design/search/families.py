@@ -1,4 +1,4 @@
-"""From the coarse landscape of J to the few answers a person wants: candidates, rescored exactly and refined."""
+"""Candidates: the local minima of coarse J, their exact scores, and their refinement to a short list of results."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ from scanwright.design.search.refinement import (
     Descent,
     allowed_setting,
     buildable_setting,
+    descend,
     descended,
-    walked,
 )
 from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.angle_ranges import NAMES
 
 FAMILIES = 10
-EQUAL = 1e-8  # J of settings that are equal by symmetry differ by rounding only
-SINGLE = 2e-6  # rounding of a landscape's lowest values, which are made in single precision
-MOST_WALKS = 0, 1, 16  # from each minimum, by the rounds of refinement
+EQUAL = 1e-8  # rounding error of J of mounts that are equal by symmetry
+SINGLE = 2e-6  # rounding error of the lowest values of a landscape, in single precision
+MOST_RUNS = 0, 1, 16  # simplex runs from each minimum, by the rounds of refinement
 VALLEY_J = 2e-2
-NEAR_RAD = np.radians(12.5)  # nearer axes with nearly the same J are one result, nearer planes about them neighbours
-PIECE = 128  # planes whose J are made together
-MOST_TRIES = 80  # for local minima, before the list is left shorter
-MOST_REFUSED = 200  # settings that keep a constraint at the nodes of the landscape and break it between them
+NEAR_RAD = np.radians(12.5)  # axes that are closer and have nearly the same J are one result
+PIECE = 128  # planes whose J are computed together
+MOST_TRIES = 80  # local minima and slopes that are examined
+MOST_REJECTED = 200  # mounts that meet a constraint at the nodes of the landscape, but break it between them
 
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Settings of equal J, shown by the one that builds best.
+    """A group of mounts of equal J, represented by the one that is easiest to build.
 
     Attributes:
         angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        score: its J, rescored exactly.
-        members: grid settings of the search that stand behind it.
-        word: what the others are, for a person.
+        score: its exact score.
+        members: number of mounts of the grid in the group.
+        word: description of the others.
     """
 
     angles_deg: tuple[float, float, float, float]
@@ -63,16 +63,22 @@ class Family:
         return np.radians(self.angles_deg)
 
     def facts(self) -> dict[str, float]:
-        """Angles, J and its error, with units, for JSON."""
+        """Return angles, J and its error by name, for JSON."""
         angles = {f"{name}_deg": angle for name, angle in zip(NAMES, self.angles_deg, strict=True)}
         return angles | {"J": self.score.J, "J_error": self.score.J_error}
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Settings of equal coarse J, shown by the one that builds best.
+    """A group of mounts of equal coarse J, represented by the one that is easiest to build.
 
-    `score` is the exact one of what is shown; only minima have it: none is on the slope of a better one.
+    Attributes:
+        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        J_coarse: coarse J.
+        score: exact score of a local minimum; None for a mount on the slope of a better one.
+        members: number of mounts of the grid in the group.
+        axes: number of their axes.
+        every_axis: whether these are all axes of the grid.
     """
 
     angles_deg: Setting
@@ -84,29 +90,30 @@ class Candidate:
 
 
 def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
-    """Local minima of J over what keeps the constraints, lowest first, then mounts on their slopes.
+    """Return the local minima of J that meet the constraints, lowest first, then mounts on their slopes.
 
-    Equal ones are one. A minimum takes its valley with it: settings about nearly the same axis with nearly the same J,
-    whatever the plane. What turns out to break a constraint between the nodes of the landscape is left out.
+    Mounts of equal J are one. The valley of a minimum is removed with it: mounts about nearly the same axis with nearly
+    the same J, whatever their scan plane. Mounts that break a constraint between the nodes of the landscape are
+    dropped.
     """
     planes, axes = land.space.planes, land.space.axes
     pieces = [slice(i, i + PIECE) for i in range(0, len(planes.first), PIECE)]
     J = np.concatenate([_feasible_J(land, piece) for piece in pieces])
     every = _distinct(axes.points)
-    left = J.reshape(len(J), -1).copy()
-    low = left.min(axis=1)  # of each plane
+    remaining = J.reshape(len(J), -1).copy()
+    low = remaining.min(axis=1)  # of each plane
     q = planes.representatives
     cosines = axes.representatives @ axes.representatives.T
     next_to, opposite = cosines >= np.cos(NEAR_RAD), cosines <= -np.cos(NEAR_RAD)
     minima: list[Candidate] = []
     slopes: list[Candidate] = []
-    tries = refused = 0
-    while tries < MOST_TRIES and refused < MOST_REFUSED and len(minima) < FAMILIES:
+    tries = rejected = 0
+    while tries < MOST_TRIES and rejected < MOST_REJECTED and len(minima) < FAMILIES:
         lowest = low.min()
         if not np.isfinite(lowest):
             break
         c = int((low <= lowest + EQUAL).argmax())
-        orientation, axis = divmod(int((left[c] <= lowest + EQUAL).argmax()), J.shape[2])
+        orientation, axis = divmod(int((remaining[c] <= lowest + EQUAL).argmax()), J.shape[2])
         same = J[c] <= lowest + EQUAL
         around = np.stack([side[same[0]].any(axis=0) for side in (next_to, opposite)])
         around |= np.stack([side[same[1]].any(axis=0) for side in (opposite, next_to)])
@@ -115,42 +122,42 @@ def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:
             for mirror in land.space.mirrors
             for sign, there in ((1, around), (-1, around[::-1]))
         ]
-        beaten = any((J.reshape(left.shape)[block] < lowest - EQUAL).any() for block in near)
+        beaten = any((J.reshape(remaining.shape)[block] < lowest - EQUAL).any() for block in near)
         candidate = _candidate(J[c], land, c, orientation, axis, every)
         exact = None if beaten else space.score(candidate.angles_deg)
         if not beaten and exact is None:
-            J[c][same] = left[c][same.ravel()] = np.inf
-            low[c] = left[c].min()
-            refused += 1
+            J[c][same] = remaining[c][same.ravel()] = np.inf
+            low[c] = remaining[c].min()
+            rejected += 1
             continue
         tries += 1
         (slopes if beaten else minima).append(replace(candidate, score=exact))
         changed = low <= lowest + (EQUAL if beaten else VALLEY_J)
         if not beaten:
             block = np.ix_(changed, (around | around[::-1]).ravel())
-            left[block] = np.where(left[block] <= lowest + VALLEY_J, np.inf, left[block])
+            remaining[block] = np.where(remaining[block] <= lowest + VALLEY_J, np.inf, remaining[block])
         for block in near:
-            left[block] = np.inf
+            remaining[block] = np.inf
             changed[block[0]] = True
-        low[changed] = left[changed].min(axis=1)
+        low[changed] = remaining[changed].min(axis=1)
     return minima + slopes
 
 
 def best_candidate(land: Landscape, space: SearchSpace, feasible: bool = True) -> Candidate | None:
-    """The lowest entry of a landscape too large to be looked at whole, or of all that keep no constraint.
+    """Return the lowest mount of a landscape that is exactly feasible; without `feasible`, the lowest of all.
 
-    None where the first `MOST_REFUSED` all break a constraint between the nodes of the landscape.
+    None if the lowest `MOST_REJECTED` all break a constraint between the nodes of the landscape.
     """
     lowest = (land.feasible if feasible else land.plain).by_plane.min(axis=0)
     rows: dict[int, Array] = {}
     every = _distinct(land.space.axes.points)
-    refused = 0
-    while refused < MOST_REFUSED and np.isfinite(lowest.min()):
+    rejected = 0
+    while rejected < MOST_REJECTED and np.isfinite(lowest.min()):
         c = int((lowest <= lowest.min() + SINGLE).argmax())
         if c not in rows:
             rows[c] = _feasible_J(land, slice(c, c + 1), feasible)[0]
         J = rows[c]
-        if J.min() > lowest[c] + SINGLE:  # what was lowest has been refused
+        if J.min() > lowest[c] + SINGLE:  # the lowest of this plane was rejected
             lowest[c] = J.min()
             continue
         orientation, axis = np.unravel_index(int((J.min() + EQUAL >= J).argmax()), J.shape)
@@ -160,12 +167,12 @@ def best_candidate(land: Landscape, space: SearchSpace, feasible: bool = True) -
             return replace(candidate, score=exact)
         J[J.min() + EQUAL >= J] = np.inf
         lowest[c] = J.min()
-        refused += 1
+        rejected += 1
     return None
 
 
 def _feasible_J(land: Landscape, piece: slice, feasible: bool = True) -> Array:
-    """Coarse J of a piece of the plane classes, (planes, ways round, axes): inf where the grid has none, or breaks."""
+    """Return coarse J of plane classes, (planes, 2, axes); inf for mounts outside the grid or the constraints."""
     planes, axes = land.space.planes, land.space.axes
     p = planes.has[:, piece, None]
     there = np.stack(
@@ -175,15 +182,15 @@ def _feasible_J(land: Landscape, piece: slice, feasible: bool = True) -> Array:
 
 
 def _distinct(points: Float[ndarray, "n 3"]) -> int:
-    """How many different points there are."""
+    """Return the number of different points."""
     return len(np.unique(np.round(points, 9) + 0.0, axis=0))
 
 
 def _candidate(J: Array, land: Landscape, plane: int, orientation: int, axis: int, every: int) -> Candidate:
-    """All grid settings that equal one entry by symmetry, shown by the one that builds best.
+    """Return the group of all mounts of the grid that equal J[orientation, axis] of a landscape by symmetry.
 
-    `J` is that of the plane class about all axes, shape (2, axes); `orientation` is 1 if just one of plane and axis is
-    flipped; `every` is how many different axes the grid has.
+    `J` is that of a plane class about all axes; `orientation` is 1 if one of plane and axis is flipped; `every` is the
+    number of different axes of the grid.
     """
     planes, axes = land.space.planes, land.space.axes
     same = np.abs(J - J[orientation, axis]) <= EQUAL
@@ -194,7 +201,7 @@ def _candidate(J: Array, land: Landscape, plane: int, orientation: int, axis: in
     angles = np.hstack([axes.settings_deg[which_a], planes.settings_deg[p[which_p]]])
     u = axes.points[which_a]
     distinct = _distinct(u)
-    # builds best: stands rather than hangs, blind wedge of the fan to the servo, axis upright, angles small
+    # easiest to build: upright rather than hanging, blind sector of the lidar to the servo, axis upright, small angles
     preference = (
         angles[:, 3],
         angles[:, 2],
@@ -214,14 +221,14 @@ def _candidate(J: Array, land: Landscape, plane: int, orientation: int, axis: in
 def refine_candidates(
     space: SearchSpace, candidates: list[Candidate], rounds: int = 2, progress: Progress = no_progress
 ) -> tuple[Family, ...]:
-    """Refine the minima: in one round by a walk each, in two as long as walks pay, and the best of them finely.
+    """Return the refined minima, at most one in each valley, then mounts on slopes, which are not refined.
 
-    No two are in one valley; settings on slopes follow as they are.
+    One round is a simplex run from each minimum; with two, runs go on while J falls, and the best is refined finely.
     """
     minima = list({tuple(each.angles_deg): each for each in candidates if each.score is not None}.values())
     starts = [(candidate.angles_deg, candidate.every_axis) for candidate in minima]
     apart: list[Descent] = []
-    for descent in descended(space, starts, MOST_WALKS[rounds], progress):
+    for descent in descended(space, starts, MOST_RUNS[rounds], progress):
         if not any(same_valley(descent.angles_deg, descent.J, better.angles_deg, better.J) for better in apart):
             apart.append(descent)
 
@@ -230,9 +237,9 @@ def refine_candidates(
 
     parts = in_chunks(lambda some: [finished(descent) for descent in apart[some]], len(apart), smallest=1)
     ready = list(chain.from_iterable(parts))
-    if MOST_WALKS[rounds] > 1:  # which is the best, exact scores tell; within a tolerance of the mounting the walks do
+    if MOST_RUNS[rounds] > 1:  # with a tolerance of the mounting the first run has the lowest J within it
         k = 0 if space.ranges.tolerance_deg else int(np.argmin([family.score.J for family in ready]))
-        ready[k] = finished(walked(space, apart[k], NARROW), NARROW.nodes)
+        ready[k] = finished(descend(space, apart[k], NARROW), NARROW.nodes)
     families: list[Family] = []
     for family in sorted(ready, key=lambda family: family.score.J):
         if _is_apart(family.angles_deg, family.score.J, families):
@@ -247,7 +254,7 @@ def refine_candidates(
 
 
 def same_valley(angles_deg: Setting, J: float, other_deg: Setting, other_J: float) -> bool:
-    """Whether two mounts have nearly the same axis and nearly the same J: the scan plane is then indifferent."""
+    """Return whether two mounts have nearly the same axis and nearly the same J."""
     if not abs(J - other_J) <= VALLEY_J:
         return False
     u, v = (R_world_rot(*np.radians(each[:2]))[:, 2] for each in (angles_deg, other_deg))
@@ -255,13 +262,13 @@ def same_valley(angles_deg: Setting, J: float, other_deg: Setting, other_J: floa
 
 
 def _is_apart(angles_deg: Array | tuple[float, ...], J: float, families: list[Family]) -> bool:
-    """Whether a setting is in no valley of the families, and these are not enough."""
+    """Return whether a mount is in no valley of the families, and there are fewer than `FAMILIES`."""
     known = any(same_valley(np.array(angles_deg), J, np.array(x.angles_deg), x.score.J) for x in families)
     return not known and len(families) < FAMILIES
 
 
 def _finished(space: SearchSpace, descent: Descent, candidate: Candidate, nodes: int) -> Family:
-    """A refined candidate, rounded and scored exactly; or itself, as rounder angles are better if J is as low."""
+    """Return a refined candidate, rounded and scored exactly; or the candidate itself if its J is as low."""
     exact = candidate.score
     assert exact is not None
     refined = buildable_setting(space, descent, nodes, candidate.angles_deg)
@@ -272,7 +279,7 @@ def _finished(space: SearchSpace, descent: Descent, candidate: Candidate, nodes:
 
 
 def _by_the_worst(space: SearchSpace, families: list[Family]) -> tuple[Family, ...]:
-    """Families in the order of their highest J when one angle is off by the tolerance of the mounting."""
+    """Return families in the order of their highest J if one angle is off by the tolerance of the mounting."""
     off_deg = space.ranges.tolerance_deg
     worst = [worst_within(space.problem, family.angles_rad, np.radians(off_deg), NODES) for family in families]
     order = np.argsort(worst, kind="stable")
@@ -283,9 +290,5 @@ def _by_the_worst(space: SearchSpace, families: list[Family]) -> tuple[Family, .
 
 def _family(angles_deg: Array, exact: Score, candidate: Candidate) -> Family:
     word = "any axis" if candidate.every_axis else f"{candidate.axes} axes" if candidate.axes > 1 else ""
-    return Family(_four(angles_deg), exact, candidate.members, word)
-
-
-def _four(angles_deg: Array) -> tuple[float, float, float, float]:
-    alpha_rot, beta_rot, alpha_laser, beta_laser = (float(angle) for angle in angles_deg)
-    return alpha_rot, beta_rot, alpha_laser, beta_laser
+    a, b, c, d = (float(angle) for angle in angles_deg)
+    return Family((a, b, c, d), exact, candidate.members, word)

@@ -1,11 +1,11 @@
-"""Grid settings of the four angles, folded to the few that differ.
+"""Classes of mounts of the grid with equal J.
 
-The four angles act through two things only (docs/definitions.md, Motion): which polar angles the beams sweep, decided
-by the third row q of `R_rot_laser`, and where the axis u points. And with the same J for it,
+J depends on two things only (docs/definitions.md, Motion): the polar angles of the beams, determined by the third row q
+of `R_rot_laser`, and the direction u of the axis. J is equal for
 
-    (q0, q1) about u is (-q0, -q1) about -u       for any fan
-    (q0, q1) about u is (q0, -q1) about u         for a symmetric fan
-    (q0, q1) about u is (-q0, -q1) about u        for a fan that looks as far behind as ahead: a full circle
+    (q0, q1) about u and (-q0, -q1) about -u      for any field of view
+    (q0, q1) about u and (q0, -q1) about u        for a symmetric field of view
+    (q0, q1) about u and (-q0, -q1) about u       for a full circle
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from scanwright.design.task.angle_ranges import AngleRanges
 
 @dataclass(frozen=True, slots=True)
 class Folded:
-    """Settings of one pair of angles, shape (n, 2): setting i belongs to classes[i], turned round where flip[i].
+    """Classes of the axes, or of the scan planes, of the grid.
 
     Attributes:
-        settings_deg: the grid settings, shape (n, 2).
-        points: what decides J: unit axes (n, 3), or (q0, q1) of the scan planes (n, 2).
-        classes: class of each setting, shape (n,).
-        flip: whether a setting is its class turned round, shape (n,).
-        first: the first setting of each class; it is never flipped.
-        has: whether a class has a setting that is not flipped, and one that is, shape (2, classes).
-        own: whether a class is its own turned image: its J is the same both ways round, shape (classes,).
+        settings_deg: the two angles of each of the n axes or planes.
+        points: unit vectors of the axes (n, 3), or (q0, q1) of the scan planes (n, 2).
+        classes: class of each.
+        flip: whether each is the opposite of the first one of its class.
+        first: index of the first one of each class.
+        has: whether a class has a member that is not flipped, and one that is.
+        own: whether a class equals its opposite.
     """
 
     settings_deg: Float[ndarray, "n 2"]
@@ -49,7 +49,7 @@ class Folded:
 
 
 def mirrors_of(bearings_rad: Float[ndarray, " beams"]) -> Float[ndarray, "mirrors 2 2"]:
-    """Mirrors of (q0, q1) that a fan allows, shape (1, 2 or 4, 2, 2); the identity is the first."""
+    """Return the mirrors of (q0, q1) that a field of view allows, shape (1, 2 or 4, 2, 2); the identity is first."""
     mirrors = np.array([np.eye(2)])
     if _same_circle(bearings_rad, -bearings_rad):
         mirrors = np.concatenate([mirrors, mirrors @ np.diag([1.0, -1.0])])
@@ -59,32 +59,32 @@ def mirrors_of(bearings_rad: Float[ndarray, " beams"]) -> Float[ndarray, "mirror
 
 
 def _same_circle(one_rad: Float[ndarray, " beams"], other_rad: Float[ndarray, " beams"]) -> bool:
-    """Whether two fans are the same directions, in whatever order and whole turns apart."""
+    """Return whether two sets of bearings are the same directions."""
     ends = np.array([np.sort(np.round(fan % (2 * np.pi), 9) % np.round(2 * np.pi, 9)) for fan in (one_rad, other_rad)])
     return bool(np.allclose(ends[0], ends[1], atol=1e-8))
 
 
 def fold_axes(ranges: AngleRanges) -> Folded:
-    """Axes of the grid up to their sign."""
+    """Return the axes of the grid, with opposite axes in one class."""
     settings = _grid(ranges, "alpha_rot", "beta_rot")
     return _fold(settings, R_world_rot(*np.radians(settings.T))[:, :, 2], np.eye(3)[None])
 
 
 def fold_planes(ranges: AngleRanges, mirrors: Float[ndarray, "mirrors 2 2"]) -> Folded:
-    """Scan planes of the grid up to the mirrors and the sign."""
+    """Return the scan planes of the grid, with their mirror images and opposites in one class."""
     settings = _grid(ranges, "alpha_laser", "beta_laser")
     return _fold(settings, plane_key(np.radians(settings)), mirrors)
 
 
 def unfolded(ranges: AngleRanges) -> tuple[Folded, Folded]:
-    """Axes and scan planes of the grid, each setting a class of its own: for a sweep, where nothing is equivalent."""
+    """Return axes and scan planes of the grid, each in a class of its own, for a sweep, which has no symmetries."""
     axes = _grid(ranges, "alpha_rot", "beta_rot")
     planes = _grid(ranges, "alpha_laser", "beta_laser")
     return _apart(axes, R_world_rot(*np.radians(axes.T))[:, :, 2]), _apart(planes, plane_key(np.radians(planes)))
 
 
 def plane_key(plane_rad: Float[ndarray, "*k 2"]) -> Float[ndarray, "*k 2"]:
-    """(q0, q1) of scan planes (alpha_laser, beta_laser) (n, 2): beam polar angles are acos(q0 cos b + q1 sin b)."""
+    """Return (q0, q1) of scan planes (alpha_laser, beta_laser): polar angles are acos(q0 cos b + q1 sin b)."""
     alpha, beta = plane_rad.T
     return np.stack([-np.sin(beta), np.cos(beta) * np.sin(alpha)], axis=1)
 
@@ -103,7 +103,7 @@ def _apart(settings: Float[ndarray, "n 2"], points: Float[ndarray, "n k"]) -> Fo
 def _fold(
     settings: Float[ndarray, "n 2"], points: Float[ndarray, "n k"], mirrors: Float[ndarray, "mirrors k k"]
 ) -> Folded:
-    """Group points that are equal up to the mirrors (no flip), or up to the mirrors and the sign (flip)."""
+    """Return classes of points that are equal up to the mirrors (not flipped) or up to mirrors and sign (flipped)."""
     images = np.concatenate([points @ m for m in mirrors] + [-points @ m for m in mirrors])
     keys = np.round(images, 9) + 0.0  # -0.0 is 0.0
     _, numbers = np.unique(keys, axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""The answer to a task: the search, its gain over the reference mounts, and both in words."""
+"""The result of a task: the search, its gain over the reference mounts, and their text."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from scanwright.design.search.shortest_period import fastest
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import LoadedTask
 
-SQUARE_DEGREES = 41_253  # on the whole sphere
+SQUARE_DEGREES = 41_253  # on the sphere
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a task comes to.
+    """The result of a task.
 
     Attributes:
-        asked: the task as it was read.
-        loaded: the same; where it asks for the shortest period, with the one that was found.
-        problem: its numbers.
-        search: the best families and how they were found.
+        requested: the task as it was read.
+        loaded: the same with the result of a search for the shortest period.
+        problem: the same as numbers.
+        search: result of the search.
     """
 
-    asked: LoadedTask
+    requested: LoadedTask
     loaded: LoadedTask
     problem: Problem
     search: SearchResult
@@ -53,34 +53,34 @@ class Optimum:
 
     @property
     def title(self) -> str:
-        """Sensor and duration of one full scan."""
+        """Sensor and duration of one full scan, as text."""
         task = self.loaded.task
         verb = "out and back" if task.motion.mode == "sweep" else "one turn"
         return f"{task.sensor}, {verb} in {task.motion.duration_s:g} s"
 
     @property
     def long_title(self) -> str:
-        """The same, and where the duration comes from."""
-        shortest = isinstance(self.asked.task.motion, Shortest)
+        """`title`, and the origin of the duration."""
+        shortest = isinstance(self.requested.task.motion, Shortest)
         return f"{self.title}, the shortest found that keeps the limits" if shortest else self.title
 
     def angle_set(self, rank: int = 0) -> AngleSet:
-        """The designed angles of a family, the best one first."""
+        """Return the designed angles of a family of the search, 0 is the best."""
         return angle_set(self.loaded, self.search.best[rank])
 
     @property
     def gains(self) -> tuple[Gain, ...]:
-        """What the answer is worth against the reference mounts, all without parts; the smallest gain first."""
-        answer = self.search.best[0]
-        return gains(self.problem, answer.angles_deg, answer.score.J, self.mounts)
+        """Gains over the reference mounts, all without parts; the smallest first."""
+        best = self.search.best[0]
+        return gains(self.problem, best.angles_deg, best.score.J, self.mounts)
 
     @property
     def left_out(self) -> list[LeftOut]:
-        """What the task made superfluous in the search."""
+        """Work that the search skipped."""
         return [*directions_left_out(self.problem), *self.search.left_out]
 
     def facts(self) -> dict[str, Any]:
-        """Names with units and values, for JSON."""
+        """Return the result by name, for JSON."""
         plain = self.search.plain
         return {
             "task": self.loaded.task.name,
@@ -128,14 +128,14 @@ class Optimum:
         """Return the blind spots of the optimum, or the cost of having none; `tabled`: they follow `table`."""
         best, plain, least = self.search.best[0], self.search.plain, self.search.least_blind
         lowest = best if self.search.lowest is None else self.search.lowest
-        found = [hole.words() for hole in holes(self.problem, best.angles_rad)]
+        lines = [hole.words() for hole in holes(self.problem, best.angles_rad)]
         if least is not None:
-            found.insert(
+            lines.insert(
                 0, f"no mount of the grid sees all of the region: at least {percent(least)} of the weight is blind"
             )
-        if found or plain is None:
-            return found or ["blind spots: none, without parts"]
-        named = "the last row" if tabled else _told(plain)
+        if lines or plain is None:
+            return lines or ["blind spots: none, without parts"]
+        named = "the last row" if tabled else _angles_and_J(plain)
         spots = "; ".join(hole.words() for hole in holes(self.problem, plain.angles_rad))
         return [
             "blind spots: none, without parts",
@@ -157,38 +157,35 @@ class Optimum:
         return [*lines, *self.hole_lines(), *self.preferred_lines()]
 
     def preferred_lines(self) -> list[str]:
-        """What was preferred to the lowest J, and what that costs."""
+        """Return the simple mount that was preferred to the lowest J, and its cost."""
         if self.search.lowest is None:
             return []
-        answer, optimum = self.search.best[0], self.search.lowest
-        loss = self.loaded.task.angles.prefer_loss
-        accepted = f"at most {percent(loss)} {'of the beams per ball' if self._logarithmic else 'of J'}"
-        if answer.angles_deg == optimum.angles_deg:
+        preferred, optimum = self.search.best[0], self.search.lowest
+        unit = "of the beams per ball" if self.problem.objective.name == "log" else "of J"
+        accepted = f"at most {percent(self.loaded.task.angles.prefer_loss)} {unit}"
+        if preferred.angles_deg == optimum.angles_deg:
             return [f"no simpler mount costs {accepted}: the result has the lowest J"]
-        used = angles_used(answer.angles_deg)
+        used = angles_used(preferred.angles_deg)
+        cost = price(self.problem, preferred.score.J, optimum.score.J)
         return [
-            f"preferred as the simplest mount that costs {accepted}: {_shown(answer)}, {used} "
+            f"preferred as the simplest mount that costs {accepted}: {_angles(preferred)}, {used} "
             f"{'angle is' if used == 1 else 'angles are'} not 0",
-            f"it costs {price(self.problem, answer.score.J, optimum.score.J)} against the lowest J, {_told(optimum)}",
+            f"it costs {cost} against the lowest J, {_angles_and_J(optimum)}",
         ]
-
-    @property
-    def _logarithmic(self) -> bool:
-        return self.problem.objective.name == "log"
 
 
 def price(problem: Problem, J: float, less: float) -> str:
-    """What a J costs against a lower one, in words."""
+    """Return the cost of a J relative to a lower one, as text."""
     if problem.objective.name == "log":
         return f"{percent(-math.expm1(less - J))} of the beams per ball"
     return f"{J - less:.2g} in J"
 
 
-def _told(family: Family) -> str:
-    return f"{_shown(family)} with J = {family.score.J:.4f}"
+def _angles_and_J(family: Family) -> str:
+    return f"{_angles(family)} with J = {family.score.J:.4f}"
 
 
-def _shown(family: Family) -> str:
+def _angles(family: Family) -> str:
     return angles_words(np.round(family.angles_deg, 2) + 0.0)
 
 
@@ -199,27 +196,27 @@ def _row(family: Family) -> str:
 
 
 def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
-    """Search a task, for the shortest period first if it asks for that.
+    """Search the best mounts of a task, and the shortest period if the task requests it.
 
     Raises:
-        TaskError: no direction has a weight, or no setting keeps the limits.
+        TaskError: no direction has a weight, or no mount meets the limits.
         NumericalError: the best J differs from a count over simulated beams.
     """
     progress("reading the task (first run: compiling, about 5 s)")
-    found = loaded
+    result_task = loaded
     if isinstance(loaded.task.motion, Shortest):
-        found, problem, result = fastest(loaded, progress)
-        progress(f"one turn in {found.task.motion.duration_s:g} s: the shortest found that keeps the limits")
+        result_task, problem, result = fastest(loaded, progress)
+        progress(f"one turn in {result_task.task.motion.duration_s:g} s: the shortest found that keeps the limits")
     else:
         problem = problem_of(loaded)
         result = search(problem, loaded.task.angles, progress, loaded.task.limits)
     best = result.best[0]
-    require_counted(found, best.angles_rad, best.score)
-    return Optimum(loaded, found, problem, result)
+    require_counted(result_task, best.angles_rad, best.score)
+    return Optimum(loaded, result_task, problem, result)
 
 
 def directions_left_out(problem: Problem) -> list[LeftOut]:
-    """Directions that no J ever looked at, in square degrees."""
+    """Return the directions without weight, in square degrees."""
     directions: Array = spiral(SQUARE_DEGREES)
     masked = problem.field.masked_at(directions)
     ignored = (problem.field.weight_at(directions) == 0) & ~masked
@@ -232,8 +229,8 @@ def directions_left_out(problem: Problem) -> list[LeftOut]:
 
 
 def angle_set(loaded: LoadedTask, family: Family) -> AngleSet:
-    """The designed angle set of a family; J is rounded to its error."""
-    assert not isinstance(loaded.task.motion, Shortest)  # the search has put the period that it found
+    """Return the designed angle set of a family; J is rounded to its error."""
+    assert not isinstance(loaded.task.motion, Shortest)  # the search has replaced it
     J, J_error = rounded_to_error(family.score.J, family.score.J_error)
     return loaded.angle_set(family.angles_deg).model_copy(
         update={

@@ -1,4 +1,4 @@
-"""Products of all scan planes with all axes, made in pieces, of which only the lowest along each side stays."""
+"""Moments of all scan planes about all axes as matrix products, computed in tiles, and the lowest J of each."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.design.objective.named_objectives import Moment, Objective
 from scanwright.design.search.constraints import Constraint
 
-PIECE, PART = 128, 4096  # planes and axes per tile of the product: the cache holds it until it is looked through
+PIECE, PART = 128, 4096  # planes and axes of a tile, which fits in the cache
 
 BothOrientations = Callable[[slice, slice], tuple[Array, Array]]
-"""A moment of some planes about some axes, (planes, axes): straight, and with the planes turned round."""
+"""A moment of some planes about some axes, (planes, axes): with the planes not flipped, and flipped."""
 
 
 def gathered(
     moment: Moment, weights: Float[ndarray, "axes nodes"], g: Float[ndarray, "planes nodes"]
 ) -> Float[ndarray, "planes axes"]:
-    """A moment of planes about each axis, from their g over the nodes, shape (planes, axes)."""
+    """Return a moment of planes about each axis, from their g over the nodes."""
     if moment.gathered == "mean":
         return np.asarray(g @ weights.T)
     seen = weights > 0
@@ -35,11 +35,11 @@ def gathered(
 
 @dataclass(frozen=True, slots=True)
 class Lowest:
-    """The lowest J along each side of the products.
+    """The lowest J of each plane and about each axis.
 
     Attributes:
         by_plane: lowest J of a plane class, not flipped and flipped, over the axes of the grid, (2, planes).
-        its_class: axis class where that was, (2, planes).
+        its_class: class of the axis with that J, (2, planes).
         its_flip: whether that axis is flipped, (2, planes).
         by_axis: lowest J about an axis class, not flipped and flipped, over the planes of the grid, (2, axes).
     """
@@ -57,34 +57,30 @@ def lowest(
     has_axis: Mask,
     constraints: Sequence[Constraint] = (),
 ) -> tuple[Lowest, Lowest]:
-    """Lowest J of every plane and about every axis: of all settings of the grid, and of those that keep constraints.
+    """Return the lowest J of all mounts of the grid, and of those that meet constraints (inf if there are none).
 
-    Args:
-        objective: joins the moments.
-        orientations: both of each moment.
-        has_plane: whether the grid has a plane class not flipped, and flipped, (2, planes).
-        has_axis: the same of axes, (2, axes).
-        constraints: what settings must keep; where none keeps them J is inf.
+    `orientations` compute the moments; `has_plane` (2, planes) and `has_axis` (2, axes) state whether the grid has a
+    class not flipped, and flipped.
     """
     closed_axis, closed_plane = (np.where(has, 0, np.inf).astype(np.float32, "C") for has in (has_axis, has_plane))
     plain, feasible = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
 
-    def met(planes: slice) -> tuple[_Running, _Running]:
-        """Return the state with some of the planes; all threads share the axes, so their lowest are kept apart."""
-        of_all, of_feasible = plain.about_the_same_axes(), feasible.about_the_same_axes()
+    def after(planes: slice) -> tuple[_Running, _Running]:
+        """Return the minima after some of the planes; each thread has planes, and minima about axes, of its own."""
+        of_all, of_feasible = plain.with_own_axes(), feasible.with_own_axes()
         for part in _slices(0, has_axis.shape[1], PART):
             for piece in _slices(planes.start, planes.stop, PIECE):
                 pairs = [orientation(piece, part) for orientation in orientations]
                 straight, turned = (_joined(objective, [pair[i] for pair in pairs]) for i in (0, 1))
-                of_all.meets(straight, turned, piece, part)
+                of_all.lower(straight, turned, piece, part)
                 for constraint in constraints:
                     for J, broken in zip((straight, turned), constraint.broken(piece, part), strict=True):
                         np.copyto(J, np.inf, where=broken)
                 if constraints:
-                    of_feasible.meets(straight, turned, piece, part)
+                    of_feasible.lower(straight, turned, piece, part)
         return of_all, of_feasible
 
-    parts = in_chunks(met, has_plane.shape[1], smallest=PIECE)
+    parts = in_chunks(after, has_plane.shape[1], smallest=PIECE)
     lows = [side.lowest([part[i].by_axis for part in parts]) for i, side in enumerate((plain, feasible))]
     return lows[0], lows[1] if constraints else lows[0]
 
@@ -99,7 +95,7 @@ def _slices(start: int, stop: int, size: int) -> list[slice]:
 
 @dataclass(frozen=True, slots=True)
 class _Running:
-    """The lowest so far, in arrays that each tile lowers; see `Lowest` for their shapes."""
+    """Running minima, which each tile lowers; see `Lowest` for their shapes. Closed planes and axes have inf, not 0."""
 
     closed_plane: Array
     closed_axis: Array
@@ -110,24 +106,24 @@ class _Running:
 
     @classmethod
     def over(cls, closed_plane: Array, closed_axis: Array) -> _Running:
-        """State of as many planes and axes, nothing met yet."""
+        """Return the minima before the first tile."""
         none = np.zeros(closed_plane.shape, np.intp)
         by_plane, by_axis = (np.full(closed.shape, np.inf, np.float32) for closed in (closed_plane, closed_axis))
         return cls(closed_plane, closed_axis, by_plane, none, none.copy(), by_axis)
 
-    def about_the_same_axes(self) -> _Running:
-        """The same planes, with axes that met nothing yet: for one of several threads, each with planes of its own."""
+    def with_own_axes(self) -> _Running:
+        """Return minima that share the arrays of planes, with new minima about axes, for one of several threads."""
         return replace(self, by_axis=np.full_like(self.by_axis, np.inf))
 
-    def meets(self, straight: Array, turned: Array, piece: slice, part: slice) -> None:
-        """Lower it by a tile of J, of a piece of the planes about a part of the axes."""
+    def lower(self, straight: Array, turned: Array, piece: slice, part: slice) -> None:
+        """Lower the minima by a tile of J: planes `piece` about axes `part`, not flipped and flipped."""
         first = (piece.start, part.start)
         closed = (self.closed_plane, self.closed_axis)
         _lower_planes(straight, turned, *first, *closed, self.by_plane, self.its_class, self.its_flip)
         _lower_axes(straight, turned, *first, *closed, self.by_axis)
 
     def lowest(self, by_axis: list[Array]) -> Lowest:
-        """What was met, about the axes in some threads."""
+        """Return the minima, with those about axes of all threads."""
         lowest_about = np.min(by_axis, axis=0).astype(float)
         return Lowest(self.by_plane.astype(float), self.its_class, self.its_flip, lowest_about)
 
@@ -144,16 +140,13 @@ def _lower_planes(
     its_class: Array,
     its_flip: Array,
 ) -> None:
-    """Lowest J of each plane of a tile about its axes, which axis that is and its flip; a tile has its first of both.
-
-    Whole arrays and the first of each side, and no slices of them: one kernel serves every tile.
-    """
+    """Lower the minima of the planes of a tile; `plane` and `axis` are the indices of its first plane and axis."""
     columns = straight.shape[1]
     closed = closed_axis[:, axis : axis + columns]
     for c in range(len(straight)):
         lows = np.full(2, np.float32(np.inf))
         for a in range(columns):
-            # an axis that is flipped as well comes the same way round
+            # a flipped plane about a flipped axis has the J of both not flipped
             J0, J1 = straight[c, a] + closed[0, a], turned[c, a] + closed[1, a]
             J = J0 if J0 < J1 else J1
             lows[0] = J if lows[0] > J else lows[0]
@@ -177,7 +170,7 @@ def _lower_planes(
 def _lower_axes(
     straight: Array, turned: Array, plane: int, axis: int, closed_plane: Array, closed_axis: Array, by_axis: Array
 ) -> None:
-    """Lowest J about each axis of a tile."""
+    """Lower the minima about the axes of a tile; arguments as for `_lower_planes`."""
     columns = straight.shape[1]
     closed, lowest = closed_axis[:, axis : axis + columns], by_axis[:, axis : axis + columns]
     for c in range(len(straight)):
@@ -190,10 +183,10 @@ def _lower_axes(
 
 
 def both_orientations(moment: Moment, g: Array, weights: Array) -> BothOrientations:
-    """A moment over polar nodes, an odd number of them, g (planes, nodes) and weights (axes, nodes).
+    """Return the function for a moment over an odd number of polar nodes, g (planes, nodes) and weights (axes, nodes).
 
-    Reversing g changes the sign of its odd part only, so both ways round cost one product of the even parts and one
-    of the odd parts: the moments are their sum and their difference.
+    Reversing g changes only the sign of its odd part, so the moments of both orientations are the sum and the
+    difference of one product of the even parts and one of the odd parts.
     """
     if moment.gathered == "highest":
         seen = weights > 0
@@ -203,14 +196,13 @@ def both_orientations(moment: Moment, g: Array, weights: Array) -> BothOrientati
     w_even, w_odd = (np.ascontiguousarray(part.T, dtype=np.float32) for part in _parts(weights))
     w_even[:-1] *= 2
     w_odd *= 2
-
-    rooms = threading.local()  # of each thread one: fresh memory costs as much as the product
+    buffers = threading.local()  # new memory for each tile would cost as much time as the product
 
     def pair(piece: slice, part: slice) -> tuple[Array, Array]:
         rows, columns = len(range(len(g))[piece]), len(range(len(weights))[part])
-        if not hasattr(rooms, "own"):
-            rooms.own = np.empty((3, PIECE * min(PART, len(weights))), np.float32)
-        even, odd, straight = (flat[: rows * columns].reshape(rows, columns) for flat in rooms.own)
+        if not hasattr(buffers, "own"):
+            buffers.own = np.empty((3, PIECE * min(PART, len(weights))), np.float32)
+        even, odd, straight = (flat[: rows * columns].reshape(rows, columns) for flat in buffers.own)
         blocked_product(g_even[piece], w_even[:, part], even)
         blocked_product(g_odd[piece], w_odd[:, part], odd)
         np.add(even, odd, out=straight)
@@ -220,7 +212,7 @@ def both_orientations(moment: Moment, g: Array, weights: Array) -> BothOrientati
 
 
 def one_orientation(moment: Moment, g: Array, weights: Array) -> BothOrientations:
-    """A moment over directions that nothing turns round: both ways are the same, and the grid has only one."""
+    """Return the function for a moment over directions, for which flipped planes are not distinguished."""
     if moment.gathered == "highest":
         seen = weights > 0
         return lambda piece, part: (_highest(g[piece], seen[part]),) * 2
@@ -234,7 +226,7 @@ def one_orientation(moment: Moment, g: Array, weights: Array) -> BothOrientation
 
 
 def _highest(g: Array, seen: Mask) -> Array:
-    """The highest g among the nodes that each axis sees, shape (planes, axes)."""
+    """Return the highest g at the nodes with weight about each axis, shape (planes, axes)."""
     parts = in_chunks(lambda chunk: _highest_of(g.astype(np.float32), seen[chunk]), len(seen))
     return np.concatenate(parts, axis=1)
 
@@ -251,7 +243,7 @@ def _highest_of(g: Array, seen: Array) -> Array:
 
 
 def _parts(rows: Array) -> tuple[Array, Array]:
-    """Even part (middle node last) and odd part of rows over an odd number of polar nodes."""
+    """Return the even part (middle node last) and the odd part of rows over an odd number of polar nodes."""
     half = rows.shape[1] // 2
     upper, lower = rows[:, : half + 1], rows[:, ::-1][:, : half + 1]
     return (upper + lower) / 2, ((upper - lower) / 2)[:, :half]

@@ -1,10 +1,10 @@
-"""From a setting of the grid to the nearest minimum of J: a simplex that walks on the spheres that decide J.
+"""Refinement of a mount of the grid to the nearest local minimum of J, by the simplex method of Nelder and Mead.
 
-At a pole (beta = 90) alpha names nothing, and near one a step of it moves hardly anything: a simplex over the angles
-stops there. So where the servo goes round, and both angles of a pair are free, its coordinates are degrees along two
-lines that touch the sphere of what the pair decides: where the axis points, or how the axis stands in the laser frame.
+At a pole (beta = 90) alpha has no effect, and near it hardly any, so a simplex over the angles would stop there. For
+full turns with both angles of a pair free, the coordinates are degrees along two tangents of the unit sphere of the
+axis direction, or of the axis in the laser frame.
 
-The simplex is Nelder and Mead's within bounds: scipy has one too, whose import takes longer than a search's use of it.
+The simplex method of scipy is not used since its import takes longer than the refinement.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from scanwright.design.search.space import SearchSpace
 from scanwright.design.sphere.regions import frames_about
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 
-STEP = 2  # values that one step takes
+STEP = 2  # values that one step needs
 FINEST_DEG = 0.01
-STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a minimum at the edge of what is allowed, as shares of the way to it
-LITTLE, LUCK = 1e-3, 0.25  # of J: less is not worth a walk; what is left of a gain after a walk that gains less
-NEARLY_DEG, INDIFFERENT = 0.25, 1e-4  # to an angle of the grid; of J: about its error, 0.01 % of the beams
+STEPS_BACK = (0.0, 0.05, 0.15, 0.35, 0.7)  # from a rejected minimum back to its candidate, as shares of the distance
+LITTLE, LUCK = 1e-3, 0.25  # smallest expected gain of J for a run; share of it that is still expected after the run
+NEARLY_DEG, INDIFFERENT = 0.25, 1e-4  # tolerances for rounding to the grid: angle, and J (0.01 % of the beams)
 PAIRS = slice(0, 2), slice(2, 4)  # of the axis, and of the scan plane
 
 
 @dataclass(frozen=True, slots=True)
-class Walk:
-    """A simplex: how it begins, and when it ends.
+class SimplexRun:
+    """Parameters of one run of the simplex method.
 
     Attributes:
-        reach: the first step along each coordinate, in steps of the grid.
+        reach: first step along each coordinate, in steps of the grid.
         nodes: of the quadrature of J.
-        size_deg: it ends if it is no larger in any coordinate,
-        spread: and if its values differ by no more.
-        values: it takes at most so many for each coordinate.
+        size_deg: largest size in each coordinate at the end.
+        spread: largest difference of values at the end.
+        values: largest number of values for each coordinate.
     """
 
     reach: float
@@ -55,21 +55,21 @@ class Walk:
     values: int
 
 
-WIDE = Walk(0.5, 243, 0.1, 1e-4, 60)
-SHRUNK = 1.0, 0.3, 0.1  # the reach of one walk after another
-NARROW = Walk(0.1, 1215, 0.005, 1e-7, 30)
+WIDE = SimplexRun(0.5, 243, 0.1, 1e-4, 60)
+SHRUNK = 1.0, 0.3, 0.1  # factor of the reach of successive runs
+NARROW = SimplexRun(0.1, 1215, 0.005, 1e-7, 30)
 
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """How far a setting of the grid has been refined.
+    """State of the refinement of one mount of the grid.
 
     Attributes:
-        start: number of the setting among those that were given.
-        any_axis: whether its axis is any, and stays.
-        angles_deg: the setting that its walks have come to.
-        J: of that, on the nodes of the walks; with a tolerance of the mounting the highest within it.
-        gain: by how much the next walk may lower J.
+        start: index of the mount.
+        any_axis: whether J does not depend on its axis, which then stays.
+        angles_deg: the refined angles.
+        J: of these, on the nodes of the runs; with a tolerance of the mounting the highest within it.
+        gain: expected gain of the next run.
     """
 
     start: int
@@ -80,10 +80,11 @@ class Descent:
 
 
 def descended(space: SearchSpace, starts: list[tuple[Setting, bool]], most: int, progress: Progress) -> list[Descent]:
-    """Walk from settings [deg], of which the axis may be any, at most so many times each; the lowest J first.
+    """Return mounts refined by at most `most` simplex runs each, the lowest J first.
 
-    A valley may be long and narrower than the grid: a simplex ends far from its minimum, and one that is turned goes
-    on. It lowers J by about as much as the last one did, so those go on which that would make the best.
+    `starts` are angles [deg], and whether J does not depend on the axis. In a valley that is long and narrower than the
+    grid a simplex ends far from the minimum, and another one with rotated sides continues. A run is expected to gain as
+    much as the last one; only those that could give the best result continue.
     """
     descents = [Descent(k, any_axis, angles_deg) for k, (angles_deg, any_axis) in enumerate(starts)]
     for number in range(most):
@@ -91,46 +92,43 @@ def descended(space: SearchSpace, starts: list[tuple[Setting, bool]], most: int,
         open_ = [d for d in descents if not number or (d.gain > LITTLE and d.J - d.gain < lowest)]
         if not open_:
             break
-        walks = in_chunks(partial(_walks, space, open_, number), len(open_), smallest=1)
-        further = {descent.start: descent for descent in chain.from_iterable(walks)}
+        runs = in_chunks(partial(_descend_some, space, open_, number), len(open_), smallest=1)
+        further = {descent.start: descent for descent in chain.from_iterable(runs)}
         descents = [further.get(descent.start, descent) for descent in descents]
         progress("refining the minima", (number + 1) / most)
     return sorted(descents, key=lambda descent: descent.J)
 
 
-def walked(space: SearchSpace, descent: Descent, walk: Walk, number: int = 0) -> Descent:
-    """The lowest setting that a simplex reaches: angles that the task fixes stay, and an axis that is any.
-
-    The first one has its sides along the coordinates, those of a higher number are turned.
-    """
+def descend(space: SearchSpace, descent: Descent, run: SimplexRun, number: int = 0) -> Descent:
+    """Return the lowest mount of one simplex run; run 0 has its sides along the coordinates, others are rotated."""
     free, limits = _free(space.ranges, descent.any_axis)
-    # a count of lines that is not whole takes ten times as long and moves no minimum, but it decides the lowest count
+    # a non-integer number of lines needs ten times the time and matters for the lowest count only
     exact_count = space.limits.min_density is not None
     easier = space if exact_count else replace(space, problem=space.problem.without_seam())
     chart = _Chart(descent.angles_deg, free, limits, on_spheres=space.problem.sweep is None)
 
     def J(moved: Array) -> float:
-        return _J_of(easier, chart.setting(moved), walk.nodes)
+        return _J_of(easier, chart.setting(moved), run.nodes)
 
     if not free.any():
         return replace(descent, J=J(chart.origin), gain=0.0)
     sides = np.eye(free.sum())
     if number:
         sides = np.linalg.qr(np.random.default_rng(number).normal(size=sides.shape))[0]
-    sides *= walk.reach * space.ranges.step_deg * SHRUNK[number % len(SHRUNK)]
+    sides *= run.reach * space.ranges.step_deg * SHRUNK[number % len(SHRUNK)]
     corners, values = _first_simplex(J, chart, sides)
-    lowest, value = lowest_by_simplex(J, corners, values, chart.bounds, walk)
-    # a walk without gain does not exclude that the next one gains
+    lowest, value = lowest_by_simplex(J, corners, values, chart.bounds, run)
+    # after a run without gain the next one can still gain
     gain = max(float(values[0]) - value, descent.gain * LUCK if number else 0.0)
     return replace(descent, angles_deg=chart.setting(lowest), J=value, gain=gain)
 
 
-def _walks(space: SearchSpace, descents: list[Descent], number: int, some: slice) -> list[Descent]:
-    return [walked(space, descent, WIDE, number) for descent in descents[some]]
+def _descend_some(space: SearchSpace, descents: list[Descent], number: int, some: slice) -> list[Descent]:
+    return [descend(space, descent, WIDE, number) for descent in descents[some]]
 
 
 def buildable_setting(space: SearchSpace, descent: Descent, nodes: int, otherwise: Setting) -> Setting:
-    """A refined mount, with angles of the grid if J is as low there, rounded to 0.01 deg within the constraints."""
+    """Return a refined mount, rounded to the grid if J is as low there, or to 0.01 deg, within the constraints."""
     free, limits = _free(space.ranges, descent.any_axis)
     if not free.any():
         return descent.angles_deg
@@ -139,7 +137,7 @@ def buildable_setting(space: SearchSpace, descent: Descent, nodes: int, otherwis
     below = np.floor(angles[free] / FINEST_DEG) * FINEST_DEG
     corners = below + FINEST_DEG * np.array(list(product((0, 1), repeat=int(free.sum()))))
     corners = np.clip(corners, limits[free, 0], limits[free, 1]).round(2)
-    # the nearest one may be outside the constraints, and then another one is inside
+    # the nearest one can break the constraints
     for corner in corners[np.argsort(np.linalg.norm(corners - angles[free], axis=1), kind="stable")]:
         setting = angles.copy()
         setting[free] = corner
@@ -149,7 +147,7 @@ def buildable_setting(space: SearchSpace, descent: Descent, nodes: int, otherwis
 
 
 def _free(ranges: AngleRanges, any_axis: bool) -> tuple[Bool[ndarray, " 4"], Float[ndarray, "4 2"]]:
-    """Which angles may move, and the limits of each."""
+    """Return whether each angle is free, and its limits."""
     limits = np.array([ranges.limits(name) for name in NAMES])
     free = limits[:, 1] > limits[:, 0]
     free[:2] &= not any_axis
@@ -157,7 +155,7 @@ def _free(ranges: AngleRanges, any_axis: bool) -> tuple[Bool[ndarray, " 4"], Flo
 
 
 def _J_of(space: SearchSpace, angles_deg: Setting, nodes: int) -> float:
-    """J of a mount, or the highest within the tolerance of the mounting; inf if the mount is rejected."""
+    """Return J of a mount, or the highest within the tolerance of the mounting; inf if the mount is rejected."""
     designed, off_deg = space.J(angles_deg, nodes), space.ranges.tolerance_deg
     if not off_deg or not np.isfinite(designed):
         return designed
@@ -165,7 +163,7 @@ def _J_of(space: SearchSpace, angles_deg: Setting, nodes: int) -> float:
 
 
 def allowed_setting(space: SearchSpace, refined: Setting, candidate: Setting) -> tuple[Setting, Score | None]:
-    """A refined mount and its score; if all nodes reject it, the next one on the way back to its candidate."""
+    """Return a refined mount and its exact score; if it is rejected, the next one on the line to its candidate."""
     for share in STEPS_BACK:
         setting = ((1 - share) * refined + share * candidate).round(2) + 0.0
         result = space.score(setting)
@@ -179,19 +177,15 @@ def lowest_by_simplex(
     corners: Float[ndarray, "corners n"],
     values: Float[ndarray, " corners"],
     bounds: Float[ndarray, "n 2"],
-    walk: Walk,
+    run: SimplexRun,
 ) -> tuple[Float[ndarray, " n"], float]:
-    """The lowest corner of a simplex that reflects, expands and contracts (Nelder and Mead 1965), and its value.
+    """Return the lowest corner of a simplex that reflects, expands and contracts (Nelder and Mead 1965), and its value.
 
-    Args:
-        value: what is minimised; inf where a point is refused.
-        corners: the first simplex, one corner more than coordinates.
-        values: of its corners.
-        bounds: lowest and highest of each coordinate; points beyond are moved there.
-        walk: when it ends; the values of the first simplex count.
+    `value` is inf for rejected points, and points are clipped to `bounds`. The values of the first simplex, with one
+    corner more than coordinates, count as values of the run.
     """
     corners, values = corners.copy(), values.copy()
-    left = walk.values * corners.shape[1] - len(values)
+    left = run.values * corners.shape[1] - len(values)
 
     def tried(point: Array) -> tuple[Array, float]:
         nonlocal left
@@ -202,8 +196,8 @@ def lowest_by_simplex(
     while True:
         order = np.argsort(values, kind="stable")
         corners, values = corners[order], values[order]
-        small = np.abs(corners[1:] - corners[0]).max(initial=0.0) <= walk.size_deg  # one corner: no angle is free
-        if left < STEP or (small and not values[-1] > values[0] + walk.spread):  # all of them can be inf
+        small = np.abs(corners[1:] - corners[0]).max(initial=0.0) <= run.size_deg  # one corner: no angle is free
+        if left < STEP or (small and not values[-1] > values[0] + run.spread):  # all of them can be inf
             return corners[0], float(values[0])
         middle = corners[:-1].mean(axis=0)
         away = middle - corners[-1]
@@ -224,9 +218,9 @@ def lowest_by_simplex(
 
 
 class _Chart:
-    """Coordinates [deg] about a mount, as many as angles are free; `bounds` are their limits, (free, 2).
+    """Coordinates [deg] about a mount, one for each free angle; `bounds` are their limits, (free, 2).
 
-    A pair of free angles moves on its sphere if `on_spheres`; else each coordinate is an angle.
+    With `on_spheres` the coordinates of a pair of free angles are tangential on its sphere; else they are the angles.
     """
 
     def __init__(
@@ -241,13 +235,13 @@ class _Chart:
         self.bounds = np.where(spherical[:, None], [[-np.inf, np.inf]], limits_deg)[free]
 
     def setting(self, moved: Array) -> Setting:
-        """The setting of some coordinates, within the limits."""
+        """Return the mounting angles of coordinates, within the limits."""
         result = self._angles.copy()
         full = np.zeros(4)
         full[self._free] = moved
         for k, pair in enumerate(PAIRS):
             if self._on_sphere[k]:
-                result[pair] = (_axis_of, _plane_of)[k](_walked(self._frames[k], np.radians(full[pair])))
+                result[pair] = (_axis_of, _plane_of)[k](_along_sphere(self._frames[k], np.radians(full[pair])))
             else:
                 result[pair] = np.where(self._free[pair], full[pair], result[pair])
         return np.clip(result, *self._limits.T)
@@ -258,12 +252,12 @@ def _axis_of(u: Vector) -> Array:
 
 
 def _plane_of(q: Vector) -> Array:
-    """Its third coordinate may have either sign: that is a mirror image, of the same J."""
+    """Return scan-plane angles from the third row q of `R_rot_laser`; the sign of q[2] has no effect on J."""
     return np.degrees([np.arctan2(q[1], abs(q[2])), -np.arcsin(np.clip(q[0], -1, 1))])
 
 
-def _walked(frame: Rotation, moved_rad: Array) -> Vector:
-    """Walk from a point of the unit sphere along the great circle that leaves it in a tangent direction."""
+def _along_sphere(frame: Rotation, moved_rad: Array) -> Vector:
+    """Return the point at a distance from the third row of `frame`, along a great circle in a tangent direction."""
     across, up, start = frame
     away = float(np.hypot(*moved_rad))
     if away == 0.0:
@@ -273,7 +267,7 @@ def _walked(frame: Rotation, moved_rad: Array) -> Vector:
 
 
 def _first_simplex(J: Callable[[Array], float], chart: _Chart, sides: Float[ndarray, "n n"]) -> tuple[Array, Array]:
-    """The origin and a step along each side, forwards or back to the lower J, (n + 1, n); with their J."""
+    """Return the origin and a step along each side, in the direction of the lower J, (n + 1, n); and their J."""
     low, high = chart.bounds.T
     corners = [(chart.origin, J(chart.origin))]
     for side in sides:
@@ -286,7 +280,7 @@ def _first_simplex(J: Callable[[Array], float], chart: _Chart, sides: Float[ndar
 def _on_the_grid(
     angles: Setting, free: Bool[ndarray, " 4"], limits: Array, step: float, J: Callable[[Setting], float]
 ) -> Setting:
-    """An angle that is nearly one of the grid's is that one where J does not mind: 0 is built better than 0.01."""
+    """Return angles with those near a value of the grid moved there, if J does not rise by more than `INDIFFERENT`."""
     most = J(angles) + INDIFFERENT
     for i in np.flatnonzero(free):
         rounder = angles.copy()

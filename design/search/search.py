@@ -1,4 +1,4 @@
-"""The search over the four mounting angles: fold the grid, find J of all of it, show the best families."""
+"""The search over the four mounting angles: coarse J of the grid, candidates, and their refinement."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from scanwright.design.task.task import Limits
 
 CANDIDATES_STEP_DEG = 5.0
 NONE = Limits()
-DENSER = 1.05  # where a density is not kept between the nodes
+DENSER = 1.05  # factor of the required density if it is not met between the nodes
 
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """What the search found.
+    """Result of a search.
 
     Attributes:
-        best: families, best first; all keep the limits, and none has a hole where they can be avoided. With
-            `prefer = "simple"` the simplest mount comes first.
-        plain: the optimum of J alone, where holes are avoided and it has some.
-        least_blind: where every setting has holes that were to be avoided, the smallest share of weight in them.
-        covered: grid settings that the answer stands for.
+        best: families within the limits, best first, without blind spots if possible; with `prefer = "simple"` the
+            simplest mount is first.
+        plain: the optimum of J alone, if blind spots are avoided and it has some.
+        least_blind: the smallest blind share of the weight, if blind spots are to be avoided but every mount has some.
+        covered: mounts of the grid.
         evaluated: distinct values of J computed.
-        seconds: time of the search and the rescoring.
-        left_out: what was skipped.
-        lowest: the family of the lowest J, to which the simplest mount is preferred; None if that is not asked for.
-        planes: one row per scan-plane setting of the grid: alpha_laser, beta_laser [deg], the lowest J of the search
-            over all axes, and the axis alpha_rot, beta_rot [deg] it was found about.
-        axes: one row per axis of the grid: alpha_rot, beta_rot [deg], the lowest J of the search over all planes.
+        seconds: time of the search.
+        left_out: skipped work.
+        lowest: the family of the lowest J, if `prefer = "simple"`.
+        planes: one row per scan plane of the grid: alpha_laser, beta_laser [deg], the lowest J over all axes, and
+            alpha_rot, beta_rot [deg] of its axis.
+        axes: one row per axis of the grid: alpha_rot, beta_rot [deg], and the lowest J over all planes.
     """
 
     best: tuple[Family, ...]
@@ -67,19 +67,18 @@ def search(
     limits: Limits = NONE,
     effort: Effort = USUAL,
 ) -> SearchResult:
-    """Find the best families of settings in the ranges of a task that keep its limits and, if they can, have no hole.
+    """Return the best mounts in the ranges of a task that meet its limits and, if possible, have no blind spot.
 
     Raises:
-        TaskError: no direction has a weight, no setting keeps the limits, or they leave only settings with a hole and
-            without them there are others.
+        TaskError: no direction has a weight, no mount meets the limits, or only the limits cause blind spots.
     """
     start = time.perf_counter()
     space = SearchSpace(problem, ranges, limits, avoid_holes=ranges.holes == "avoid")
-    progress(_looked_over(space))
+    progress(_size_words(space))
     least_blind = None
     result = _best(space, progress, effort)
-    if space.avoid_holes and result.candidate is None:  # nothing is free of holes: the lowest J of all
-        _refuse_limits_that_blind(space, progress, effort)
+    if space.avoid_holes and result.candidate is None:  # every mount has a blind spot: use the lowest J
+        _reject_blinding_limits(space, progress, effort)
         least_blind = _least_blind(result.land)
         progress("no mount of the grid sees all of the region: the lowest J of all")
         space = replace(space, avoid_holes=False)
@@ -87,12 +86,12 @@ def search(
     land, winner = result.land, result.candidate
     if winner is None:
         raise TaskError(_none_keeps(land, limits))
-    seen = land
+    coarse_land = land
     if ranges.step_deg < CANDIDATES_STEP_DEG and problem.sweep is None:
-        # a basin is wider than the fine grid: look for the candidates on a coarse one, for the winner on both
+        # basins are wider than a fine grid: a coarse one is enough for the other candidates
         coarse = ranges.model_copy(update={"step_deg": CANDIDATES_STEP_DEG})
-        seen, _ = coarse_landscape(replace(land.space, ranges=coarse), progress, effort)
-    candidates = find_candidates(seen, space)
+        coarse_land, _ = coarse_landscape(replace(land.space, ranges=coarse), progress, effort)
+    candidates = find_candidates(coarse_land, space)
     progress("refining the minima")
     families = refine_candidates(space, [winner, *candidates], effort.rounds, progress)
     simple = ranges.prefer == "simple"
@@ -116,10 +115,9 @@ class _Best:
     """The best mount of a grid.
 
     Attributes:
-        land: what it is the lowest of; its limits are those of the task, or more if what keeps them at the nodes does
-            not keep them between the nodes.
-        exact: scan planes whose J is exact.
-        candidate: the mount; None if none keeps the limits.
+        land: the landscape; its density limit can be above that of the task, to meet that between the nodes.
+        exact: number of scan planes with exact J.
+        candidate: the mount; None if none meets the limits.
     """
 
     land: Landscape
@@ -128,21 +126,21 @@ class _Best:
 
 
 def _best(space: SearchSpace, progress: Progress, effort: Effort) -> _Best:
-    asked = space
+    stricter = space
     while True:
-        land, exact = coarse_landscape(asked, progress, effort)
+        land, exact = coarse_landscape(stricter, progress, effort)
         candidate = best_candidate(land, space)
-        density = asked.limits.min_density
+        density = stricter.limits.min_density
         if candidate is not None or density is None or not np.isfinite(land.feasible.by_plane).any():
             return _Best(land, exact, candidate)
-        asked = replace(asked, limits=asked.limits.model_copy(update={"min_density": DENSER * density}))
+        stricter = replace(stricter, limits=stricter.limits.model_copy(update={"min_density": DENSER * density}))
 
 
-def _refuse_limits_that_blind(space: SearchSpace, progress: Progress, effort: Effort) -> None:
-    """Do nothing, unless the limits on scan planes forbid mounts that see all of the region.
+def _reject_blinding_limits(space: SearchSpace, progress: Progress, effort: Effort) -> None:
+    """Raise an error if there are mounts without blind spots that the limits on scan planes exclude.
 
     Raises:
-        TaskError: they do.
+        TaskError: there are.
     """
     limits = space.limits.model_copy(update={"max_line_gap_deg": None, "max_blind_cone_deg": None})
     if limits == space.limits:
@@ -152,7 +150,7 @@ def _refuse_limits_that_blind(space: SearchSpace, progress: Progress, effort: Ef
         raise TaskError(blinding_words(space.problem, space.limits, free.candidate.angles_deg))
 
 
-def _looked_over(space: SearchSpace) -> str:
+def _size_words(space: SearchSpace) -> str:
     planes, axes = len(space.planes.first), len(space.axes.first)
     if space.problem.sweep is None:
         return f"{planes:,} different scan planes x {axes:,} axes, both ways round"
@@ -160,7 +158,7 @@ def _looked_over(space: SearchSpace) -> str:
 
 
 def _plain(space: SearchSpace, land: Landscape, best: Family) -> Family | None:
-    """The optimum of J alone, if it has a hole: what the result is compared with."""
+    """Return the optimum of J alone, if it has a blind spot, to compare the result with it."""
     free = replace(space, avoid_holes=False)
     candidate = best_candidate(land, free, feasible=False)
     if candidate is None or candidate.score is None or candidate.score.blind_weight <= NO_BLIND_WEIGHT:
@@ -170,7 +168,7 @@ def _plain(space: SearchSpace, land: Landscape, best: Family) -> Family | None:
 
 
 def _least_blind(land: Landscape) -> float:
-    """The smallest share of weight that a mount of the grid leaves blind."""
+    """Return the smallest blind share of the weight of any mount of the grid."""
     space = land.space
     field = space.problem.field
     moment = Moment(field, np.asarray)
@@ -188,17 +186,17 @@ def _least_blind(land: Landscape) -> float:
 
 
 def _none_keeps(land: Landscape, limits: Limits) -> str:
-    """Why a search has no result, with what the mount of the lowest J reaches."""
+    """Return the message of a search without a result, with the figures of the mount of the lowest J."""
     nearest = best_candidate(land, replace(land.space, limits=NONE, avoid_holes=False), feasible=False)
     if nearest is None or nearest.score is None:
         return "weight: no setting of the grid brings a beam near the region: widen it, the angles, or ball_radius_deg"
-    asked = ", ".join(
+    required = ", ".join(
         f"{name} = {value:g}"
         for name, value in (("min_density", limits.min_density), ("max_blind_weight", limits.max_blind_weight))
         if value is not None
     )
     return (
-        f"limits: {asked}: no setting of the grid keeps them; the one of the lowest J has min_density "
+        f"limits: {required}: no setting of the grid keeps them; the one of the lowest J has min_density "
         f"{nearest.score.least} and max_blind_weight {nearest.score.blind_weight:.2g}; a longer period helps, or a "
         "smaller region"
     )
@@ -211,7 +209,7 @@ def _plane_table(land: Landscape) -> Float[ndarray, "planes 5"]:
     J = low.by_plane[flip, planes.classes]
     its_class, its_flip = (side[flip, planes.classes] for side in (low.its_class, low.its_flip))
     setting = np.full((2, len(axes.first)), -1)
-    order = np.arange(len(axes.settings_deg))[::-1]  # the first setting of each class stays
+    order = np.arange(len(axes.settings_deg))[::-1]  # the first of each class is written last
     setting[axes.flip[order].astype(int), axes.classes[order]] = order
     setting = np.where(setting < 0, setting[::-1], setting)
     return np.column_stack([planes.settings_deg, J, axes.settings_deg[setting[its_flip, its_class]]])

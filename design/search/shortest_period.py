@@ -1,4 +1,4 @@
-"""The shortest period that keeps the limits of a task, and the settings that allow it (`period_s = "shortest"`)."""
+"""The shortest period that meets the limits of a task, and the mounts that allow it (`period_s = "shortest"`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from scanwright.design.arrays import Setting
 from scanwright.design.density.beams import ScanLines
-from scanwright.design.density.spin import zones
+from scanwright.design.density.spin import phase_statistics
 from scanwright.design.errors import TaskError
 from scanwright.design.motion import Shortest, Spin
 from scanwright.design.objective.problem import NODES, Problem, problem_of
@@ -24,18 +24,17 @@ from scanwright.design.task.named_products import fastest_rpm
 from scanwright.design.task.task import LoadedTask
 
 MOST_LINES = 200_000
-ROUNDS = 6  # the best settings of a slow turn are seldom those of a fast one: search again at the period found
+ROUNDS = 6  # of searches, since the best mounts of a slow turn are seldom those of a fast one
 
 
 def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem, SearchResult]:
-    """The task with the shortest period found, its numbers, and its search.
+    """Return the task with the shortest period found, its numbers, and its search.
 
-    Every family of a search is asked how fast it may turn, and the search is made again at the fastest, until nothing
-    turns faster. What is found keeps the limits for certain; that nothing faster exists between the families is not
-    proved.
+    The search is repeated at the shortest period of any of its families until that does not become shorter. The result
+    meets the limits; a shorter period of a mount that is not among the families is possible.
 
     Raises:
-        TaskError: the limits are not kept even at `longest_s`.
+        TaskError: the limits are not met even at `longest_s`.
     """
     motion, limits, ranges = loaded.task.motion, loaded.task.limits, loaded.task.angles
     assert isinstance(motion, Shortest)
@@ -62,7 +61,7 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
             result = replace(result, best=able)
         try:
             result = search(problem, ranges, progress, limits)
-        except TaskError:  # none of the families of this period is the one that allows it: that one stays
+        except TaskError:  # the families of this search do not include the one that allows the period: keep that
             break
     return now, problem, result
 
@@ -70,22 +69,22 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
 def shortest_period_s(
     problem: Problem, angles_rad: Setting, scan_rate_hz: float, least: int, nodes: int = NODES
 ) -> float:
-    """Shortest full turn [s] in which no direction of the weighted region gets less than `least` beams per ball.
+    """Return the shortest full turn [s] with at least `least` beams per ball in all directions of the region.
 
-    Whole numbers of lines only: then no gap is shorter than the others and the turn repeats. The region is looked at
-    on `nodes` circles about the axis: with fewer a thin spot between two of them may go unseen.
+    It has an integer number of lines, so that all gaps are equal. The density is evaluated on `nodes` circles about the
+    axis.
 
     Raises:
-        TaskError: the region holds directions that no period brings that many beams to.
+        TaskError: some directions do not get that many beams at any period.
     """
     if least < 1:
-        raise TaskError(f"density {least}: ask for at least 1 beam per ball")
+        raise TaskError(f"density {least}: at least 1 beam per ball is required")
     rule, beam_polar, beam_azimuth = polar_rule(problem, angles_rad, nodes)
     polar_rad = rule.polar_rad[rule.fine > 0]
 
     def enough(count: int) -> bool:
         lines = ScanLines(count, 2 * np.pi / count)
-        results = zones(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
+        results = phase_statistics(polar_rad, beam_polar, beam_azimuth, lines, problem.ball_rad, np.zeros_like)
         return bool(results.least.min() >= least)
 
     upper = 1
@@ -94,7 +93,7 @@ def shortest_period_s(
         if upper > MOST_LINES:
             raise TaskError(
                 f"density {least} per ball: not reached with {MOST_LINES} lines; part of the region is blind: "
-                "make it smaller, mask it, or take other angles"
+                "make it smaller, mask it, or use other angles"
             )
     lower = upper // 2
     while upper - lower > 1:
@@ -108,7 +107,7 @@ def _at(loaded: LoadedTask, period_s: float) -> LoadedTask:
 
 
 def _shortest(loaded: LoadedTask, problem: Problem, family: Family) -> float:
-    """Shortest period of one family: the longest of what servo, density and gaps ask for."""
+    """Return the shortest period of one family: the longest of those that servo, density and gaps require."""
     limits, rate = loaded.task.limits, loaded.lidar.scan_rate_hz
     periods = [
         np.ceil(60 / fastest_rpm(loaded.task.product_names(), loaded.task.motion, loaded.products)[0] * rate - 1e-9)
@@ -126,7 +125,7 @@ def _shortest(loaded: LoadedTask, problem: Problem, family: Family) -> float:
 def _rescored(
     problem: Problem, families: tuple[Family, ...], periods: list[float], period_s: float
 ) -> tuple[Family, ...]:
-    """The families that may turn that fast, scored there."""
+    """Return the families that allow a period, with their scores at it."""
     able = [family for family, p in zip(families, periods, strict=True) if p <= period_s * (1 + 1e-9)]
     return tuple(
         sorted((replace(f, score=score(problem, f.angles_rad)) for f in able), key=lambda family: family.score.J)

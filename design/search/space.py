@@ -1,4 +1,4 @@
-"""The mounts of one search: the task as numbers, its grid in groups of equal J, what they must keep, their scores."""
+"""The mounts of one search: the task as numbers, the grid in classes of equal J, the limits, and exact scores."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from scanwright.design.task.task import Limits
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """The mounts of a search, and what rejects some of them.
+    """The mounts of a search and their limits.
 
     Attributes:
         problem: the task as numbers.
@@ -41,15 +41,15 @@ class SearchSpace:
 
     @cached_property
     def mirrors(self) -> Float[ndarray, "mirrors 2 2"]:
-        """Mirrors of the scan plane that leave J as it is; of a sweep the identity alone."""
+        """Mirrors of the scan plane that do not change J; for a sweep only the identity."""
         return mirrors_of(self.problem.bearings_rad)[: None if self.problem.sweep is None else 1]
 
     @cached_property
     def planes(self) -> Folded:
-        """Scan planes of the grid that keep the limits.
+        """Scan planes of the grid that meet the limits.
 
         Raises:
-            TaskError: none does.
+            TaskError: there are none.
         """
         sweep = self.problem.sweep is not None
         every = unfolded(self.ranges)[1] if sweep else fold_planes(self.ranges, self.mirrors)
@@ -62,34 +62,34 @@ class SearchSpace:
 
     @property
     def covered(self) -> int:
-        """Mounts of the grid."""
+        """Number of mounts of the grid."""
         return len(self.planes.settings_deg) * len(self.axes.settings_deg)
 
     @property
     def different(self) -> int:
-        """Number of different J: every pair of classes both ways round, but once if both come in one way only."""
+        """Number of different J: pairs of classes in both orientations, if the grid has both of one of them."""
         planes, axes = self.planes, self.axes
         one_way = int((~(planes.has | planes.own).all(axis=0)).sum()) * int((~axes.has.all(axis=0)).sum())
         return 2 * len(planes.first) * len(axes.first) - one_way
 
     def score(self, angles_deg: Setting) -> Score | None:
-        """The exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None if the mount is rejected.
+        """Return the exact score of (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg]; None if it is rejected.
 
-        Kept, as several steps of a search need the same: an exact one of a sweep takes seconds.
+        Scores are cached: for a sweep one takes seconds.
         """
-        named = tuple(np.asarray(angles_deg).tolist())
-        if named not in self._scores:
-            self._scores[named] = score(self.problem, np.radians(angles_deg))
-        result = self._scores[named]
+        key = tuple(np.asarray(angles_deg).tolist())
+        if key not in self._scores:
+            self._scores[key] = score(self.problem, np.radians(angles_deg))
+        result = self._scores[key]
         return result if self.keeps(result, angles_deg) and self._reaches_all(angles_deg) else None
 
     def J(self, angles_deg: Setting, nodes: int) -> float:
-        """J on a number of nodes; inf if the mount is rejected."""
+        """Return J on a number of nodes; inf if the mount is rejected."""
         result = score_on(self.problem, np.radians(angles_deg), nodes, stated=False)
         return result.J if self.keeps(result, angles_deg) and self._reaches_all(angles_deg) else np.inf
 
     def keeps(self, result: Score, angles_deg: Setting) -> bool:
-        """Whether a scored mount keeps the limits and, if they are to be avoided, has no hole."""
+        """Return whether a scored mount meets the limits and, if they are to be avoided, has no blind spot."""
         blind = 0.0 if self.avoid_holes else self.limits.max_blind_weight
         if blind is not None and result.blind_weight > blind + NO_BLIND_WEIGHT:
             return False
@@ -98,7 +98,7 @@ class SearchSpace:
         return bool(planes_keep(self.problem, np.radians(angles_deg[None, 2:]), self.limits)[0])
 
     def _reaches_all(self, angles_deg: Setting) -> bool:
-        """Whether a fan reaches all of a region of many edges, also between the directions that represent it."""
+        """Return whether a mount sees all of a region of many edges, also between the directions that represent it."""
         problem, angles_rad = self.problem, np.radians(angles_deg)
         if not self.avoid_holes or problem.sweep is not None or has_all_breaks(problem.field):
             return True

@@ -1,8 +1,8 @@
-"""The optimum with what the parts hide: bounds first, solids only for the candidates.
+"""The best mount with the beams that its parts block; solids are made for few mounts only.
 
-The J of a setting without parts is a lower bound of its J with them, and so is the J without the beams that its parts
-hide in any case. Families are taken in the order of the first, their equivalent settings in that of the second, and
-the work ends when no bound is below the best J found: what is left cannot win.
+J without parts is a lower bound of J with parts, and so is J without the beams that parts block according to a closed
+form. Families are examined in the order of the first bound, their equivalent mounts in that of the second, until no
+bound is below the best J.
 """
 
 from __future__ import annotations
@@ -35,44 +35,41 @@ from scanwright.design.sphere.directions import sample_set
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import Limits, LoadedTask
 
-SETS, DIRECTIONS = 4, 3000  # with and without what stands still, on the same directions at the same phases
-MOST_BUILT = 6  # settings whose solids are made; what is then left unseen is told
+SETS, DIRECTIONS = 4, 3000  # of samples with and without fixed parts, at the same directions and phases
+MOST_BUILT = 6  # mounts whose solids are made
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """A setting that cannot be built, and why."""
+    """A mount that cannot be built, and the reason."""
 
     reason: str
 
 
 class Workshop(Protocol):
-    """Whoever knows the parts: `cad.assembly.shadow`, passed in, for `design` never imports `cad`.
-
-    Settings are (alpha_rot, beta_rot, alpha_laser, beta_laser) in radians.
-    """
+    """Maker of the parts of a mount (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]: `cad.assembly.shadow`."""
 
     def bound(self, setting_rad: Setting) -> SelfOcclusion | Refused:
-        """What the parts hide at least, in closed form: `stator` is None, all of it holds at every axis angle."""
+        """Return beams that the parts block at every axis angle according to a closed form; `stator` is None."""
         ...
 
     def shadow(self, setting_rad: Setting) -> SelfOcclusion | Refused:
-        """What the parts hide, from the parts themselves."""
+        """Return the beams that the parts block."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The best setting with its parts.
+    """The best mount with its parts.
 
     Attributes:
-        family: its angles, and its J with what the parts hide.
-        bare: its J without them.
+        family: its angles, and its J with the parts.
+        bare: its J without parts.
         shadow: the beams that the parts block.
-        bounded: settings that a bound was computed for.
-        built: settings whose solids were made.
-        refused: (J without parts, why it cannot be built) of each rejected setting.
-        open: families whose bound is below the J found, left because `MOST_BUILT` were made.
+        bounded: number of mounts with a bound.
+        built: number of mounts whose solids were made.
+        refused: J without parts and the reason, for each rejected mount.
+        open: families with a bound below the best J that were not built because of `MOST_BUILT`.
         worse: families with a lower J without parts that are worse with them.
     """
 
@@ -99,7 +96,7 @@ class Chosen:
         return lines
 
     def left_out(self) -> list[LeftOut]:
-        """Return how many mounts with a lower J were rejected, and each reason once; nothing if there is none."""
+        """Return the number of rejected mounts with a lower J, and each reason once; empty if there are none."""
         reasons = [reason for J, reason in sorted(self.refused) if self.bare.J > J]
         if not reasons:
             return []
@@ -118,14 +115,7 @@ def choose_with_parts(
 ) -> Chosen:
     """Return the family that is best with its parts; with `prefer = "simple"` the first one that can be built.
 
-    Args:
-        problem: of the task.
-        families: candidates.
-        ranges: of the angles.
-        limits: of the task.
-        workshop: makes the parts.
-        progress: progress callback.
-        failed: settings [deg] whose parts failed their checks, and which one: they are not chosen.
+    `failed` maps angles [deg] of mounts whose parts failed a check to its message: they are not chosen.
 
     Raises:
         BuildError: none can be built within the limits of the task.
@@ -159,7 +149,7 @@ def choose_with_parts(
             bare = score(problem.behind(bound), np.radians(angles_deg))
             turned = simple and angles_deg != family.angles_deg
             bounds.append((_blind(bare, avoid), turned, bare.J, angles_deg))
-        # the family's own setting stands upright: another one must be better by more than a thousandth
+        # the first mount of a family is the easiest to build: another one must be better by more than 0.001
         for blind, _, J, angles_deg in sorted(bounds, key=lambda bound: (*bound[:2], round(bound[2], 3)))[:1]:
             if lowest is not None and lowest <= (blind, first, J):
                 continue
@@ -188,18 +178,15 @@ def choose_with_parts(
 
 
 def score_with(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion) -> Score:
-    """J of a setting whose parts hide beams.
+    """Return the score of a mount without the beams that its parts block.
 
-    What turns with the laser only removes beams: exact. What stands still breaks the symmetry: its effect is the
-    difference of two samplings on the same directions and phases, and so is what it blinds. `least` is then the lowest
-    count of the samples, if that is lower.
-
-    Raises:
-        BuildError: the shadow is of another number of beams.
+    Beams blocked by parts that turn with the laser are removed, which is exact. The effect of fixed parts on J and on
+    the blind weight is the difference of two samplings on the same directions and phases; `least` is the lowest count
+    of these samples, if that is lower.
     """
     seen = problem.behind(shadow)
     plain = score(seen, angles_rad)
-    if not shadow.partly().any() or not np.isfinite(plain.J):  # nothing is seen: parts change nothing
+    if not shadow.partly().any() or not np.isfinite(plain.J):  # J is infinite without beams
         return plain
     at_times = shadow.of(~shadow.beams)
     sampled = [_sampled(seen, angles_rad, at_times, index) for index in range(SETS)]
@@ -216,7 +203,7 @@ def score_with(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion) -> 
 
 
 def checked_score(loaded: LoadedTask, problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Score:
-    """Score a setting, with its parts if they are known, and compare J with a count over simulated beams.
+    """Return the score of a mount, with its parts if known, after comparing J with a count over simulated beams.
 
     Raises:
         NumericalError: they differ by more than their errors.
@@ -229,11 +216,11 @@ def checked_score(loaded: LoadedTask, problem: Problem, angles_rad: Setting, sha
 def equivalents(
     problem: Problem, angles_deg: tuple[float, float, float, float], ranges: AngleRanges
 ) -> list[tuple[float, float, float, float]]:
-    """The setting and those of equal J that the ranges of the task hold, itself first (docs/definitions.md, Motion)."""
+    """Return the mount and those of equal J within the ranges, itself first (docs/definitions.md, Motion)."""
     a, b, c, d = angles_deg
     if problem.sweep is not None:
         return [angles_deg]
-    turned = round((a + 360.0) % 360.0 - 180.0, 9)  # with -b the axis points the other way; no 179.97000000000003
+    turned = round((a + 360.0) % 360.0 - 180.0, 9)  # with -b the axis has the opposite direction
     result: list[tuple[float, float, float, float]] = []
     for beta, alpha in np.diagonal(mirrors_of(problem.bearings_rad), axis1=1, axis2=2).tolist():
         plane = 0.0 + alpha * c, 0.0 + beta * d  # q0 has the sign of beta_laser, q1 that of alpha_laser
@@ -242,16 +229,16 @@ def equivalents(
 
 
 def _blind(result: Score, avoid_holes: bool) -> bool:
-    """Whether a setting has holes that are to be avoided: it then comes after all that have none."""
+    """Return whether a mount has blind spots that are to be avoided."""
     return avoid_holes and result.blind_weight > NO_BLIND_WEIGHT
 
 
 def _sampled(
     problem: Problem, angles_rad: Setting, shadow: SelfOcclusion, index: int
 ) -> tuple[Float[ndarray, "2 moments"], float, int]:
-    """Moments with and without what stands still, over one set of directions at one start phase, (2, moments).
+    """Return moments with and without fixed parts over one set of directions at one start phase, (2, moments).
 
-    And the share of the weight that it blinds, and the lowest count where a direction has a weight.
+    Also the share of the weight that these parts make blind, and the lowest count.
     """
     if problem.sweep is None:
         joint = problem.lines.angles_rad + start_phases(problem.lines.count, problem.lines.step_rad)[2 * index]

@@ -1,4 +1,4 @@
-"""Sets of directions that represent the sphere, or its part that matters to a task."""
+"""Sets of directions that represent the sphere, or the weighted region of a task."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scanwright.design.sphere.rectangle import seen_rectangle
 from scanwright.design.sphere.regions import Field, frames_about
 
 GOLDEN = (1 + 5**0.5) / 2
-MOST_TRIES = 1_000_000  # directions looked at in one patch
+MOST_PER_PATCH = 1_000_000  # directions
 A_FEW = 100  # directions that show that a region is not empty
 EMPTY = "weight: the region is empty: no direction has a weight above 0 outside the masks"
 NO_WEIGHT = f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a value above 0, or set density.background"
@@ -23,7 +23,7 @@ NO_WEIGHT = f"{EMPTY}; widen theta_deg, phi_deg or half_angle_deg, give it a val
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Directions (n, 3) and what each adds to `int w dO`, shape (n,)."""
+    """Directions, and the contribution of each to the integral of the weight over the sphere."""
 
     directions: Float[ndarray, "n 3"]
     weights: Float[ndarray, " n"]
@@ -32,9 +32,9 @@ class Samples:
 def spiral(
     count: int, turn_rad: float = 0.0, lowest_z: float = -1.0, shift: float = 0.5
 ) -> Float[ndarray, "{count} 3"]:
-    """Fibonacci spiral: `count` directions of equal solid angle in the cap about z that ends at a height.
+    """Return a Fibonacci spiral of directions of equal solid angle in the cap about z above `lowest_z`.
 
-    Each represents a slice of the cap; `shift` is where in it, 0 to 1. Shape (count, 3).
+    Each direction represents a slice of the cap; `shift` is its place in the slice, 0 to 1.
     """
     k = np.arange(count) + shift
     return _on_sphere(1 - (1 - lowest_z) * k / count, turn_rad + 2 * np.pi * k / GOLDEN)
@@ -46,7 +46,7 @@ def _on_sphere(z: Float[ndarray, " n"], phi: Float[ndarray, " n"]) -> Float[ndar
 
 
 def equal_angle_grid(step_deg: float) -> Float[ndarray, "n 3"]:
-    """The paper's grid: theta 0 .. 180, phi 0 .. 360 (excluded) in equal steps, row after row, shape (n, 3)."""
+    """Return the paper's grid: theta 0 .. 180, phi 0 .. 360 (excluded) in equal steps, row after row, shape (n, 3)."""
     theta = np.radians(np.arange(0, 180 + step_deg / 2, step_deg))
     phi = np.radians(np.arange(0, 360 - step_deg / 2, step_deg))
     t, p = np.meshgrid(theta, phi, indexing="ij")
@@ -55,10 +55,10 @@ def equal_angle_grid(step_deg: float) -> Float[ndarray, "n 3"]:
 
 
 def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: float = 0.5) -> Samples:
-    """About `wanted` directions or more that cover the weighted region; directions of weight zero are left out.
+    """Return `wanted` or more directions that cover the weighted region, without directions of weight zero.
 
-    Every painted region is covered by itself, so however small one is, it gets its share. If several regions hold a
-    direction, it represents the solid angle that the directions of all of them leave it.
+    Each region of the task gets the same number, however small it is. In the overlap of several regions the directions
+    of all of them share the solid angle.
 
     Raises:
         TaskError: no direction has a weight.
@@ -73,7 +73,7 @@ def weighted_samples(field: Field, wanted: int, turn_rad: float = 0.0, shift: fl
 
 
 def require_weight(field: Field) -> None:
-    """Nothing, where some direction has a weight: the first painted region that holds one ends the look.
+    """Require a direction with a weight; stop at the first region that has one.
 
     Raises:
         TaskError: no direction has a weight.
@@ -85,7 +85,7 @@ def require_weight(field: Field) -> None:
 
 @lru_cache(maxsize=8)
 def sample_sets(field: Field, grid_step_deg: float | None, wanted: int, count: int) -> tuple[Samples, ...]:
-    """Return the first so many of `sample_set`, or the paper's grid once; cached, as all settings use the same.
+    """Return `sample_set` 0 .. count - 1, or the paper's grid once; cached, since all mounts use the same sets.
 
     Raises:
         TaskError: no direction has a weight.
@@ -94,12 +94,10 @@ def sample_sets(field: Field, grid_step_deg: float | None, wanted: int, count: i
 
 
 def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: int) -> Samples:
-    """The set of that number: sets share no ring of the spiral, so no two cut a region's edges alike.
+    """Return set number `index` of directions that cover the weighted region; with a grid step, the paper's grid.
 
-    Nor are they at the same place in the slices of a cap: what the middle of each misses of a density that is
-    zonal about the cap would be common to all, and their spread would not tell of it.
-
-    With a grid step it is the paper's grid, the same for every number.
+    The spirals of the sets differ in number, rotation and `shift`, so that the spread of their means contains the error
+    of one set. With equal shifts the error for a density that is symmetric about a cap would be common to all.
 
     Raises:
         TaskError: no direction has a weight.
@@ -112,9 +110,9 @@ def sample_set(field: Field, grid_step_deg: float | None, wanted: int, index: in
 
 
 def _in_patch(field: Field, index: int, wanted: int, turn_rad: float, shift: float) -> tuple[Samples, float]:
-    """Weighted directions in one patch with their weights, and how many the patch has for each steradian.
+    """Return at least `wanted` weighted directions of one patch, and all directions of the patch per steradian.
 
-    They are made denser until there are enough, or the patch is given up.
+    Fewer are returned if `MOST_PER_PATCH` directions do not contain as many.
     """
     count = wanted
     while True:
@@ -123,13 +121,13 @@ def _in_patch(field: Field, index: int, wanted: int, turn_rad: float, shift: flo
             return Samples(np.empty((0, 3)), np.empty(0)), 0.0
         weights = field.weight_at(directions)
         hits = int((weights > 0).sum())
-        if hits >= wanted or count >= MOST_TRIES:
+        if hits >= wanted or count >= MOST_PER_PATCH:
             return Samples(directions[weights > 0], weights[weights > 0]), count / solid_angle
-        count = min(MOST_TRIES, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)
+        count = min(MOST_PER_PATCH, int(count * min(100.0, 1.2 * wanted / max(hits, 1))) + 1)
 
 
 def _spread(field: Field, index: int, count: int, turn_rad: float, shift: float) -> tuple[Float[ndarray, "n 3"], float]:
-    """Directions of equal solid angle all over one patch, and the solid angle of the patch."""
+    """Return directions of equal solid angle that cover one patch, and its solid angle."""
     row = field.patches[index]
     if row[0] == ALL:
         return spiral(count, turn_rad, -1.0, shift), 4 * np.pi
@@ -149,7 +147,7 @@ def _spread(field: Field, index: int, count: int, turn_rad: float, shift: float)
     ends = np.cumsum(edges[r] - edges[r + 1])
     if not len(ends):
         return np.empty((0, 3)), 0.0
-    at = k / count * ends[-1]  # along the cells as if they lay one below the other
+    at = k / count * ends[-1]  # as if the cells lay one below the other
     cell = np.minimum(np.searchsorted(ends, at, side="right"), len(ends) - 1)
     z = np.clip(edges[r[cell] + 1] + ends[cell] - at, edges[r[cell] + 1], edges[r[cell]])
     return _on_sphere(z, 2 * np.pi * (c[cell] + share) / width), float(2 * np.pi / width * ends[-1])

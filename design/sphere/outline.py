@@ -1,4 +1,4 @@
-"""The outline of what a task cares about, and how far from an axis it begins and ends."""
+"""The outline of the weighted region, and its lowest and highest polar angle about an axis."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy import ndarray
 
 from scanwright.design.concurrency.blocked_product import product
 from scanwright.design.concurrency.parallel import in_chunks
-from scanwright.design.sphere.corners import LOOK_RAD, around, edge_corners
+from scanwright.design.sphere.corners import PROBE_RAD, edge_corners, probes_around
 from scanwright.design.sphere.painting import MAP
 from scanwright.design.sphere.regions import Field, frames_about
 
-AROUND = 3600  # points of each edge: what an arc reaches further between two of them is below 4e-7 rad
-PIECE = 1024  # points that axes are compared with at a time
-BETWEEN = 9  # points of each edge of a cell of a map
+AROUND = 3600  # points of each edge circle: the error of a polar angle is below 4e-7 rad
+PIECE = 1024  # points of one matrix product
+BETWEEN = 9  # points of each edge of a map cell
 
 
 def reach_about(field: Field, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
-    """Lowest and highest polar angle about unit axes (n, 3) at which there is weight, shape (n, 2).
+    """Return the lowest and highest polar angle [rad] of the weighted region about each axis.
 
-    The way from an axis to a region ends at its outline, but for a region that the axis itself lies in.
+    Both lie on the outline, unless the region contains the axis or its opposite.
     """
     arcs, points = _outline(field)
-    if not arcs and not len(points):  # all of the sphere
+    if not arcs and not len(points):  # the entire sphere
         return np.tile([0.0, np.pi], (len(axes), 1))
     cosines = [arc.cosines(axes) for arc in arcs]
     if len(points):
@@ -40,52 +40,49 @@ def reach_about(field: Field, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, 
 
 
 def _cosines(points: Float[ndarray, "n 3"], axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
-    """Cosines from axes to the nearest point and to the farthest, shape (axes, 2)."""
-    pieces = [points[i : i + PIECE].T for i in range(0, len(points), PIECE)]  # the cache holds a piece
+    """Return the cosines of the angles from each axis to the nearest and to the farthest point."""
+    pieces = [points[i : i + PIECE].T for i in range(0, len(points), PIECE)]  # a piece fits in the cache
     cosine = np.stack([[c.max(axis=1), c.min(axis=1)] for c in (product(axes, piece) for piece in pieces)])
     return np.stack([cosine[:, 0].max(axis=0), cosine[:, 1].min(axis=0)], axis=1)
 
 
 @dataclass(frozen=True, slots=True)
 class _Arcs:
-    """Where the weight begins along a circle `x . m = c`: azimuths about m, in order, in a frame (e1, e2, m)."""
+    """The points of an edge circle `x . m = c` (offset) at which weight begins: increasing azimuths in (e1, e2, m)."""
 
     frame: Float[ndarray, "3 3"]
     offset: float
     azimuth_rad: Float[ndarray, " n"]
 
     def sides(self) -> Float[ndarray, "both 3"]:
-        """Return unit vectors close to the circle, all of those inside it before all of those outside, (2 n, 3)."""
+        """Return unit vectors close to the circle, first those inside it, then those outside, shape (2 n, 3)."""
         e1, e2, normal = self.frame
         turn = self.azimuth_rad[:, None]
         out = np.cos(turn) * e1 + np.sin(turn) * e2
-        along = (np.arccos(np.clip(self.offset, -1, 1)) + np.array([-LOOK_RAD, LOOK_RAD]))[:, None, None]
+        along = (np.arccos(np.clip(self.offset, -1, 1)) + np.array([-PROBE_RAD, PROBE_RAD]))[:, None, None]
         return (np.cos(along) * normal + np.sin(along) * out).reshape(-1, 3)
 
-    @property
-    def _radius(self) -> float:
-        return float(np.sqrt(max(0.0, 1 - self.offset**2)))
-
     def cosines(self, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
-        """As `_cosines`: the nearest point is next in azimuth to the axis, the farthest to the other side."""
+        """Return the cosines of the angles from each axis to the nearest and to the farthest point."""
         x, y, along = (axes @ self.frame.T).T
         turn = np.arctan2(y, x)
-        out = [self._next(turn), -self._next(turn + np.pi)]
-        return (self.offset * along + self._radius * np.hypot(x, y) * np.stack(out)).T
+        out = [self._nearest(turn), -self._nearest(turn + np.pi)]
+        radius = float(np.sqrt(max(0.0, 1 - self.offset**2)))
+        return (self.offset * along + radius * np.hypot(x, y) * np.stack(out)).T
 
-    def _next(self, azimuth_rad: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
-        """Cosine of the way around to the nearest azimuth of the arcs."""
+    def _nearest(self, azimuth_rad: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
+        """Return the cosine of the azimuth distance to the nearest point."""
         behind = np.searchsorted(self.azimuth_rad, azimuth_rad % (2 * np.pi)) % len(self.azimuth_rad)
         return np.asarray(np.cos(self.azimuth_rad[[behind - 1, behind]] - azimuth_rad).max(axis=0))
 
 
 @lru_cache(maxsize=64)
 def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
-    """Where the weight begins: arcs of edges, and points of cells of maps and all corners, shape (n, 3)."""
+    """Return the outline: arcs of edge circles, and points of map cells and corners."""
     arcs = []
     for plane in field.planes:
         full = _Arcs(frames_about(plane[None, :3])[0], float(plane[3]), 2 * np.pi * np.arange(AROUND) / AROUND)
-        begins = _on_both_sides(field.weight_at(full.sides()).reshape(2, -1).T)
+        begins = _is_outline(field.weight_at(full.sides()).reshape(2, -1).T)
         if begins.any():
             arcs.append(replace(full, azimuth_rad=full.azimuth_rad[begins]))
     cells = [
@@ -95,24 +92,19 @@ def _outline(field: Field) -> tuple[tuple[_Arcs, ...], Float[ndarray, "n 3"]]:
     ]
     points = np.concatenate([np.empty((0, 3)), *cells])
     corners = edge_corners(field)
-    started = corners.points[_on_both_sides(corners.weights)]
-    return tuple(arcs), np.concatenate([points[_begins(field, points)], started])
+    if len(points):
+        probes = field.weight_at(probes_around(points).reshape(-1, 3)).reshape(len(points), -1)
+        points = points[_is_outline(probes)]
+    return tuple(arcs), np.concatenate([points, corners.points[_is_outline(corners.weights)]])
 
 
-def _begins(field: Field, points: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
-    """Whether there is weight on one side of points and none on another."""
-    if not len(points):
-        return np.zeros(0, dtype=bool)
-    return _on_both_sides(field.weight_at(around(points).reshape(-1, 3)).reshape(len(points), -1))
-
-
-def _on_both_sides(weights: Float[ndarray, "n looks"]) -> Bool[ndarray, " n"]:
-    """Whether some of the weights around each point are above 0, and others not."""
+def _is_outline(weights: Float[ndarray, "n probes"]) -> Bool[ndarray, " n"]:
+    """Return whether some but not all of the weights around each point are above 0."""
     return np.asarray((weights > 0).any(axis=1) & ~(weights > 0).all(axis=1))
 
 
 def _on_cells(table: Float[ndarray, "rows columns"], row: Float[ndarray, " 14"]) -> Float[ndarray, "n 3"]:
-    """Points along those edges of a map's cells at which it begins to hold something."""
+    """Return points along those edges of map cells that separate cells of weight 0 from others."""
     height, width = int(row[2]), int(row[3])
     holds = table[:height, :width] > 0
     along = np.linspace(0, 1, BETWEEN)

@@ -1,4 +1,4 @@
-"""Compiled: what painted regions hold at a direction, and in the mean along circles; see `design.sphere.regions`."""
+"""Compiled kernels: value of painted regions at directions, and mean value along circles (`design.sphere.regions`)."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from scanwright.design.sphere.shell_sort import sort_indices
 ALL, BAND, CONE, MAP, POLYGON = 0.0, 1.0, 2.0, 3.0, 4.0
 """Kinds of rows."""
 
-VALUE = 13  # of a row: its kind, what it needs of twelve parameters, what it is painted with
+VALUE = 13  # column of the value: a row is the kind of a region, twelve parameters and its value
 COLUMNS = VALUE + 1
 
 EDGE = 1e-12  # edges are inclusive: a direction whose cosine is this close to that of an edge lies on it
-CELL_EDGE = 1e-9  # share of a cell of a map: what lies this little before the next one is on the border, so in the next
+CELL_EDGE = 1e-9  # of a map cell: a direction this close to the next cell belongs to the next cell
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _value(x: float, y: float, z: float, rows: Array, tables: Array, background: float) -> float:
-    """Value of the last painted region that contains the direction."""
+    """Return the value of the last painted region that contains the direction."""
     for i in range(rows.shape[0] - 1, -1, -1):
         if _holds(x, y, z, rows[i]):
             return rows[i, VALUE] * _of_cell(x, y, z, rows[i], tables)
@@ -29,7 +29,7 @@ def _value(x: float, y: float, z: float, rows: Array, tables: Array, background:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _holds(x: float, y: float, z: float, row: Array) -> bool:
-    """Whether a region contains the direction; edges are inclusive."""
+    """Return whether a region contains the direction; edges are inclusive."""
     if row[0] == CONE:
         return x * row[1] + y * row[2] + z * row[3] >= row[4] - EDGE
     if row[0] == BAND:
@@ -45,7 +45,7 @@ def _holds(x: float, y: float, z: float, row: Array) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
-    """What a map holds at the direction; 1 of any other region."""
+    """Return the entry of a map at the direction; 1 for any other region."""
     if row[0] != MAP:
         return 1.0
     across = np.sqrt(x * x + y * y)
@@ -59,7 +59,7 @@ def _of_cell(x: float, y: float, z: float, row: Array, tables: Array) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _masked(x: float, y: float, z: float, rows: Array, tables: Array) -> bool:
-    """Whether any mask hides the direction: masks unite, and a table hides only directions with a value above 0."""
+    """Return whether any mask hides the direction; a table hides directions with a value above 0."""
     for i in range(rows.shape[0]):  # noqa: SIM110 - numba compiles no generator
         if _holds(x, y, z, rows[i]) and _of_cell(x, y, z, rows[i], tables) > 0.0:
             return True
@@ -68,7 +68,7 @@ def _masked(x: float, y: float, z: float, rows: Array, tables: Array) -> bool:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def masked_at(directions: Array, rows: Array, tables: Array) -> Mask:
-    """Whether any mask hides each direction, (directions,)."""
+    """Return whether any mask hides each direction, shape (n,)."""
     out = np.empty(directions.shape[0], np.bool_)
     for i in range(directions.shape[0]):
         out[i] = _masked(directions[i, 0], directions[i, 1], directions[i, 2], rows, tables)
@@ -77,7 +77,7 @@ def masked_at(directions: Array, rows: Array, tables: Array) -> Mask:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def summed_over(directions: Array, rows: Array, tables: Array, of_rows: Array) -> Array:
-    """Sum of `of_rows` over the rows that hold each direction with a value above 0, (directions,)."""
+    """Return, for each direction, the sum of `of_rows` over the rows with a value above 0 there, shape (n,)."""
     out = np.zeros(directions.shape[0])
     for i in range(directions.shape[0]):
         x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
@@ -89,7 +89,7 @@ def summed_over(directions: Array, rows: Array, tables: Array, of_rows: Array) -
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def values_at(directions: Array, rows: Array, tables: Array, background: float) -> Array:
-    """Value of the last painted region that contains each direction, (directions,)."""
+    """Return the value of the last painted region that contains each direction, shape (n,)."""
     out = np.empty(directions.shape[0])
     for i in range(directions.shape[0]):
         out[i] = _value(directions[i, 0], directions[i, 1], directions[i, 2], rows, tables, background)
@@ -113,9 +113,9 @@ def circle_means(
     mask_tables: Array,
     background: float,
 ) -> tuple[Array, Array]:
-    """Mean weight (0 where masked) and unmasked share on each circle about each frame, (frames, circles).
+    """Return mean weight (0 if masked) and unmasked share of each circle about the z axis of each frame.
 
-    Circles beyond the polar angles `within` (frames, 2) are not looked at: 0 both.
+    Both have shape (frames, circles), and are 0 for circles outside the polar angles `within`, shape (frames, 2).
     """
     weights = np.zeros((len(frames), len(polar)))
     shares = np.zeros((len(frames), len(polar)))
@@ -136,7 +136,7 @@ def circle_means(
                 c, r = planes[k, 3] - ct * along[k], st * across[k]
                 if r > abs(c):
                     half = np.arccos(c / r)
-                    first, last = azimuth[k] - half, azimuth[k] + half  # from -2 pi to 2 pi: no division is needed
+                    first, last = azimuth[k] - half, azimuth[k] + half  # within -2 pi .. 2 pi
                     cuts[n] = first if first >= 0.0 else first + 2 * np.pi
                     cuts[n + 1] = last if last >= 0.0 else last + 2 * np.pi
                     n += 2

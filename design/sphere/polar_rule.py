@@ -1,11 +1,11 @@
-"""Quadrature over the polar angle about an axis: where a region breaks, and the nodes between.
+"""Quadrature over the polar angle about an axis.
 
 In coordinates about the axis an integral over the sphere is one-dimensional. Its segments end where a circle touches
-an edge of the region or passes a corner of it, and at the further breaks that the caller names. The sum of the weights
-does not depend on the axis: a rule whose sum differs from it is made finer, or is an error.
+an edge or passes a corner of the region, and at further breaks that the caller gives. The sum of the weights does not
+depend on the axis: a rule with another sum is refined, or is an error.
 
-A region of many edges (fine maps, meshes, hundreds of bands) has too many breaks, and a circle would cross all of them.
-There each node gets the weight of the directions around it, of a set that is the same about every axis.
+A region of many edges (fine maps, meshes, hundreds of bands) has too many breaks. Each node then gets the weight of the
+directions around it, from one set of directions for all axes.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Array, Ints, Vector
 from scanwright.design.sphere.corners import (
-    LOOK_RAD,
     MANY_EDGES,
+    PROBE_RAD,
     breaking_planes,
     edge_corners,
     polar_about,
@@ -31,11 +31,11 @@ from scanwright.design.sphere.directions import Samples, weighted_samples
 from scanwright.design.sphere.regions import Field
 from scanwright.design.sphere.total_weight import is_total, require_drawn, weight_error
 
-GRID = 180  # segments of a region of many edges, for those who ask for all of its breaks
-MANY_CORNERS = 64  # above this segments between corners would cost more nodes than the bends
+GRID = 180  # segments that replace the breaks of a region of many edges
+MANY_CORNERS = 64  # with more corners, segments between them cost more nodes than they save
 PER_NODE = 256  # directions for each node of a region of many edges or corners
 MOST_DIRECTIONS = 2_000_000
-FINER = 1, 3, 9, 27  # times the nodes, until their weights sum to the integral of the weight
+FINER = 1, 3, 9, 27  # times the nodes, until the sum of the weights is correct
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +44,9 @@ class PolarRule:
 
     Attributes:
         polar_rad: nodes, shape (n,).
-        fine: what each node adds to `int w dO`, shape (n,).
-        coarse: the same for the rule with a third of the nodes: zero on two of three, shape (n,).
-        segment: the segment that each node belongs to, shape (n,).
+        fine: contribution of each node to the integral of the weight, shape (n,).
+        coarse: the same for the rule with a third of the nodes, 0 at the others, shape (n,).
+        segment: index of the segment of each node, shape (n,).
     """
 
     polar_rad: Float[ndarray, " n"]
@@ -55,22 +55,19 @@ class PolarRule:
     segment: Int64[ndarray, " n"]
 
     def own_error(self) -> float:
-        """What its sum of weights is off by as its nodes are few, from the rule with a third of them."""
+        """Return an estimate of the error of the sum of weights, from the rule with a third of the nodes."""
         return float(np.abs(np.bincount(self.segment, self.fine - self.coarse)).sum())
 
 
 def circle_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"], nodes: int) -> PolarRule:
-    """Midpoint rule on each segment, nodes gathered at its ends: there the integrand starts like a square root.
+    """Return the midpoint rule on each segment, with denser nodes at its ends, where the integrand has square roots.
 
-    Args:
-        field: the weights.
-        axis: unit vector.
-        breaks_rad: further breaks of the integrand.
-        nodes: about how many, spread over the segments; 0 if no direction has a weight.
+    `breaks_rad` are further breaks of the integrand. The rule has about `nodes` nodes, or none if no direction has a
+    weight.
 
     Raises:
-        NumericalError: weight is missing: the nodes sum to less or more than its integral.
-        TaskError: the same, and the region is thinner than what is resolved.
+        NumericalError: the sum of the weights is not the integral of the weight.
+        TaskError: the same, and the region is thinner than the resolution.
     """
     if not has_all_breaks(field):
         return _sampled_rule(field, axis, breaks_rad, nodes)
@@ -94,13 +91,13 @@ def _rule_on(field: Field, axis: Vector, ends: Float[ndarray, "segments 2"], nod
 
 
 def _sampled_rule(field: Field, axis: Vector, breaks_rad: Float[ndarray, " breaks"], nodes: int) -> PolarRule:
-    """The weight of directions between the middles of nodes; a third of them make the coarse rule."""
+    """Return the rule whose nodes have the weight of the directions around them; every third makes the coarse rule."""
     breaks = np.unique(np.round(np.concatenate([[0, np.pi], _fold(breaks_rad)]), 12))
     ends = np.stack([breaks[:-1], breaks[1:]], axis=1)
     segment, k, s, step = _nodes_between(ends, nodes)
     length = np.diff(ends, axis=1)[segment, 0]
     upper = ends[segment, 0] + length * np.sin((s + step / 2) / 2) ** 2
-    first = np.searchsorted(upper, np.linspace(0, np.pi, 4 * len(upper)))  # node of each of so many equal steps
+    first = np.searchsorted(upper, np.linspace(0, np.pi, 4 * len(upper)))  # lookup table: first node of equal steps
     samples = _samples(field, min(PER_NODE * nodes, MOST_DIRECTIONS))
     fine, third = _gathered(samples.directions, samples.weights, axis, upper, np.minimum(first, len(upper) - 1))
     middle = np.flatnonzero(k % 3 == 1)
@@ -118,7 +115,7 @@ def _samples(field: Field, wanted: int) -> Samples:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _gathered(directions: Array, weights: Array, axis: Array, upper: Array, first: Ints) -> tuple[Array, Array]:
-    """Weight of directions by polar angle, up to `upper` each: of all, and three times that of every third one."""
+    """Return the weight of the directions of each bin of polar angles: of all, and three times that of every third."""
     fine, third = np.zeros(len(upper)), np.zeros(len(upper))
     per_rad = (len(first) - 1) / np.pi
     for i in range(len(directions)):
@@ -136,9 +133,9 @@ def _gathered(directions: Array, weights: Array, axis: Array, upper: Array, firs
 def _nodes_between(
     ends: Float[ndarray, "segments 2"], nodes: int
 ) -> tuple[Int64[ndarray, " n"], Int64[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
-    """About so many nodes on segments: the segment of each, its number in it, its place from 0 to pi, and the step."""
+    """Return segment, number in the segment, place in it (0 to pi) and step of about `nodes` nodes."""
     length = ends[:, 1] - ends[:, 0]
-    least = 3 if 9 * len(ends) <= nodes else 1  # thirds of a segment: some regions have many
+    least = 3 if 9 * len(ends) <= nodes else 1  # triples of nodes of a segment
     thirds = np.maximum(least, np.round(nodes / 3 * length / length.sum())).astype(int)
     segment = np.repeat(np.arange(len(ends)), 3 * thirds)
     k = np.arange(len(segment)) - np.repeat(np.cumsum(3 * thirds) - 3 * thirds, 3 * thirds)
@@ -147,9 +144,9 @@ def _nodes_between(
 
 
 def breaks_of(field: Field, axis: Vector, more_rad: Float[ndarray, " more"]) -> Float[ndarray, " n"]:
-    """Polar angles about an axis where the circle mean of the weight breaks, with some more, sorted, 0 to pi.
+    """Return the polar angles at which the mean weight of a circle is not smooth, and `more_rad`, sorted, 0 to pi.
 
-    Of a region of many edges they are those of a grid.
+    For a region of many edges they include a regular grid in place of those of map cells.
     """
     points = np.concatenate([_touched_points(field, axis), edge_corners(field).points])
     grid = np.linspace(0, np.pi, GRID + 1 if field.edges > MANY_EDGES else 2)
@@ -157,8 +154,8 @@ def breaks_of(field: Field, axis: Vector, more_rad: Float[ndarray, " more"]) -> 
 
 
 def weighted_segments(field: Field, axis: Vector, more_rad: Float[ndarray, " n"]) -> Float[ndarray, "segments 2"]:
-    """Ranges of the polar angle between breaks, shape (segments, 2); those of weight zero are left out."""
-    if not len(field.patches):  # as the logarithms of equal weights are
+    """Return the ranges of the polar angle between breaks, without those of weight zero."""
+    if not len(field.patches):  # such as logarithms of equal weights
         return np.empty((0, 2))
     breaks = breaks_of(field, axis, more_rad)
     ends = np.stack([breaks[:-1], breaks[1:]], axis=1)
@@ -167,22 +164,22 @@ def weighted_segments(field: Field, axis: Vector, more_rad: Float[ndarray, " n"]
 
 
 def has_all_breaks(field: Field) -> bool:
-    """Whether segments end wherever weight begins or ends, so that one circle decides for each whether it has any."""
+    """Return whether segments end at all edges and corners, so that one circle shows whether a segment has weight."""
     return field.edges <= MANY_EDGES and len(edge_corners(field).points) <= MANY_CORNERS
 
 
 def _fold(polar_rad: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
-    """Bring polar angles past a pole back to 0 .. pi."""
+    """Return polar angles reduced to 0 .. pi."""
     beyond = np.abs(polar_rad) % (2 * np.pi)
     return np.where(beyond > np.pi, 2 * np.pi - beyond, beyond)
 
 
 def _touched_points(field: Field, axis: Vector) -> Float[ndarray, "n 3"]:
-    """Points at which a circle about `axis` touches an edge of the region, shape (n, 3)."""
+    """Return the points at which a circle about `axis` touches an edge at which the weight changes."""
     planes = breaking_planes(field)
     touched = touched_points(planes, axis)
     across = np.tile(planes[:, :3], (2, 1))
-    across -= touched * np.einsum("ij,ij->i", touched, across)[:, None]  # along the sphere
-    across *= LOOK_RAD / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    across -= touched * np.einsum("ij,ij->i", touched, across)[:, None]  # tangent to the sphere
+    across *= PROBE_RAD / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
     inside, outside = field.weight_at(np.concatenate([touched + across, touched - across])).reshape(2, -1)
     return touched[inside != outside]

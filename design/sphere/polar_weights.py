@@ -1,4 +1,4 @@
-"""The weight about an axis over the polar angle: what each polar node gets of a field, about many axes at once."""
+"""Distribution of the weight over the polar angle, about many axes at once."""
 
 from __future__ import annotations
 
@@ -14,22 +14,17 @@ from scanwright.design.sphere.directions import EMPTY, Samples, equal_angle_grid
 from scanwright.design.sphere.outline import reach_about
 from scanwright.design.sphere.regions import Field
 
-FEW_EDGES = 16  # above this (maps) directions represent the field: circles would be slower
-DIRECTIONS = 20_000  # that do so
-MISSED = 0.05  # share of the weight that circles may miss or count twice
+FEW_EDGES = 16  # with more edges (maps) sample directions are faster than circles
+DIRECTIONS = 20_000  # sample directions
+MISSED = 0.05  # largest relative error of the sum over circles
 
 
 def weights_over_polar(
-    field: Field, axes: Float[ndarray, "axes 3"], nodes: int, circles: int, grid_step_deg: float | None
+    field: Field, axes: Float[ndarray, "axes 3"], nodes: int, grid_step_deg: float | None
 ) -> Float[ndarray, "axes nodes"]:
-    """Share of a weight near each polar node about each axis, shape (axes, nodes); rows sum to 1.
+    """Return the share of the weight near each of `nodes` equally spaced polar angles about each axis; rows sum to 1.
 
-    Args:
-        field: the weights.
-        axes: unit vectors, shape (axes, 3).
-        nodes: of the polar angle, from 0 to pi.
-        circles: about each axis along which the weight is looked at, a multiple of `nodes - 1`.
-        grid_step_deg: of the paper's grid, whose nodes are all that counts then.
+    With `grid_step_deg` only the directions of the paper's grid have weight.
 
     Raises:
         TaskError: no direction has a weight.
@@ -40,13 +35,15 @@ def weights_over_polar(
     elif field.edges > FEW_EDGES:
         rows = _histogram(weighted_samples(field, DIRECTIONS), axes, nodes)
     else:
-        polar = (np.arange(circles) + 0.5) * (np.pi / circles)
-        rows = _share_between_nodes(
-            field.on_circles_about(axes, polar, reach_about(field, axes)) * np.sin(polar), nodes
-        )
-        around = rows.sum(axis=1) * (2 * np.pi * np.pi / circles)
+        step = np.pi / (nodes - 1)
+        polar = (np.arange(nodes - 1) + 0.5) * step  # circles halfway between the nodes, which share their weight
+        halves = field.on_circles_about(axes, polar, reach_about(field, axes)) * np.sin(polar) / 2
+        rows = np.zeros((len(axes), nodes))
+        rows[:, :-1] += halves
+        rows[:, 1:] += halves
+        around = rows.sum(axis=1) * (2 * np.pi * step)
         samples = weighted_samples(field, DIRECTIONS // 10)
-        # what is narrower than the step between circles they meet about some axes and miss about others
+        # circles miss or overrate regions that are narrower than the step between them
         if np.abs(around / samples.weights.sum() - 1).max() > MISSED:
             rows = _histogram(samples, axes, nodes)
     total = rows.sum(axis=1, keepdims=True)
@@ -56,26 +53,16 @@ def weights_over_polar(
 
 
 def _histogram(samples: Samples, axes: Float[ndarray, "axes 3"], nodes: int) -> Array:
-    """Weight of samples near each polar node about each axis, shape (axes, nodes)."""
+    """Return the weight of the samples near each polar angle about each axis, shape (axes, nodes)."""
     parts = in_chunks(
         lambda chunk: _polar_histogram(samples.directions, samples.weights, axes[chunk], nodes), len(axes), 4
     )
     return np.concatenate(parts)
 
 
-def _share_between_nodes(circles: Array, nodes: int) -> Array:
-    """Weights at circle middles, shape (axes, circles), shared linearly between the nodes on both sides."""
-    cells = circles.reshape(len(circles), nodes - 1, -1)
-    upper = (np.arange(cells.shape[2]) + 0.5) / cells.shape[2]
-    shared = np.zeros((len(circles), nodes))
-    shared[:, :-1] += cells @ (1 - upper)
-    shared[:, 1:] += cells @ upper
-    return shared
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def _polar_histogram(directions: Array, weights: Array, axes: Array, nodes: int) -> Array:
-    """Weight by polar angle, each direction shared linearly between its two nodes."""
+    """Return the weight by polar angle; each direction is shared linearly between the two nearest nodes."""
     out = np.zeros((len(axes), nodes))
     for a in range(len(axes)):
         for i in range(len(directions)):

@@ -1,8 +1,8 @@
-"""Weights and masks on the sphere: of weights the last region that contains a direction wins; masks unite.
+"""Weights and masks on the sphere. The last region that contains a direction determines its weight; masks unite.
 
-Every edge of a band, a cone, a rectangle on a plane or a map cell lies in a plane `x . m = c`. So along a circle about
-any axis the weight is piecewise constant between the circle's crossings with those planes, and its integral over the
-circle is a finite sum: exact, region edges included.
+Every edge of a band, a cone, a rectangle on a plane or a map cell lies in a plane `x . m = c`. So the weight along a
+circle about any axis is constant between its crossings with those planes, and the integral over the circle is a finite
+sum: exact, region edges included.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from scanwright.design.task.shapes import (
 )
 from scanwright.design.task.task import LoadedTask
 
-FEW_CIRCLES = 1024  # up to here one thread is done before others have begun
+FEW_CIRCLES = 1024  # fewer are faster in one thread
 EVERYWHERE = np.array([[-np.inf, np.inf]])
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
@@ -54,9 +54,11 @@ _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 class Layers:
     """Painted regions as numbers.
 
-    `rows`: (kind, twelve parameters, value) of each region, in painting order, shape (regions, 14).
-    `planes`: (m, c) of each edge of a band or a cone, shape (edges, 4). `map_planes`: of the cells of maps, the same.
-    `tables`: the maps, padded to one shape, (maps, rows, columns).
+    Attributes:
+        rows: kind, twelve parameters and value of each region, in painting order.
+        planes: (m, c) of each edge of a band, a cone or a rectangle.
+        map_planes: the same for map cells.
+        tables: the maps, padded to one shape.
     """
 
     rows: Float[ndarray, "regions 14"]
@@ -67,50 +69,50 @@ class Layers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """Weight and mask of a task; equal to itself only, so that what is computed of one can be kept with it."""
+    """Weight and mask of a task; compared by identity, so that it can be the key of a cache."""
 
     weight: Layers
     mask: Layers
     background: float
 
     def weight_at(self, directions: Float[ndarray, "n 3"]) -> Float[ndarray, " n"]:
-        """Weight of unit vectors (n, 3); masked directions weigh 0. Shape (n,)."""
+        """Return the weight of unit vectors, 0 for masked ones."""
         painted = _paint(self.weight, directions, self.background)
         return np.where(self.masked_at(directions), 0.0, painted)
 
     def masked_at(self, directions: Float[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
-        """Whether unit vectors (n, 3) are hidden by the robot, shape (n,)."""
+        """Return whether a mask hides each unit vector."""
         return _masked(self.mask, directions)
 
     @property
     def planes(self) -> Float[ndarray, "edges 4"]:
-        """Planes of the edges of bands and cones, masks included."""
+        """Planes of the edges of bands, cones and rectangles, masks included."""
         return np.concatenate([self.weight.planes, self.mask.planes])
 
     @property
     def map_planes(self) -> Float[ndarray, "cell_edges 4"]:
-        """Planes of the cells of maps, masks included."""
+        """Planes of the edges of map cells, masks included."""
         return np.concatenate([self.weight.map_planes, self.mask.map_planes])
 
     @property
     def edges(self) -> int:
-        """Number of edge planes: what a circle integral costs."""
+        """Number of edge planes, to which the time of a circle integral is proportional."""
         return sum(len(e.planes) + len(e.map_planes) for e in (self.weight, self.mask))
 
     @property
     def patches(self) -> Float[ndarray, "patches 14"]:
-        """Rows of the regions that hold weight, the background last: together they hold all of it."""
+        """Rows of the regions with a value above 0, and of the background: together they contain all weight."""
         rows = self.weight.rows[self.weight.rows[:, VALUE] > 0]
         return rows if self.background == 0 else np.vstack([rows, _row(ALL, [], self.background)])
 
     def summed_at(self, directions: Float[ndarray, "n 3"], of_patches: Float[ndarray, " patches"]) -> Array:
-        """Sum over those of `patches` that hold each direction (n, 3) of what each of them has, shape (n,)."""
+        """Return, for each direction, the sum of `of_patches` over the `patches` that contain it, shape (n,)."""
         return summed_over(np.ascontiguousarray(directions, dtype=float), self.patches, self.weight.tables, of_patches)
 
     def on_circles(
         self, axis: Vector, polar_rad: Float[ndarray, " n"]
     ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
-        """Mean weight and unmasked share along circles at polar angles about `axis`, both of shape (n,); exact."""
+        """Return the exact mean weight and unmasked share of circles at polar angles about `axis`."""
         numbers = _numbers(self)
         frame = frames_about(axis[None])
         parts = in_chunks(
@@ -121,10 +123,7 @@ class Field:
     def on_circles_about(
         self, axes: Float[ndarray, "axes 3"], polar_rad: Float[ndarray, " n"], reach_rad: Float[ndarray, "axes 2"]
     ) -> Float[ndarray, "axes n"]:
-        """Mean weight on the same circles about many axes (n, 3), shape (n, len(polar_rad)); exact.
-
-        Only circles between the polar angles at which there is weight, `reach_rad` (n, 2), are looked at.
-        """
+        """Return the exact mean weight of circles about many axes, 0 outside the polar angles `reach_rad`."""
         numbers = _numbers(self)
         frames = frames_about(axes)
         parts = in_chunks(
@@ -135,24 +134,24 @@ class Field:
 
 @lru_cache(maxsize=64)
 def _numbers(field: Field) -> tuple[Array, Array, Array, Array, Array, float]:
-    """What the kernel of circle means takes of a field."""
+    """Return the arguments of `circle_means` for a field."""
     weight, mask = field.weight, field.mask
-    planes = np.unique(np.concatenate([field.planes, field.map_planes]), axis=0)  # of a scene both have the same cells
+    planes = np.unique(np.concatenate([field.planes, field.map_planes]), axis=0)  # weight and mask can share edges
     return planes, weight.rows, weight.tables, mask.rows, mask.tables, field.background
 
 
 def value_of(region: Region | MaskRegion) -> float:
-    """What a region is painted with."""
+    """Return the value of a region."""
     return region.value
 
 
 def field_of(
     loaded: LoadedTask, weight_of: Callable[[Region], float] = value_of, background: float | None = None
 ) -> Field:
-    """The weights and masks of a task; `weight_of` is what each region is painted with, `background` all else.
+    """Return the weights and masks of a task, with other values of the regions and of the background if given.
 
-    With a scene both become tables on its grid of rays: directions without a surface in range are masked, and what
-    lies in a box weighs by its area.
+    With a scene both are tables on its grid of rays: directions without a surface in range are masked, and surfaces in
+    a box have a weight by area.
     """
     maps = list(loaded.maps)
     background = loaded.task.density.background if background is None else background
@@ -191,7 +190,7 @@ def _on_surface(
 
 
 def _layers(regions: Sequence[Region | MaskRegion], maps: list[Array], weight_of: Callable[[Any], float]) -> Layers:
-    """Turn regions into numbers; takes as many tables off the front of `maps` as there are map regions."""
+    """Return regions as numbers; remove a table from the front of `maps` for each region that has one."""
     rows: list[Array] = []
     planes, map_planes = [np.empty((0, 4))], [np.empty((0, 4))]
     tables: list[Array] = []
@@ -242,7 +241,7 @@ def _edges_of_band(theta: Array, phi: Array) -> Float[ndarray, "edges 4"]:
 
 
 def _edges_of_map(table: Float[ndarray, "rows columns"]) -> Float[ndarray, "edges 4"]:
-    """Planes between cells, where any two on both sides of one differ."""
+    """Return the planes between rows and columns of cells with different values."""
     rows, columns = table.shape
     theta = np.pi * np.arange(1, rows)[(table[1:] != table[:-1]).any(axis=1)] / rows
     differ = (table != np.roll(table, 1, axis=1)).any(axis=0)
@@ -255,7 +254,7 @@ def _edges_of_map(table: Float[ndarray, "rows columns"]) -> Float[ndarray, "edge
 
 
 def frames_about(axes: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3 3"]:
-    """Rows e1, e2, axis for each axis (n, 3): right-handed, orthonormal, shape (n, 3, 3)."""
+    """Return a right-handed orthonormal frame for each axis, rows e1, e2, axis."""
     helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
     e1 = cross(axes, helper)
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
@@ -263,7 +262,7 @@ def frames_about(axes: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3 3"]:
 
 
 def cross(a: Float[ndarray, "n 3"], b: Float[ndarray, "m 3"]) -> Float[ndarray, "n 3"]:
-    """`np.cross` of vectors (n, 3), m is n or 1: it spends most of its time on other shapes, and a J asks ten times."""
+    """Return `np.cross(a, b)`, several times as fast; m is n or 1."""
     return a[:, _NEXT] * b[:, _LAST] - a[:, _LAST] * b[:, _NEXT]
 
 

@@ -1,4 +1,4 @@
-"""Compiled: a sort for short lists. `np.sort` and `np.argsort` take longer to compile than the kernels that need it."""
+"""Compiled sort of short lists. `np.sort` and `np.argsort` take longer to compile than the kernels that need it."""
 
 from __future__ import annotations
 
@@ -6,19 +6,15 @@ from numba import njit
 
 from scanwright.design.arrays import Array, Ints
 
-CROWD = 32  # values that may have to pass each other, up to which an insertion sort is as fast as any
+CROWD = 32  # up to this number of values in disorder an insertion sort is as fast as any
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sort_indices(values: Array, order: Ints, n: int, crowd: int) -> None:
-    """Sort the first n indices of `order` in place, so that their values rise; equal values may change places.
+    """Sort the first n indices of `order` in place by their `values`; not stable.
 
-    Args:
-        values: that the indices point to.
-        order: indices, (n or more,).
-        n: how many of them.
-        crowd: how many values may have to pass each other: n, or the largest bucket if they are sorted by buckets.
-            Above `CROWD` wide gaps come first (Shell's sort, gaps of Knuth).
+    `crowd` is the largest number of values in disorder: n, or the largest bucket of a list sorted by buckets. If it is
+    above `CROWD`, wide gaps come first (Shell's sort, gaps of Knuth).
     """
     gap = 1
     while crowd > CROWD and gap < n // 3:

@@ -95,11 +95,7 @@ class Equivalent:
 
 
 def equivalents_within(setting: Setting) -> list[Equivalent]:
-    """Return the equivalent settings within the ranges; those that change fewest angles first.
-
-    Args:
-        setting: all four angles, by the names of `BOUNDS`, of any size.
-    """
+    """Return the settings within the ranges that are equivalent to one of any size, fewest changes first."""
     equivalents = [
         Equivalent(inside, symmetry.gamma_sign, symmetry.gamma_added, symmetry.mirrored)
         for symmetry in _SYMMETRIES
@@ -114,12 +110,7 @@ def equivalents_within(setting: Setting) -> list[Equivalent]:
 
 
 def advice(setting: Setting, name: str) -> str:
-    """Return text with the equivalents of the part of a setting in which one angle is outside its range.
-
-    Args:
-        setting: all four angles.
-        name: of that angle.
-    """
+    """Return text on the equivalents of the part of a setting in which angle `name` is outside its range."""
     if max(abs(end) for span in setting.values() for end in span) > FARTHEST_DEG:
         return ""
     return "".join(_advice(setting, name, beyond) for beyond in _beyond(setting[name], BOUNDS[name]))

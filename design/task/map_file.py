@@ -36,7 +36,7 @@ def read_map(path: Path) -> Array:
     if not np.isfinite(table).all() or (table < 0).any():
         raise TaskError(f"{path}: a map contains weights: finite and not negative")
     if not table.any():
-        raise TaskError(f"{path}: every weight of the map is 0: nothing in it counts")
+        raise TaskError(f"{path}: every weight of the map is 0")
     return table.astype(float)
 
 

@@ -23,13 +23,7 @@ Names = Mapping[str, str | None]
 
 
 def motion_faults(names: Names, motion: Motion | Shortest, products: Catalogue) -> list[Fault]:
-    """Return the faults of the products of a task, and of its motion with them.
-
-    Args:
-        names: of the products, by the keys of `NAMED`.
-        motion: of the task.
-        products: the catalogue.
-    """
+    """Return the faults of the products of a task (`names` by the keys of `NAMED`), and of its motion with them."""
     faults: list[Fault] = []
     for key, kind in NAMED.items():
         name = names[key]

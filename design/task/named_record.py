@@ -13,10 +13,7 @@ from scanwright.design.files.text_files import read_toml
 def named_table(path: Path, shipped: Path, what: str) -> tuple[dict[str, Any], Path]:
     """Return the table of a TOML file, or of a file of the folder `shipped` by its bare name; and its path.
 
-    Args:
-        path: the file, or the name.
-        shipped: folder of the package with such files.
-        what: its name in messages, such as "task".
+    `what` is its name in messages, such as "task".
 
     Raises:
         TaskError: there is no such file, or it is not TOML.

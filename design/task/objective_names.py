@@ -14,7 +14,7 @@ SHIPPED_OBJECTIVES = {
 
 
 def objectives(wanted: str) -> dict[str, EntryPoint]:
-    """Return the shipped objectives by name, and if it is none of these the installed ones too: that takes 20 ms."""
+    """Return the shipped objectives by name, and the installed ones (20 ms) if `wanted` is not a shipped one."""
     if wanted in SHIPPED_OBJECTIVES:
         return SHIPPED_OBJECTIVES
     return {entry.name: entry for entry in entry_points(group=GROUP)} | SHIPPED_OBJECTIVES

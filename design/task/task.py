@@ -119,7 +119,7 @@ class Task(Record):
     camera: Camera | None = Field(default=None, description="a camera that colours the cloud")
 
     @model_validator(mode="after")
-    def _boxes_stand_in_a_scene(self) -> Task:
+    def _boxes_need_a_scene(self) -> Task:
         if self.scene is None and any(isinstance(region, BoxRegion) for region in self.weight):
             raise ValueError("a weight of shape = 'box' requires a [scene]")
         return self
@@ -198,7 +198,7 @@ class LoadedTask:
         return self.products.get(self.task.servo, Servo)
 
     def warnings(self) -> list[str]:
-        """Return warnings: what the scanner of this task does less well than expected."""
+        """Return warnings of unread servo angles, and of planes outside the lidar's range."""
         return [*self.unread_angles(), *self._out_of_range()]
 
     def _out_of_range(self) -> list[str]:
@@ -230,9 +230,9 @@ class LoadedTask:
 
     def sha256(self) -> str:
         """Return the digest of all inputs of the result: the task, its maps, and the records of its products."""
-        task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # no part of the result
+        task = self.task.model_dump(mode="json", exclude={"catalogue", "camera"})  # these do not affect the result
         for region in [*task["weight"], *task["mask"]]:
-            for key in ("file", "joint_deg", "joint_mm", "frame", "omit"):  # what they make of it counts
+            for key in ("file", "joint_deg", "joint_mm", "frame", "omit"):  # the resulting table is in the digest
                 region.pop(key, None)
         if task["scene"]:
             task["scene"].pop("file")
@@ -282,7 +282,7 @@ def _load(table: dict[str, Any], source: Path) -> LoadedTask:
     limits = task.limits
     if isinstance(task.motion, Shortest) and limits.min_density is None and limits.max_line_gap_deg is None:
         aims = "limits.min_density or limits.max_line_gap_deg"
-        faults.append(Fault(("motion", "period_s"), f" = 'shortest': shortest for what? Set {aims}"))
+        faults.append(Fault(("motion", "period_s"), f" = 'shortest': requires {aims}"))
 
     def tried(key: str, read: Callable[[], T]) -> T | None:
         try:

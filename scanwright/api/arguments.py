@@ -1,4 +1,4 @@
-"""What the functions accept in more than one form: a task, an angle set, and a progress callback."""
+"""Conversion of arguments that have several forms: task, angle set, progress callback."""
 
 from __future__ import annotations
 

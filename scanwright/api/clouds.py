@@ -37,10 +37,10 @@ def register(
     Args:
         clouds: of one place, two or more.
         out: map to write.
-        poses: TUM file to write; None for one beside the map.
-        start: TUM file of initial poses, one line per cloud; None needs none.
-        angles: calibrated angle set that all clouds were assembled with: what its covariance means for the poses is
-            part of their covariance. Without it the calibration is taken to be right.
+        poses: TUM file to write; None for one next to the map.
+        start: TUM file of initial poses, one line per cloud.
+        angles: calibrated angle set that all clouds were assembled with; its covariance is propagated to that of the
+            poses. Without it the calibration is assumed to be exact.
         spacing_m: distance of the points that are registered.
         map_spacing_m: distance of the points of the map.
         progress: progress callback.
@@ -86,7 +86,7 @@ def make_map(
 
     Args:
         clouds: of one place, z up, in one frame or with `poses`.
-        out: YAML file to write; the PGM goes beside it.
+        out: YAML file to write, next to the PGM.
         angles: angle set that all clouds were assembled with; its optical centre is the position of the scanner. None
             uses the origins of clouds that have poses; clouds without poses make no cell free.
         poses: TUM file, a line for each cloud, as `register` writes it; None reads the poses in the files.

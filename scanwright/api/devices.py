@@ -33,8 +33,8 @@ def open_servo(
         port: such as "/dev/serial/by-id/...".
         model: required model; None accepts any known one.
         servo_id: its id on the bus; None if it is the only one.
-        spins: whether it is going to spin (True) or to sweep (False), to reject a wrong mode at once; None if unknown.
-        undo_folder: allows writing permanent settings, and gets a file that undoes each change; None changes nothing.
+        spins: whether it will spin (True) or sweep (False), to reject a wrong mode at once; None if unknown.
+        undo_folder: allows writing permanent settings, and gets a file to undo them; None changes nothing.
 
     Raises:
         ServoSetupError: such settings must change, and `undo_folder` is None; see `set_up_servo`.
@@ -68,7 +68,7 @@ def set_up_servo(
     Args:
         port: such as "/dev/serial/by-id/...".
         undo_folder: gets the file that undoes the changes.
-        spins: whether the servo is going to spin (True) or to sweep (False); None leaves its mode as it is.
+        spins: whether the servo will spin (True) or sweep (False); None does not change its mode.
         model: required model; None accepts any known one.
         servo_id: its id on the bus; None if it is the only one.
         progress: progress callback.

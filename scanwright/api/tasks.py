@@ -60,13 +60,13 @@ def evaluate(
     Args:
         task: a task; of a build folder, `Evaluation.as_built` includes its parts.
         angles_deg: alpha_rot, beta_rot, alpha_laser, beta_laser; None uses those of the build folder.
-        pole: computes the chance to hit this upright pole; a text as in version 0.1 still works.
-        lever: offset of the optical centre from the axis, as seen at a range; a text as in version 0.1 still works.
+        pole: upright pole, whose probability to be hit is computed; a text as in version 0.1 still works.
+        lever: offset of the optical centre from the axis, at a range; a text as in version 0.1 still works.
         progress: progress callback.
 
     Raises:
         TaskError: the task is malformed, these are not four angles, or no direction has a weight.
-        BuildError: a file of the build folder is gone or was edited.
+        BuildError: a file of the build folder is missing or was edited.
 
     Example:
         >>> import scanwright as sw
@@ -95,7 +95,7 @@ def compare(task: TaskLike, *, progress: Progress = no_progress) -> tuple[Optimu
 
     Raises:
         TaskError: as for `optimise`.
-        BuildError: a file of the build folder is gone or was edited.
+        BuildError: a file of the build folder is missing or was edited.
 
     Example:
         >>> import scanwright as sw

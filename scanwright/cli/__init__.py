@@ -1,1 +1,1 @@
-"""The commands: one function each, its docstring is its help; progress, errors and exit codes."""
+"""The commands: one function each, whose docstring is the help; progress, errors and exit codes."""

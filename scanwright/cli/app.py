@@ -1,6 +1,6 @@
-"""The command `scanwright`: its groups of commands, and what becomes of an error.
+"""The command `scanwright`: its groups of commands, and the printing of errors.
 
-A command imports its room only when it is called, so that `--help` answers at once.
+A command imports its packages only when it is called, so that `--help` is fast.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scanwright.cli.help import Commands, GroupedHelp
 from scanwright.design.errors import ScanwrightError, notes_of
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
-"""What typer raises when a command is called wrongly; it names only this kind of it."""
+"""Base class of the errors that typer raises for wrong calls; typer exports only a subclass."""
 
 _OF_THE_SYSTEM = {
     errno.EACCES,
@@ -33,7 +33,7 @@ _OF_THE_SYSTEM = {
     errno.EPERM,
     errno.EROFS,
 }
-"""What a disk refuses, wherever it does: never a bug of ours."""
+"""Errors of disks and permissions, which are never a bug of the program."""
 
 app = Commands()
 for group in (new, design, parts, devices, clouds, pages):
@@ -59,34 +59,34 @@ def scanwright(
 
 
 def _named(error: Any) -> str:
-    """The command that could not be called like that."""
+    """Return the name of the command that was called wrongly."""
     return "scanwright" if error.ctx is None else str(error.ctx.command_path)
 
 
 def run() -> None:
-    """Entry point: a line for each fault and exit 2 for what a person can mend, a traceback for a bug."""
+    """Entry point: print one line for each fault of the input, or a traceback for a bug."""
     try:
         with command_console():
             code = app(prog_name="scanwright", standalone_mode=False)
-            sys.stdout.flush()  # what cannot be written is told here, not by Python at its end
+            sys.stdout.flush()  # report write errors here, not at the exit of Python
             sys.exit(code)
     except USAGE_ERROR as error:
         number = re.fullmatch(r"-[\d.]+", getattr(error, "option_name", ""))
         advice = "; a value that begins with - goes behind =: --angles=0,90,0,-90" if number else ""
-        message = error.format_message().replace(": Value error, ", ": ").removesuffix(".")  # the words of pydantic
+        message = error.format_message().replace(": Value error, ", ": ").removesuffix(".")  # added by pydantic
         print_error(f"{message}{advice} (see `{_named(error)} --help`)")
         sys.exit(2)
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):
             print_error(line)
         sys.exit(exit_code(error))
-    except typer.Abort as error:  # of a question: Ctrl-C, or Ctrl-D and the end of a file
+    except typer.Abort as error:  # at a question: Ctrl-C, or Ctrl-D and the end of a file
         ended = isinstance(error.__context__, EOFError)
-        print()  # ends the line of the question
+        print()  # end the line of the question
         if ended:
             print_error("no answer: the input ended")
         sys.exit(2 if ended else 130)
-    except BrokenPipeError:  # whoever read the results has gone
+    except BrokenPipeError:  # the reader of the results has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
@@ -98,11 +98,11 @@ def run() -> None:
 
 
 def _unnamed(error: OSError) -> str:
-    """What the system refused and does not name: standard output, where that refuses one more line as well."""
+    """Return the subject of a system error without a file name: standard output if that fails again, else a file."""
     try:
-        print(flush=True)  # what it refused before may have left its buffer
+        print(flush=True)  # the failed output may have left the buffer
     except OSError as again:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries again at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else Python tries again at its exit
         if again.errno == error.errno:
             return "standard output"
     return "a file"

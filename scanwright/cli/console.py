@@ -1,4 +1,4 @@
-"""What the commands share: their arguments, progress on standard error, JSON on standard output, signals."""
+"""Common functions of the commands: results, warnings, progress, JSON, verbosity, signals."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Verbosity(Enum):
     VERBOSE = "verbose"
 
 
-_VERBOSITY = "SCANWRIGHT_VERBOSITY"  # in the environment, so that other processes of the command follow it
+_VERBOSITY = "SCANWRIGHT_VERBOSITY"  # in the environment, for other processes of the command
 _OLD_VERBOSITY = "SCANWRIGHT_VOICE"  # its name in version 0.1
 _STYLES: dict[str, dict[str, Any]] = {
     "heading": {"bold": True},
@@ -42,14 +42,14 @@ _STYLES: dict[str, dict[str, Any]] = {
     "progress": {"fg": "cyan"},
     "next": {"fg": "green", "bold": True},
 }
-_PRIORITY = -10  # nice value: before every ordinary program, behind the system's own at -20
-_APART_S = 10.0  # between two lines of one step in a file: a log of an hour stays readable
+_PRIORITY = -10  # nice value: above ordinary programs, below those of the system at -20
+_APART_S = 10.0  # between two lines of one step in a log file
 _MOST_COLUMNS = 100
 _COLUMN = re.compile(r"\S {2,}(?=\S)")
-_MOST_GAPS = 2  # between words: a line with more is the row of a table
-_MOST_INDENT = 20  # of a line that continues another, to the column of its value
-_BAR_CHARACTERS = 24  # leaves 50 of a terminal's 80 for the step and the time that is left
-_LEAST_SHARE = 0.1  # done before the time left is estimated: an error of a small share is a large one of the time
+_MOST_GAPS = 2  # wide gaps: a line with more is the row of a table
+_MOST_INDENT = 20  # of continuation lines, to the column of the value
+_BAR_CHARACTERS = 24  # leaves 50 of 80 columns for the step and the time left
+_LEAST_SHARE = 0.1  # share of the work that is done before the time left is estimated
 _NUMBER = re.compile(r"[\d.,]+")
 _FIELD = re.compile(r"^[a-z]+(?=:| = )|(?<=`)\w+(?=`)|(?<![\w./-])[a-z]+(_[a-z0-9]+)+(?![\w/(-]|\.\w)")
 _SETTING = re.compile(r'\b(\w+) = (true|"?([\w.+-]+)"?)')
@@ -58,7 +58,7 @@ _elsewhere: dict[str, str] = {}
 
 
 def set_verbosity(value: Verbosity) -> None:
-    """Print more or less from now on, in this process and in those that it starts."""
+    """Set the verbosity of this process and of those that it starts."""
     os.environ[_VERBOSITY] = value.value
 
 
@@ -69,16 +69,16 @@ def verbosity() -> Verbosity:
 
 
 class _Log(logging.Handler):
-    """Warnings that the packages log, on standard error."""
+    """Handler that prints logged warnings on standard error."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print one."""
+        """Print a warning."""
         warn([record.getMessage()])
 
 
 @contextmanager
 def command_console() -> Iterator[None]:
-    """Print logged warnings while the block runs, and end with it what it sets as verbosity."""
+    """Print logged warnings while the block runs, and restore the verbosity at its end."""
     before, log = os.environ.get(_VERBOSITY), _Log(logging.WARNING)
     logging.getLogger("scanwright").addHandler(log)
     try:
@@ -91,12 +91,12 @@ def command_console() -> Iterator[None]:
 
 
 def on_terminal(stream: IO[str]) -> bool:
-    """Whether a person looks on, at something that can move its cursor."""
+    """Return whether a stream is a terminal with cursor control."""
     return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def styled(text: str, style: str, stream: IO[str] | None = None) -> str:
-    """The text in the colour of a style, where the stream (standard output) is a terminal that wants colours."""
+    """Return the text in the colour of a style, if the stream (standard output by default) is a terminal."""
     wanted = on_terminal(stream or sys.stdout) and "NO_COLOR" not in os.environ
     return typer.style(text, **_STYLES[style]) if wanted else text
 
@@ -105,7 +105,7 @@ def show(lines: Iterable[str]) -> None:
     """Print results on standard output, and the warnings among them on standard error."""
     _end_bar()
     warning = False
-    for line in lines:  # goes when no result of a lower package is a list of lines
+    for line in lines:
         warning = line.startswith("warning: ") or (warning and line.startswith(" "))
         if warning:
             warn([line.removeprefix("warning: ")])
@@ -114,10 +114,7 @@ def show(lines: Iterable[str]) -> None:
 
 
 def wrapped(line: str, stream: IO[str]) -> str:
-    """Return a line wrapped at 100 columns, or at those of a narrower terminal; a file gets it as it is.
-
-    The variable `COLUMNS` of the environment wraps lines in a file too.
-    """
+    """Return a line wrapped at 100 columns or at the terminal's width; unchanged for a file unless COLUMNS is set."""
     if not (on_terminal(stream) or "COLUMNS" in os.environ) or len(_COLUMN.findall(line)) > _MOST_GAPS:
         return line
     label = re.match(r" *(?:\S+(?: \S+)*  +)?", line)
@@ -127,47 +124,46 @@ def wrapped(line: str, stream: IO[str]) -> str:
 
 
 def warn(lines: Iterable[str]) -> None:
-    """Print warnings in every verbosity; a line that begins with a space belongs to the one before it."""
+    """Print warnings in every verbosity; a line that begins with a space continues the one before it."""
     for line in lines:
         _print_aside("" if line.startswith(" ") else "warning", line)
 
 
 def print_error(line: str) -> None:
-    """Print what went wrong."""
+    """Print an error."""
     _print_aside("error", line)
 
 
 def print_note(line: str) -> None:
-    """Print what became of the work of a command that was stopped."""
+    """Print a note on the state of the work of a stopped command."""
     _print_aside("note", line)
 
 
 def _print_aside(kind: str, line: str) -> None:
-    """Print a line on standard error, after all that went to standard output; its fields are spelt as options."""
+    """Print a line on standard error, after all output to standard output, with fields spelt as options."""
     _end_bar()
     sys.stdout.flush()
     if kind == "warning" or line.lstrip().startswith("hint: "):
         what, colon, remedy = line.rpartition(": ")
         line = what + colon + as_typed(remedy)
     text = _FIELD.sub(lambda match: _options.get(match[0], match[0]), line)
-    if kind:  # never wrapped: one line of input that is wrong is one line, and its path can be copied
+    if kind:  # not wrapped, so that a path can be copied
         text = styled(f"{kind}:", kind, sys.stderr) + f" {text}"
     print(text, file=sys.stderr, flush=True)
 
 
 def as_typed(remedy: str) -> str:
     """Spell each `name = value` of a remedy as an option, with its command if the running one does not have it."""
-    return _SETTING.sub(_as_typed, remedy)
 
+    def as_option(setting: re.Match[str]) -> str:
+        option = _options.get(setting[1]) or _elsewhere.get(setting[1])
+        return setting[0] if option is None else option if setting[2] == "true" else f"{option} {setting[3]}"
 
-def _as_typed(setting: re.Match[str]) -> str:
-    """Spell `name = value` as the option that sets it."""
-    option = _options.get(setting[1]) or _elsewhere.get(setting[1])
-    return setting[0] if option is None else option if setting[2] == "true" else f"{option} {setting[3]}"
+    return _SETTING.sub(as_option, remedy)
 
 
 def exit_code(error: ScanwrightError) -> int:
-    """Return the exit code of an error: 1 a result that is wrong, 2 wrong input, 3 a device."""
+    """Return the exit code of an error: 1 for a wrong result, 2 for wrong input, 3 for a device."""
     return 1 if isinstance(error, NumericalError) else 3 if isinstance(error, DeviceError) else 2
 
 
@@ -178,7 +174,7 @@ def name_options(options: dict[str, str]) -> None:
 
 
 def name_elsewhere(command: str, options: dict[str, str]) -> None:
-    """Add the options of a command that other commands name; the first command of a field keeps it."""
+    """Add the options of a command for messages of other commands; the first command of a field is used."""
     for field, option in options.items():
         _elsewhere.setdefault(field, f"{command} {option}")
 
@@ -199,7 +195,7 @@ def show_result(lines: Callable[[], Iterable[str]], record: Any, as_json: bool) 
 
 
 def hint(line: str) -> None:
-    """What to do next, the last line of a command; on standard error, so that results can be piped."""
+    """Print the next step as the last line of a command, on standard error, so that results can be piped."""
     if verbosity() is not Verbosity.QUIET:
         _end_bar()
         sys.stdout.flush()
@@ -227,13 +223,13 @@ class ConsoleProgress:
     _fraction: float = 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Go on in another process, which estimates the time left from the same beginning."""
+        """Pickle for another process, which estimates the time left from the same beginning."""
         return ConsoleProgress, (time.monotonic, self.began)
 
     def left_s(self, fraction: float) -> float | None:
-        """Return the time left at a fraction [s], from the time that it took so far; None if that is too short."""
+        """Return the time left [s] at a fraction, from the time so far; None if that is too short."""
         now_s = self.clock()
-        # nothing is done yet, or other work, or steps that are done again
+        # nothing is done yet, or other or repeated work begins
         if self.began is None or not fraction or fraction < self._fraction - _LEAST_SHARE:
             self.began, self._fraction = (now_s, fraction), fraction
         fraction = self._fraction = max(fraction, self._fraction)
@@ -282,20 +278,13 @@ def _end_bar() -> None:
 
 
 def require_pages(work: str) -> None:
-    """Refuse work that opens a page where nothing is installed that could serve it.
-
-    Raises:
-        InstallError: a package of the extra `pages` is missing.
-    """
+    """Require the packages of the extra `pages`; raises InstallError."""
     require("pages", f"{work} needs a page server", "msgspec", "viser", "websockets")
 
 
 @contextmanager
 def high_priority() -> Iterator[None]:
-    """Run the block at a high priority, if the system allows it, and end it by KeyboardInterrupt on every signal.
-
-    Arrival times of device data are late if other programs come first.
-    """
+    """Run the block at a high priority if allowed, for exact arrival times; every signal is a KeyboardInterrupt."""
     usual = os.nice(0)
     with suppress(PermissionError):
         os.nice(_PRIORITY)

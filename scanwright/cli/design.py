@@ -1,4 +1,4 @@
-"""Commands about the angles: optimise, evaluate, compare, accuracy; and what a task can name."""
+"""Commands about the angles and the catalogue: optimise, evaluate, compare, accuracy, catalogue, schema."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def optimise(task: TaskFile, as_json: AsJson = False) -> None:
     if as_json:
         from scanwright.cli.results.angles import Optimised
 
-        show_json(Optimised(**optimum.facts(), **cloud.facts(), warnings=optimum.asked.warnings()))
+        show_json(Optimised(**optimum.facts(), **cloud.facts(), warnings=optimum.requested.warnings()))
     else:
         show(
             [
                 *optimum.lines(verbosity() is Verbosity.VERBOSE),
                 *cloud.lines(),
-                *(f"warning: {warning}" for warning in optimum.asked.warnings()),
+                *(f"warning: {warning}" for warning in optimum.requested.warnings()),
             ]
         )
         hint(f"next: `scanwright build {task}`")
@@ -128,8 +128,7 @@ def accuracy(
         from scanwright.trials.stress import range_rows, servo_rows
 
         more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
-        cases = report_stress(loaded, folder, ConsoleProgress(), more)
-        report = WrittenFiles(folder, ["stress.csv"], list(cases.lines), cases.passed)
+        report = WrittenFiles(folder, ["stress.csv"], *report_stress(loaded, folder, ConsoleProgress(), more))
     else:
         from scanwright.design.accuracy.report import report_precision, report_search
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -176,27 +175,24 @@ def scan(
     )
     progress = ConsoleProgress()
     result = ScanResult(_devices_of(plan), plan.angles_path, plan.duration_s)
-    print_lines = _print_nothing if as_json else show
-    print_lines(plan.lines())
+    if not as_json:
+        show(plan.lines())
     if dry_run:
         show_result(tuple, result, as_json)
         return
     with viewer as watch, closing(watch):
         try:
             recorded = _acquired(plan, progress, watch, out, servo_id)
-            watch.ended(finished(recorded))  # the devices stand, whatever becomes of the cloud
+            watch.ended(finished(recorded))  # the devices are at rest, even if assembling fails
             progress(f"recorded {recorded.duration_s:.1f} s, assembling")
-            print_lines(recorded.lines())
+            if not as_json:
+                show(recorded.lines())
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
             watch.ended(finished(recorded, cloud.lines()))
             show_result(cloud.lines, replace(result, recording=recorded, cloud=cloud), as_json)
         except ScanwrightError as error:
             _end(watch, failed(error), plan.recording)
             raise typer.Exit(exit_code(error)) from None
-
-
-def _print_nothing(_lines: Iterable[str]) -> None:
-    """Replace `show` if one JSON object is printed at the end."""
 
 
 def _devices_of(plan: ScanPlan) -> Devices:
@@ -206,7 +202,7 @@ def _devices_of(plan: ScanPlan) -> Devices:
 
 
 def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Path, servo_id: int | None) -> ScanSummary:
-    """Record, after the person has agreed to what the servo needs; Ctrl-C ends the command."""
+    """Record a scan, after the user has agreed to changes of servo settings; Ctrl-C ends the command."""
     from scanwright.firmware_io.scan.acquire import acquire
 
     try:
@@ -218,7 +214,7 @@ def _acquired(plan: ScanPlan, progress: ConsoleProgress, watch: Viewer, out: Pat
 
 
 def _end(watch: Viewer, end: ScanEnd, recording: Path) -> None:
-    """Say how a scan ended early, in the same words on standard error and to the viewer."""
+    """Print how a scan ended early on standard error, and pass it to the viewer."""
     recorded_in = (f"what was recorded is in {recording}",) if recording.exists() else ()
     end = replace(end, lines=(*end.lines, *recorded_in))
     for line in end.lines:

@@ -1,4 +1,4 @@
-"""What all commands have in common before they do anything: their groups in the help, `-q`, `-v`, `--version`."""
+"""Groups of commands in the help, and the options `-q` and `-v` of every command."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print every step
 
 
 class Commands(typer.Typer):
-    """A group of commands with a title; each of them gets `-q` and `-v`, and calls `first` before anything else."""
+    """A group of commands with a title; each has the options `-q` and `-v`, and calls `first` before it runs."""
 
     def __init__(self, title: str = "", first: Callable[[], None] = lambda: None) -> None:
         super().__init__(rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -35,7 +35,7 @@ class Commands(typer.Typer):
         register = super().command(name, cls=_Command, epilog=epilog, rich_help_panel=self.title, **options)
 
         def registered(function: F) -> F:
-            if self.title == "Clouds":  # what warnings of a recording advise
+            if self.title == "Clouds":  # warnings of recordings name these options
                 name_elsewhere(name or function.__name__, _options_of(inspect.signature(function, eval_str=True)))
             register(_with_verbosity(function, self.first))
             return function
@@ -47,12 +47,12 @@ class _Command(TyperCommand):
     """A command whose usage line has no braces around arguments."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """As typer's own, `RECORDING` in place of `{RECORDING}`."""
+        """Return the usage, with `RECORDING` in place of `{RECORDING}`."""
         return [re.sub(r"[{}]", "", piece) for piece in super().collect_usage_pieces(ctx)]
 
 
 class GroupedHelp(TyperGroup):
-    """The help with a section for each group of commands, and what each command does in whole words."""
+    """The help with a section for each group of commands, without abbreviated descriptions."""
 
     titles: ClassVar[tuple[str, ...]] = ("Design", "Parts", "Devices", "Clouds", "Pages")
 
@@ -68,13 +68,13 @@ class GroupedHelp(TyperGroup):
 
 
 def first_sentence(command: Any) -> str:
-    """What a command does, from its docstring."""
+    """Return the first sentence of the docstring of a command."""
     paragraph = str(command.help or "").split("\n\n", maxsplit=1)[0].replace("\n", " ")
     return re.split(r"\.(?: (?=[A-Z])|$)", paragraph, maxsplit=1)[0]
 
 
 def _with_verbosity(function: Callable[..., Any], first: Callable[[], None]) -> Callable[..., Any]:
-    """Return the function with options for its verbosity, which it does not see; it runs after `first`."""
+    """Return the function with options for its verbosity, which are not passed to it; it runs after `first`."""
     signature = inspect.signature(function, eval_str=True)
     options = _options_of(signature)
 
@@ -103,7 +103,7 @@ def _option(name: str, parameter: inspect.Parameter) -> str:
     """Return the option of a parameter, such as `--min-range-m`; empty for an argument."""
     for info in getattr(parameter.annotation, "__metadata__", ()):
         if isinstance(info, OptionInfo):
-            written = (info.default, *(info.param_decls or ()))  # typer takes the first one for a default
+            written = (info.default, *(info.param_decls or ()))  # typer stores the first one as the default
             named = (text for text in written if isinstance(text, str) and text.startswith("--"))
             return next(named, f"--{name.replace('_', '-')}")
     return ""

@@ -1,4 +1,4 @@
-"""The command `new`: questions, or their options, and a task file."""
+"""The command `new`: a task file from options or questions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scanwright.design.errors import ScanwrightError, TaskError, suggest
 app = Commands("Design")
 T = TypeVar("T")
 DEFAULTS: dict[str, Any] = {"name": "new", "height_m": 0.5, "see": ("all",), "scan_s": 10.0}
-"""Values of later answers while earlier ones are checked."""
+"""Values of questions that are not yet answered, to check the others."""
 
 
 @app.command(example="new dog --lidar UST-10LX --servo XM430-W350 --height-m 0.45 --see ground:0.5:5 --see ceiling")
@@ -69,8 +69,8 @@ def new(
         products.get(lidar, Lidar)
     if servo is not None:
         products.get(servo, Servo)
-    asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
-    if asks:
+    interactive = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
+    if interactive:
         lidar, servo, height_m, robot, ahead_m, see, scan_s = _prompted(
             products, lidar, servo, height_m, robot, ahead_m, see, scan_s
         )
@@ -105,7 +105,7 @@ def _prompted(
     see: list[str] | None,
     scan_s: float | None,
 ) -> tuple[str, str, float, str, float, list[str], float]:
-    """Ask the questions that no option answers, each again until its answer is valid."""
+    """Ask the questions without an option, each until the answer is valid."""
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.table import MARK, chosen, table_lines
     from scanwright.pipeline.new_task import Answers, check_answers, usual_scan_s
@@ -150,7 +150,7 @@ def _prompted(
 
 
 def _until(question: str, usual: str | None, read: Callable[[str], T], fits: Callable[[T], object]) -> T:
-    """Ask until an answer can be read and fits those before it."""
+    """Ask until `read` and `fits` accept an answer."""
     while True:
         try:
             answer = read(str(typer.prompt(question, default=usual, prompt_suffix=" > ")).strip())

@@ -103,7 +103,7 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     if verbosity() is Verbosity.VERBOSE:
         lines += [f"{each.severity:7} {sentence(each)}" for each in checks if each.severity != "error"]
     else:
-        warnings = [each for each in checks if each.severity == "warning" and each.code != "unverified"]  # summed up
+        warnings = [each for each in checks if each.severity == "warning" and each.code != "unverified"]  # only counted
         lines += finding_lines(warnings, checks, in_full=False)
     show_result(
         lambda: lines, Checked(loaded.task.name, [CheckEntry(**entry) for entry in entries_of(checks)]), as_json

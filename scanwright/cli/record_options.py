@@ -1,4 +1,4 @@
-"""Options of a command that are the fields of a record, so that they are written once."""
+"""Options of a command from the fields of a dataclass."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def record_options(record: type[Any], *own: str, **metavars: str) -> Callable[[C
 
     Args:
         record: a dataclass whose docstring describes each field in one line.
-        own: fields that the command takes in another form itself.
-        metavars: what stands for the value in the help; by default the unit at the end of the field's name.
+        own: fields for which the command has options of its own.
+        metavars: placeholder of the value in the help; by default the unit at the end of the field's name.
     """
     described = dict(re.findall(r"^ +(\w+): (.*?)\.?$", record.__doc__ or "", re.MULTILINE))
     types = inspect.get_annotations(record)

@@ -1,4 +1,4 @@
-"""Settings of a servo that outlast the power: the person is asked first, and a file is kept that undoes the change."""
+"""Permanent settings of a servo: written after confirmation, with a file to undo the change."""
 
 from __future__ import annotations
 
@@ -18,20 +18,15 @@ T = TypeVar("T")
 
 
 def set_up_command(port: str, out: Path | None = None, servo_id: int | None = None) -> str:
-    """The command that sets up the servo of a port, for the motion of a build folder."""
+    """Return the command that sets up the servo of a port, for the motion of a build folder."""
     words = [f"scanwright servo-setup {port}"]
     words += [] if out is None else [f"--scanner {out}"]
     words += [] if servo_id is None else [f"--from-id {servo_id}"]
     return " ".join(words)
 
 
-def undo_command(port: str, file: Path) -> str:
-    """The command that undoes the changes of a file."""
-    return f"scanwright servo-setup {port} --undo {file}"
-
-
 def print_steps(port: str, steps: Iterable[str | Path], as_json: bool = False) -> None:
-    """Print each change as it is made, and first how to undo them all; or one JSON object when all are made."""
+    """Print each change as it is made, and first how to undo all; or one JSON object at the end."""
     if as_json:
         from scanwright.cli.results.of_commands import Settings
 
@@ -41,22 +36,21 @@ def print_steps(port: str, steps: Iterable[str | Path], as_json: bool = False) -
         return
     for step in steps:
         if isinstance(step, Path):
-            print(f"the old settings are saved; `{undo_command(port, step)}` restores them", flush=True)
+            print(
+                f"the old settings are saved; `scanwright servo-setup {port} --undo {step}` restores them", flush=True
+            )
         else:
             print(step, flush=True)
 
 
 def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
-    """Do work; if settings of the servo must change for it, ask the person, write them, and do it again.
+    """Do work; if settings of the servo must change for it, ask the user, write them, and do it again.
 
-    Args:
-        work: uses the servo, and has stopped it when it raises.
-        out: build folder of the scanner; gets the undo file.
-        servo_id: number of the servo, if one was given.
+    The work stops the servo before it raises an error. The build folder `out` gets the undo file.
 
     Raises:
-        ServoSetupError: nobody is there to be asked, or a setting does not last; nothing moves.
-        typer.Exit: the person declines, code 3; nothing moves.
+        ServoSetupError: there is no terminal, or a setting does not last; nothing moves.
+        typer.Exit: the user declines, code 3; nothing moves.
     """
     from scanwright.firmware_io.servo.fitness import ServoSetupError
     from scanwright.firmware_io.servo.settings import set_up
@@ -82,7 +76,7 @@ def asking_first(work: Callable[[], T], out: Path, servo_id: int | None) -> T:
 
 
 def _agrees(error: ServoSetupError) -> bool:
-    """Whether the person at the terminal, who sees the list, agrees to write it."""
+    """Print the changes, and return whether the user agrees."""
     for line in str(error).splitlines():
         print_error(line)
     number = len(error.changes)

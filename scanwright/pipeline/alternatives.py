@@ -1,4 +1,4 @@
-"""Other servos and slip rings for a scanner that cannot be built: those that turn its lidar and can be laid out."""
+"""Other servos and slip rings for a scanner that cannot be built: strong enough, and with a possible layout."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ MOST = 3
 
 
 def what_fits(loaded: LoadedTask, angles: AngleSet) -> str:
-    """Return the end of a message: what the lidar of a task can be laid out with at these angles."""
-    found = list(islice(_layouts(loaded, angles), MOST))
-    if not found:
+    """Return the end of a message: servos and rings with which the lidar can be laid out at these angles."""
+    layouts = list(islice(_layouts(loaded, angles), MOST))
+    if not layouts:
         return f"; no servo and slip ring of the catalogue fit {angles.sensor} at these angles"
-    return f"; {angles.sensor} can be laid out at these angles with {', or '.join(found)}"
+    return f"; {angles.sensor} can be laid out at these angles with {', or '.join(layouts)}"
 
 
 def _layouts(loaded: LoadedTask, angles: AngleSet) -> Iterator[str]:
-    """Yield servo and ring in words: other rings first, then other servos with the same ring, then the rest."""
+    """Yield names of servo and ring: other rings first, then other servos with the same ring, then the rest."""
     servos = [each for each in loaded.products if isinstance(each, Servo)]
     rings: list[SlipRing | None] = [None]
     if angles.slip_ring is not None:

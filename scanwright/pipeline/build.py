@@ -46,13 +46,13 @@ KERNEL = (
     "scanwright.cad.files.workshop_files",
     "scanwright.report.page",
 )
-"""What brings the CAD kernel and all that works on parts with it: loaded while the search runs, in no third place."""
+"""Modules that import the CAD kernel; worker processes import them while the search runs."""
 
 MOST_FAILED = 3
 """Other mounts that are made if the parts of the best one fail a check."""
 
 DRAWN = 2
-"""Reference mounts beside the scanner in density.png, the best one first: its ratio is drawn."""
+"""Reference mounts in density.png, the best one first, for which the ratio is drawn."""
 
 BEGINS = {
     "reading the": 0.0,
@@ -84,12 +84,12 @@ class Made:
     """The results of one build.
 
     Attributes:
-        optimum: the search.
-        chosen: the setting that is best with its parts: the one that was built.
-        as_built: what it sees, without the beams that its parts block.
-        findings: what a person should know before the parts are made.
-        cloud: error, gaps and points to expect.
-        to_make: how many parts to print and to have machined, and the time to print.
+        optimum: result of the search.
+        chosen: the best mount with its parts, which was built.
+        as_built: its view without the beams that its parts block.
+        findings: to read before the parts are made.
+        cloud: expected error, gaps and points.
+        to_make: numbers of parts to print and to machine, and the time to print.
     """
 
     optimum: Optimum
@@ -105,11 +105,11 @@ class Build:
     """A build folder.
 
     Attributes:
-        folder: where it is.
+        folder: the folder.
         files: its files, relative to the folder.
-        warnings: what the task can do, but not as well as its author may think.
+        warnings: limits of the task that can surprise.
         checks: of its parts, as in `checks.json`.
-        made: what was done; None if the folder was current and there was nothing to do.
+        made: results of the build; None if the folder was current.
     """
 
     folder: Path
@@ -120,7 +120,7 @@ class Build:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The checks that failed; the parts are safe to make only if there are none."""
+        """The failed checks; make the parts only if there are none."""
         return errors_in(self.checks)
 
     def lines(self, in_full: bool = False) -> list[str]:
@@ -142,7 +142,7 @@ class Build:
 
 @dataclass(frozen=True, slots=True)
 class PartsMade:
-    """The parts: reports, findings, omissions, and the solids for processes that have the kernel."""
+    """The parts: reports, findings, omissions, and the solids for processes with the CAD kernel."""
 
     parts: tuple[PartReport, ...]
     findings: tuple[Finding, ...]
@@ -161,22 +161,17 @@ def finding_lines(findings: Sequence[Finding], checks: Sequence[Finding], in_ful
 
 
 def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
-    """Build the folder of a task, unless it is up to date. Failed checks do not raise: see `Build.failed`.
-
-    Args:
-        loaded: the task.
-        target: the folder, `out/<task>`.
-        progress: progress callback.
+    """Build the folder of a task, `out/<task>`, unless it is up to date; failed checks are in `Build.failed`.
 
     Raises:
         InstallError: the CAD kernel is not installed.
-        TaskError: no direction has a weight, or no setting keeps the limits.
-        BuildError: no setting can be built, or the folder cannot be written.
-        KeyboardInterrupt: with a note of what became of the folder.
+        TaskError: no direction has a weight, or no mount meets the limits.
+        BuildError: no mount can be built, or the folder cannot be written.
+        KeyboardInterrupt: with a note on the state of the folder.
     """
     require_kernel("build")
     try:
-        made = None if is_current(target, loaded) else _made_again(loaded, target, progress)
+        made = None if is_current(target, loaded) else _make_and_log(loaded, target, progress)
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
@@ -207,7 +202,7 @@ def setting_built(optimum: Optimum) -> Chosen:
         InstallError: the CAD kernel is not installed.
         BuildError: no setting can be built.
     """
-    require_kernel("what parts hide")
+    require_kernel("a mount with its parts")
     from scanwright.cad.assembly.shadow import PartsWorkshop
 
     return _chosen(optimum, PartsWorkshop(optimum.loaded.scanner(optimum.angle_set())), {}, no_progress)
@@ -224,7 +219,7 @@ def _chosen(optimum: Optimum, workshop: Workshop, failed: Failed, progress: Prog
     return chosen
 
 
-def _chosen_and_made(
+def _choose_and_make(
     optimum: Optimum, task_sha256: str, failed: Failed, progress: Progress
 ) -> tuple[Chosen, Scanner, Packed[Assembly]]:
     """Choose a mount that is not among those that failed, and make the scanner and its parts."""
@@ -244,27 +239,27 @@ def _chosen_and_made(
     return chosen, scanner, Packed.of(assembly)
 
 
-def _that_passes(
+def _make_passing(
     begin: Begin, optimum: Optimum, task_sha256: str, first: Attempt, work: Path, progress: Progress
 ) -> tuple[Chosen, Scanner, PartsMade]:
     """Write parts and checks of the first mount, or of the next one if a check fails; if all fail, of the first."""
     attempt, failed = first, dict[tuple[float, ...], str]()
-    parts, errors = _written_and_checked(begin, attempt, work, progress)
+    parts, errors = _write_and_check(begin, attempt, work, progress)
     while errors and len(failed) < MOST_FAILED:
         failed[attempt[0].family.angles_deg] = errors[0].message
         progress(f"a check failed, trying another mount: {errors[0].message}")
         try:
-            attempt = begin(_chosen_and_made, optimum, task_sha256, failed, progress)()
-        except BuildError:  # there is no other one
+            attempt = begin(_choose_and_make, optimum, task_sha256, failed, progress)()
+        except BuildError:  # no other mount can be built
             break
-        parts, errors = _written_and_checked(begin, attempt, work, progress)
+        parts, errors = _write_and_check(begin, attempt, work, progress)
     if errors and attempt is not first:
         attempt = first
-        parts, errors = _written_and_checked(begin, attempt, work, progress)
+        parts, errors = _write_and_check(begin, attempt, work, progress)
     return attempt[0], attempt[1], parts
 
 
-def _written_and_checked(
+def _write_and_check(
     begin: Begin, attempt: Attempt, work: Path, progress: Progress
 ) -> tuple[PartsMade, tuple[Finding, ...]]:
     """Write parts and checks of a mount, in place of those of another one; returns the checks that failed."""
@@ -318,7 +313,7 @@ def measured(progress: Progress, step: str, fraction: float | None = None, /) ->
     progress(step, begins)
 
 
-def _made_again(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
+def _make_and_log(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
     """Build a folder that is not up to date, and log the edits that are lost."""
     edits = changes(target)
     if edits:
@@ -333,20 +328,20 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     from scanwright.design.search.optimum import find_optimum
 
     progress = partial(measured, progress)
-    with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this one never loads the kernel
+    with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this process does not load the kernel
         optimum = find_optimum(requested, progress)
-        # with `period_s = "shortest"` the search has changed the motion, and a rebuild must ask for it again
+        # with `period_s = "shortest"` the search has changed the motion, but `requested` is written for a rebuild
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
         from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
         from scanwright.pipeline import records
         from scanwright.report.parts_list import read_parts
 
         progress("waiting for the CAD kernel")
-        made = begin(_chosen_and_made, optimum, requested.sha256(), {}, progress)
-        begin(import_module, "trimesh")  # for the report: the other process has nothing to do before the parts are made
+        made = begin(_choose_and_make, optimum, requested.sha256(), {}, progress)
+        begin(import_module, "trimesh")  # for the report, in the idle process
         records.write_task(work, requested)
         records.write_search(work, result)
-        chosen, scanner, parts = _that_passes(begin, optimum, requested.sha256(), made(), work, progress)
+        chosen, scanner, parts = _make_passing(begin, optimum, requested.sha256(), made(), work, progress)
         best, angles = chosen.family, scanner.angles
         (work / "angles.json").write_text(angles.to_json(), encoding="utf-8")
         height = deck_height(loaded, angles)

@@ -47,7 +47,7 @@ def open_built(folder: Path) -> BuiltScanner:
 
     Raises:
         TaskError: the folder has no angle set or no task.
-        BuildError: a file of the build is gone or was edited, or is not as a build writes it.
+        BuildError: a file of the build is missing, was edited, or is invalid.
     """
     require_as_built(folder)
     angles, own_body, checks = load_angles(folder / "angles.json"), folder / "own_body.npz", folder / "checks.json"

@@ -17,7 +17,7 @@ from scanwright.pipeline.built_scanner import BuiltScanner
 from scanwright.pipeline.folder import report_folder
 
 VIBRATION = "natural_frequency"
-"""Code of the check that a comparison repeats."""
+"""Code of the check that is part of a comparison."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Comparison:
     Attributes:
         optimum: of the task.
         rows: of the table.
-        folder: that it was written to.
+        folder: of the written files.
         vibration: check of a build's natural frequency; None without a build.
     """
 

@@ -1,9 +1,8 @@
 """The build folder `out/<task>/`: written completely or not at all, by one build at a time.
 
-A build is made in `.<task>.building` beside its folder, and then moved file by file. What the move is about to do
-stands in `.<task>.moving`, so that the next build cleans up after one that was killed in the middle: none of its files,
-and none of those before it, stay behind unlisted. Names of files come from manifests that anybody may have written, and
-the folder may hold links: `_require_free_names` checks each name before anything moves.
+A build is made in `.<task>.building` next to its folder, and then moved file by file. `.<task>.moving` lists the files
+of the move, so that the next build removes those of a build that was killed during the move. Manifests can contain any
+file names, and the folder can contain links: `_require_free_names` checks each name before anything moves.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ def fresh_folder(target: Path) -> Iterator[Path]:
     recording, stays. `target` may be a link to a folder.
 
     Raises:
-        BuildError: the folder cannot be written, or another build of it is at work.
+        BuildError: the folder cannot be written, or another build of it is running.
     """
     if target.is_symlink():
         target = target.resolve()
@@ -50,7 +49,7 @@ def fresh_folder(target: Path) -> Iterator[Path]:
                     shutil.rmtree(work, ignore_errors=True)  # of a build that was killed
                     work.mkdir()
                 yield work
-                with _disk_errors(target), sigint_deferred():  # a folder is as it was, or finished
+                with _disk_errors(target), sigint_deferred():
                     made = _files_in(work)
                     known = {*listed_files(target), *_names_in_transit(moving), *made}
                     _require_free_names(target, made, known)
@@ -101,17 +100,17 @@ def _alone(target: Path) -> Iterator[None]:
     """Lock a build folder; the lock ends with the process.
 
     Raises:
-        BuildError: another process holds it.
+        BuildError: another process has locked it.
     """
     path = target.with_name(f".{target.name}.lock")
     with _locked(path, target) as lock:
-        if not path.exists() or path.stat().st_ino != os.fstat(lock.fileno()).st_ino:  # its holder has just ended
+        if not path.exists() or path.stat().st_ino != os.fstat(lock.fileno()).st_ino:  # the holder has removed it
             raise BuildError(f"{target}: another build of this folder has just ended: build again")
         try:
             yield
         finally:
             if fcntl is None:
-                lock.close()  # Windows removes no open file
+                lock.close()  # Windows cannot remove an open file
             path.unlink(missing_ok=True)
 
 
@@ -119,7 +118,7 @@ def _locked(path: Path, target: Path) -> TextIO:
     """Open the lock file and lock it; if the system has no `flock`, the file alone is the lock.
 
     Raises:
-        BuildError: another process holds it.
+        BuildError: another process has locked it.
     """
     busy = f"{target}: another build of this folder is at work: wait for it"
     with _disk_errors(target):
@@ -139,13 +138,10 @@ def _locked(path: Path, target: Path) -> TextIO:
 def _require_free_names(target: Path, made: Iterable[str], known: Iterable[str]) -> None:
     """Stop the build before anything moves if a name of `target` cannot be written or removed.
 
-    Args:
-        target: the build folder.
-        made: files that move into it.
-        known: those and the files of earlier builds, which are removed.
+    `made` move into it; `known` are those and the files of earlier builds, which are removed.
 
     Raises:
-        BuildError: a file is where a folder must be, a folder where a file must be, or a link is on the way.
+        BuildError: a file has the name of a folder, or a folder that of a file, or a path contains a link.
     """
     if target.exists() and not target.is_dir():
         raise BuildError(f"{target}: cannot write the build folder: a file has that name")
@@ -165,7 +161,7 @@ def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[st
     """Move every file of `work` into `target`, the manifest last, and remove files of earlier builds."""
     write_json(moving, sorted(known))
     target.mkdir(exist_ok=True)
-    (target / MANIFEST).unlink(missing_ok=True)  # a build cut off while files move is no build
+    (target / MANIFEST).unlink(missing_ok=True)  # an interrupted move leaves no valid build
     for name in made:
         if name != MANIFEST:
             (target / name).parent.mkdir(parents=True, exist_ok=True)
@@ -179,7 +175,7 @@ def _move(work: Path, target: Path, moving: Path, made: list[str], known: set[st
 
 
 def _names_in_transit(moving: Path) -> set[str]:
-    """Return the files that a killed build may have left in the folder."""
+    """Return the files that a killed build can have left in the folder."""
     try:
         names = json.loads(moving.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,6 +1,6 @@
 """The manifest of a build folder: the digest of every file, the task, the versions and the code.
 
-Cheap to import: asking whether a build is current must not load what makes one.
+The module imports no CAD, so that the check whether a build is current is fast.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from scanwright.design.files.atomic_file import place_in
 from scanwright.design.task.task import LoadedTask
 
 MANIFEST = "manifest.json"
-_CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are part of the task's own digest
+_CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are in the digest of the task
 _PACKAGES = ("scanwright.design", "scanwright.cad", "scanwright")
-_NESTED = {"design", "cad", "firmware_io"}  # links in a checkout, folders of an installed package: each file once
-_NAMED = 3  # files of a kind in one line; of more their number
+_NESTED = {"design", "cad", "firmware_io"}  # links in a checkout, folders of an installed package
+_NAMED = 3  # files of a kind that a message names
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,15 +31,15 @@ class Changes:
     """Files of a build folder that changed since its manifest was written.
 
     Attributes:
-        missing: files that are not there.
-        edited: files with other bytes.
+        missing: missing files.
+        edited: files with other contents.
     """
 
     missing: tuple[str, ...]
     edited: tuple[str, ...]
 
     def __bool__(self) -> bool:
-        """Return whether any file is not as it was built."""
+        """Return whether any file changed."""
         return bool(self.missing or self.edited)
 
     def words(self) -> str:
@@ -82,10 +82,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def listed_files(folder: Path) -> tuple[str, ...]:
-    """Return the files inside a build folder that its manifest lists.
-
-    A name is data that somebody may have written: one that leads out of the folder names nothing of ours.
-    """
+    """Return the files that the manifest of a build folder lists, without names that lead out of the folder."""
     return tuple(name for name in read_manifest(folder).get("files", {}) if inside(name))
 
 
@@ -110,7 +107,7 @@ def require_as_built(folder: Path, but: str | None = None) -> None:
     """Reject a build folder with missing or edited files except `but`; a folder without a manifest passes.
 
     Raises:
-        BuildError: a file is gone or was edited.
+        BuildError: a file is missing or was edited.
     """
     if edits := changes(folder, but):
         raise BuildError(
@@ -134,7 +131,7 @@ def first_difference(folder: Path, again: Path) -> str | None:
     """Describe the first difference between a build folder and a rebuild of its task; None if all bytes are equal.
 
     Raises:
-        BuildError: the first one is no finished build.
+        BuildError: the folder is not a finished build.
     """
     built = set(listed_files(folder))
     if not read_manifest(folder):
@@ -188,7 +185,7 @@ def write_json(path: Path, value: Any) -> None:
 def _version(name: str) -> str:
     try:
         return version(name)
-    except PackageNotFoundError:  # an extra that this installation does without
+    except PackageNotFoundError:  # of an extra that is not installed
         return "none"
 
 

@@ -25,7 +25,7 @@ from scanwright.pipeline.deck_height import deck_height
 from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines, require_positive
 
-LINE_GAP_DEG = 1.0  # between neighbouring lines of a usual scan: two to four lines meet every neighbourhood of 2 deg
+LINE_GAP_DEG = 1.0  # between neighbouring lines of a usual scan: two to four lines in every ball of 2 deg
 UPRIGHT = Angles(alpha_rot=0, beta_rot=0, alpha_laser=0, beta_laser=0)
 
 ANGLES = r"""
@@ -64,10 +64,10 @@ class Answers:
         lidar: by its name in the catalogue.
         servo: the same.
         height_m: of the scanner's optical centre over the ground.
-        see: what it must see, each as `scanwright.pipeline.seen_regions.SEEN` says.
+        see: regions to see, in the form of `scanwright.pipeline.seen_regions.SEEN`.
         scan_s: time of one full scan.
-        robot: what of it the scanner must look past: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
-        ahead_m: where on the robot it stands, ahead of the middle of the box or of the origin of the mesh.
+        robot: parts of the robot that block the view: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
+        ahead_m: position of the scanner ahead of the middle of the box, or of the origin of the mesh.
     """
 
     name: str
@@ -81,16 +81,10 @@ class Answers:
 
 
 def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -> str:
-    """Return the commented task file.
-
-    Args:
-        answers: what to write.
-        products: that can be named.
-        command: that gives the same file again.
-        path: where the file is to be; the mesh of the robot is named from there.
+    """Return the commented task file for `path`; `command` writes the same file again.
 
     Raises:
-        TaskError: an answer makes no sense, or these two cannot work together.
+        TaskError: an answer is invalid, or lidar and servo cannot work together.
     """
     lidar, servo = products.get(answers.lidar, Lidar), products.get(answers.servo, Servo)
     _require_strength(lidar, servo)
@@ -132,7 +126,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
 
 
 def _alpha_rot(answers: Answers, folder: Path) -> str:
-    """Return the range of the angle that turns the axis over: a scanner hangs only below a part of the robot."""
+    """Return the range of alpha_rot: a scanner can hang only below a part of the robot."""
     hangs = answers.robot == "none"
     if not hangs and answers.robot.split(":")[0] != "box":
         (table,) = tomllib.loads("\n".join(_mask(answers, folder)))["mask"]
@@ -153,7 +147,7 @@ def _line_gap_deg(lidar: Lidar, scan_s: float) -> float:
 
 
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
-    """Reject a lidar whose weight, off a level axis, needs more than the continuous torque of the servo."""
+    """Reject a lidar whose weight, off a horizontal axis, needs more than the continuous torque of the servo."""
     needed = torque_nm(lidar, None)
     if needed > servo.continuous_torque_nm:
         raise TaskError(
@@ -164,25 +158,24 @@ def _require_strength(lidar: Lidar, servo: Servo) -> None:
 
 
 def torque_nm(lidar: Lidar, ring: SlipRing | None) -> float:
-    """Return the torque that a lidar's weight, off a level axis, and the drag of a ring need together."""
+    """Return the torque for a lidar's weight, off a horizontal axis, and for the drag of a ring."""
     drag_nm = 0.0 if ring is None or ring.friction_nm is None else ring.friction_nm[1]
     return lidar.mass_g / 1000 * STANDARD_GRAVITY_M_S2 * _off_m(lidar) + drag_nm
 
 
 def _off_m(lidar: Lidar) -> float:
-    """Return the distance of a lidar's middle from its optical centre."""
+    """Return the distance between the middle of a lidar and its optical centre."""
     return abs(lidar.optical_height_mm - lidar.body_mm[2] / 2) / 1000
 
 
 def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing | None:
     """Return the slip ring for continuous rotation; None for a servo that must sweep.
 
-    Rings that are rated for the lidar's data come first, then those with a bore, which need no belt, and of those the
-    ones whose speed is known. A servo that does not read its angle all around sweeps, and so does one that no ring of
-    the catalogue can be laid out with.
+    Rings that are rated for the lidar's data are preferred, then those with a bore, which need no belt, then those with
+    a known speed. A servo must sweep if it does not read its angle all around, or no ring has a layout with it.
 
     Raises:
-        TaskError: these two cannot be laid out without a ring either.
+        TaskError: lidar and servo have no layout without a ring either.
     """
 
     def order(ring: SlipRing) -> tuple[bool, bool, bool, str]:

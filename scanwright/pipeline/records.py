@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +27,17 @@ _BARE_MESH = {"joint_deg": {}, "joint_mm": {}, "frame": "", "omit": []}
 
 def write_task(folder: Path, loaded: LoadedTask) -> None:
     """Write `task.toml` with all defaults, and copy the files that it names, so that the folder can be built alone."""
-    table = loaded.task.model_dump(mode="json", exclude_none=True, exclude={"camera"})  # it makes no part
-    rename_files(table, loaded.task, lambda file, role: _bring(folder, loaded.source.parent / file, role))
+    table = loaded.task.model_dump(mode="json", exclude_none=True, exclude={"camera"})  # a camera affects no part
+    rename_files(table, loaded.task, lambda file, role: _copied(folder, loaded.source.parent / file, role))
     for i, region in enumerate(loaded.task.mask):
         if isinstance(region, MeshRegion) and Path(region.file).suffix.lower() == URDF:
-            table["mask"][i] |= {"file": _bring_robot(folder, loaded.source.parent, region, f"mask-{i}"), **_BARE_MESH}
+            file = _robot_mesh(folder, loaded.source.parent, region, f"mask-{i}")
+            table["mask"][i] |= {"file": file, **_BARE_MESH}
     (folder / "task.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
 def rename_files(table: dict[str, Any], task: Task, name: Callable[[str, str], str]) -> None:
-    """Rename every file in the table of a task; `name` gets its present name and its role."""
+    """Rename every file in the table of a task; `name` maps its name and its role to the new name."""
     for key in ("weight", "mask"):
         for i, region in enumerate(getattr(task, key)):
             if isinstance(region, MapRegion | MeshRegion):
@@ -47,10 +49,9 @@ def rename_files(table: dict[str, Any], task: Task, name: Callable[[str, str], s
 
 
 def write_search(folder: Path, result: SearchResult) -> None:
-    """Write `search.csv`: for every scan plane of the grid the lowest J, and its axis.
+    """Write `search.csv`, the lowest J and its axis for every scan plane, and `axes.csv`, the lowest J of every axis.
 
-    And `axes.csv`: for every axis of the grid the lowest J of all scan planes. J is that of the search, on few nodes;
-    where it cannot win it is the bound from the mean density.
+    J is the coarse J of the search, or its bound from the mean density if that is above the best J.
     """
     header = "alpha_laser_deg,beta_laser_deg,J,alpha_rot_deg,beta_rot_deg"
     np.savetxt(folder / "search.csv", result.planes, delimiter=",", header=header, comments="", fmt="%.5g")
@@ -59,8 +60,8 @@ def write_search(folder: Path, result: SearchResult) -> None:
 
 
 def write_left_out(folder: Path, left_out: list[LeftOut]) -> None:
-    """Write `left_out.json`: what the task made unnecessary."""
-    entries = [{"what": x.what, "why": x.why, "saved": x.saved, "unit": x.unit} for x in left_out]
+    """Write `left_out.json`, the skipped work."""
+    entries = [asdict(each) for each in left_out]
     write_json(folder / "left_out.json", {"schema": "scanwright/left_out/1", "left_out": entries})
 
 
@@ -68,8 +69,8 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
     """Write `report.html` of a build folder from its files, and enter it into the manifest; `begin` as for the page.
 
     Raises:
-        TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.
-        BuildError: another file is gone, was edited, or is not as a build writes it.
+        TaskError: `angles.json` or `task.toml` is missing or invalid.
+        BuildError: another file is missing, was edited, or is invalid.
     """
     from scanwright.report.page import REPORT, report_html
 
@@ -82,14 +83,14 @@ def write_report(folder: Path, begin: Begin = in_turn) -> Path:
     return folder / REPORT
 
 
-def _bring(folder: Path, source: Path, prefix: str) -> str:
+def _copied(folder: Path, source: Path, prefix: str) -> str:
     name = f"{prefix}{source.suffix}"
     shutil.copyfile(source, folder / name)
     return name
 
 
-def _bring_robot(folder: Path, tasks: Path, region: MeshRegion, prefix: str) -> str:
-    """Write the robot of a URDF as one mesh, as its own meshes are elsewhere."""
+def _robot_mesh(folder: Path, tasks: Path, region: MeshRegion, prefix: str) -> str:
+    """Write the robot of a URDF as one mesh, since the meshes of a URDF are outside the folder; return its name."""
     import trimesh
 
     corners = load_triangles(tasks / region.file, posture=region.posture).reshape(-1, 3)

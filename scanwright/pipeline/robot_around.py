@@ -1,4 +1,4 @@
-"""The robot straight below and above the scanner: whether a scanner can hang there, and how high its deck is."""
+"""Distances from the scanner straight down and up to the robot."""
 
 from __future__ import annotations
 
@@ -15,12 +15,7 @@ from scanwright.design.task.shapes import GroundRegion, MaskRegion, MeshRegion
 
 @dataclass(frozen=True, slots=True)
 class RobotAround:
-    """Distances from the optical centre to the robot [m]; infinite where there is none.
-
-    Attributes:
-        below_m: straight down.
-        above_m: straight up.
-    """
+    """Distances from the optical centre straight down and straight up to the robot; infinite if it is not there."""
 
     below_m: float
     above_m: float

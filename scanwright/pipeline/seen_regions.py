@@ -25,7 +25,7 @@ SEEN: dict[str, tuple[str, Numbers]] = {
     "all": ("all, every direction", ()),
     "thing": ("thing:SIZE:DISTANCE, what it must not miss anywhere in the rest", (0.1, 3.0)),
 }
-"""Word of a region -> how to write it, and the defaults of its numbers."""
+"""Word of a region -> its form, and the defaults of its numbers."""
 _SIGNED = {"FROM", "TO", "HEADING"}  # these numbers can be negative
 
 
@@ -58,19 +58,19 @@ def require_positive(option: str, text: str, how: str, numbers: Sequence[float])
     word, *names = re.split(r"[:, ]", how)
     wrong = [name for name, number in zip(names, numbers, strict=False) if number < 0 and name not in _SIGNED]
     if wrong:
-        mended = [
+        valid = [
             f"{number if name in _SIGNED else abs(number):g}" for name, number in zip(names, numbers, strict=False)
         ]
-        raise TaskError(f"{option} = '{text}': {wrong[0]} is positive: {':'.join([word, *mended])} ({how})")
+        raise TaskError(f"{option} = '{text}': {wrong[0]} is positive: {':'.join([word, *valid])} ({how})")
 
 
 def known_regions() -> str:
-    """Return how to write each region."""
+    """Return the forms of all regions."""
     return "; ".join(how for how, _ in SEEN.values())
 
 
 def density_lines(things: Sequence[Numbers]) -> list[str]:
-    """Return lines of a task file: the ball has half the width of the smallest thing that must not be missed.
+    """Return lines of a task file that set the ball radius to half the width of the smallest thing to see.
 
     Raises:
         TaskError: a size or a distance is not above 0, or the thing is too small for a ball.

@@ -1,4 +1,4 @@
-"""The room about a scanner in square tiles, coloured by beam density in bands that double."""
+"""The room about a scanner in square tiles, coloured by beam density in bands with factors of two."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from scanwright.design.evaluation.coverage import UNSEEN
 from scanwright.report.colours import Bands, Colours, ramp
 from scanwright.report.room import Room
 
-AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # as three.js has them: a body has its own colour at pi
+AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # three.js: a body has its own colour at intensity pi
 ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.076, 0.90834, 0.01566], [0.0284, 0.13383, 0.83777]])
 ACES_OUT = np.array([[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]])
-TILES = 5_000  # about; of more, a browser without a graphics card draws less than ten pictures a second
-BLIND = (236, 236, 240)  # directions that no beam enters: a grey that is not in the scale
-OVERLAP = 1.06  # of the tiles, so that no seam shows
-INWARD = (  # w, x, y, z of what turns +z into the room, for the low and the high wall across each axis
+TILES = 5_000  # approximately; with more, a browser without a graphics card draws fewer than ten frames a second
+BLIND = (236, 236, 240)  # colour of blind directions: a grey that is not in the scale
+OVERLAP = 1.06  # of the tiles, to hide gaps
+INWARD = (  # quaternion w, x, y, z that turns +z into the room, for the low and the high wall across each axis
     (np.sqrt(0.5), 0, np.sqrt(0.5), 0),
     (np.sqrt(0.5), 0, -np.sqrt(0.5), 0),
     (np.sqrt(0.5), -np.sqrt(0.5), 0, 0),
@@ -32,13 +32,13 @@ INWARD = (  # w, x, y, z of what turns +z into the room, for the low and the hig
 
 @dataclass(frozen=True, slots=True)
 class RoomTiles:
-    """Square tiles of one size on floor, walls and ceiling, whose front looks into the room.
+    """Square tiles of one size on floor, walls and ceiling, with the front towards the room.
 
     Attributes:
-        middles_m: of the tiles, from the optical centre, shape (n, 3).
-        corners_m: of one about its middle, front to +z, shape (4, 3).
-        faces: its triangles, shape (2, 3).
-        wxyz: what turns +z to the room, shape (n, 4).
+        middles_m: centres of the tiles relative to the optical centre.
+        corners_m: corners of a tile relative to its centre, front to +z.
+        faces: triangles of a tile.
+        wxyz: quaternion of each tile, which turns +z into the room.
     """
 
     middles_m: Float[ndarray, "n 3"]
@@ -53,7 +53,7 @@ class RoomTiles:
     @property
     def normals(self) -> Float[ndarray, "n 3"]:
         """Unit vectors from the tiles into the room."""
-        w, x, y, _ = self.wxyz.T  # nothing turns about z
+        w, x, y, _ = self.wxyz.T  # no rotation about z
         return np.stack([2 * w * y, -2 * w * x, 1 - 2 * x**2 - 2 * y**2], axis=1)
 
     @property
@@ -63,23 +63,22 @@ class RoomTiles:
 
 
 def density_colours(density: Float[ndarray, " n"], bands: Bands) -> Colours:
-    """Return the colours of mean densities, shape (n, 3); pale if no beam comes."""
+    """Return the colours of mean densities, shape (n, 3); `BLIND` for 0."""
     return np.where(density[:, None] > UNSEEN, ramp(bands(density)), np.array(BLIND, np.uint8))
 
 
 def lit(scene: viser.SceneApi) -> None:
-    """Light a scene so that `unlit` holds."""
+    """Set the lights of a scene that `unlit` assumes."""
     scene.configure_default_lights(enabled=False, cast_shadow=False)
-    scene.configure_environment_map(None)  # the browser shows a pale picture until it has one
+    scene.configure_environment_map(None)  # the browser shows a pale picture until it is loaded
     scene.add_light_ambient("/light/all", intensity=AMBIENT)
     scene.add_light_directional("/light/above", intensity=LAMP, position=LAMP_M, cast_shadow=False)
 
 
 def unlit(colours: Colours, normals: Array) -> Colours:
-    """Return colours of tiles that look alike wherever they face, and as in the key beside them.
+    """Return colours of tiles that appear as in the colour key, whatever their orientation.
 
-    The page lights them in linear light, more where the lamp shines, and maps tones as three.js' ACESFilmicToneMapping
-    does; this is the inverse of both.
+    This is the inverse of the lighting of the page and of the tone mapping of three.js (ACESFilmicToneMapping).
     """
     c = colours / 255.0
     shown = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ np.linalg.inv(ACES_OUT).T
@@ -91,7 +90,7 @@ def unlit(colours: Colours, normals: Array) -> Colours:
 
 
 def room_tiles(room: Room) -> RoomTiles:
-    """Return tiles on all walls; they end where a wall does, so those of the last row overlap the most."""
+    """Return tiles that cover all walls exactly; to fit, the rows overlap."""
     size = room.high - room.low
     area = 2 * (size[0] * size[1] + size[1] * size[2] + size[2] * size[0])
     side = float(np.sqrt(area / TILES))
@@ -110,6 +109,6 @@ def room_tiles(room: Room) -> RoomTiles:
 
 
 def _row(low: float, high: float, side: float) -> Array:
-    """Middles of tiles between two walls."""
+    """Return the centres of tiles between two walls."""
     count = max(1, int(np.ceil((high - low) / side)))
     return np.linspace(low + side / 2, high - side / 2, count) if high - low > side else np.array([(low + high) / 2])

@@ -1,15 +1,15 @@
-"""Access to a live page: by its address, from this computer, in small and known messages.
+"""Access checks of a live page.
 
-Every request is checked before it is answered, and every message before viser reads it. Refused are
+Every request is checked before it is answered, and every message before viser reads it. Rejected are
 
-- a request without the token, which the address carries once and a cookie (HttpOnly, SameSite=Strict) afterwards;
-- another Host than this computer's: a name that was bent to 127.0.0.1 (DNS rebinding);
-- another Origin than this page's, or one that the browser itself calls cross-site;
-- every path but `/` and every query but the token: there is one file and no other;
-- more than `MOST_VISITORS` at once; messages over `MOST_BYTES` (the library closes the connection);
-- messages that the page does not need: uploads, viser's sharing over the internet, and all that is malformed.
+- requests without the token, which is in the address and then in a cookie (HttpOnly, SameSite=Strict);
+- another Host than this computer's, such as a name that resolves to 127.0.0.1 (DNS rebinding);
+- another Origin than this page's, or requests that the browser marks as cross-site;
+- every path but `/` and every query but the token;
+- more than `MOST_VISITORS` connections; messages over `MOST_BYTES` (the library closes the connection);
+- messages that the page does not need: uploads, viser's sharing over the internet, and malformed ones.
 
-The page may load nothing from anywhere else: its Content-Security-Policy says so.
+The Content-Security-Policy of the page prevents it from loading anything from elsewhere.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from scanwright.design.errors import TaskError
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
 from scanwright.serving.remembered import recalled, remember
 
-MOST_BYTES = 1 << 18  # of one message: a page sends numbers and short words
-MOST_TEXT = 200  # characters of a text, entries of a list: more than our pages send
+MOST_BYTES = 1 << 18  # of one message
+MOST_TEXT = 200  # characters of a text, entries of a list
 PAGE_MESSAGES = (
     "ViewerCameraMessage",
     "GuiUpdateMessage",
@@ -59,7 +59,7 @@ ICON = (
     "rx='6' fill='%2300224e'/%3E%3Cpath d='M16 25 6 9a16 16 0 0 1 20 0z' fill='%23fee838'/%3E%3Ccircle cx='16' cy='25' "
     "r='3' fill='%23fff'/%3E%3C/svg%3E"
 )
-"""A fan of beams, for the tab of the browser."""
+"""Icon of the browser tab: a sector of beams."""
 
 ADDED_TO_PAGE = (
     "mended_page.css",
@@ -69,7 +69,7 @@ ADDED_TO_PAGE = (
     "state_banner.js",
     "setting_link.js",
 )
-"""A style and scripts that are put into the page before its own."""
+"""A style and scripts that are inserted into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
 
@@ -81,7 +81,7 @@ class Gate:
         title: of the page.
         token: of its address.
         port: on 127.0.0.1.
-        refused: what was turned away, reason -> how often.
+        refused: number of rejections by reason.
     """
 
     def __init__(self, port: int, title: str, *, recall: bool = False) -> None:
@@ -102,7 +102,7 @@ class Gate:
         return f"http://127.0.0.1:{self.port}/?token={self.token}"
 
     def objection(self, request: Request) -> str:
-        """Return why a request is refused; empty if it is not."""
+        """Return why a request is rejected; empty if it is accepted."""
         headers, parts = request.headers, urlsplit(request.path)
         origins = headers.get_all("Origin")
         talks = "websocket" in headers.get("Upgrade", "").lower() if len(headers.get_all("Upgrade")) < 2 else True
@@ -133,7 +133,7 @@ class Gate:
                 status = HTTPStatus.NOT_FOUND if missing else HTTPStatus.FORBIDDEN
                 return refusal(why, "open the address that scanwright printed", status)
             if "Accept-Encoding" in request.headers:
-                del request.headers["Accept-Encoding"]  # the page comes whole then, and its title can be put in
+                del request.headers["Accept-Encoding"]  # an uncompressed page, to insert the title
             response = answer(connection, request)
             if response is not None:
                 response.body = self._titled(bytes(response.body))
@@ -161,7 +161,7 @@ class Gate:
             msgspec.convert(message, type=kind)
         except (msgspec.MsgspecError, KeyError, TypeError, AttributeError, RecursionError, ValueError):
             return False
-        # viser writes whatever attribute of a control a message names: only its value is the page's to change
+        # viser would write any attribute of a control that a message names
         return fits and (kind is not KNOWN["GuiUpdateMessage"] or set(message["updates"]) == {"value"})
 
     def _headers(self) -> dict[str, str]:
@@ -181,7 +181,7 @@ class Gate:
 
 
 def _opened(port: int, recall: bool) -> tuple[socket, str]:
-    """Return a socket and a token: those of the last time if they are wanted and free."""
+    """Return a socket and a token; with `recall` those of the last run if the port is free."""
     last = recalled() if recall else None
     if last is not None and port in (0, last[0]):
         with suppress(TaskError):

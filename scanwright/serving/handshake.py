@@ -1,7 +1,7 @@
 """Checks of a browser's request before a server answers, and the socket that it listens on.
 
-A browser lets any page open a websocket to this computer. Two headers, which a page cannot choose, tell who asks: Host,
-which is another name if a name was bent to 127.0.0.1 (DNS rebinding), and Origin, the page that the script comes from.
+A browser lets any page open a websocket to this computer. Two headers, which a page cannot choose, identify the origin:
+Host, which differs if a name was made to resolve to 127.0.0.1 (DNS rebinding), and Origin, the page of the script.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from websockets.http11 import Response
 
 from scanwright.design.errors import TaskError
 
-MOST_VISITORS = 8  # more than the windows of one person
+MOST_VISITORS = 8  # connections at once
 
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9.:\[\]-]+")
 
@@ -27,9 +27,9 @@ def local_hosts(port: int) -> set[str]:
 
 
 def foreign(headers: Headers, hosts: Container[str], origins: Container[str]) -> str:
-    """Return "foreign host" or "foreign origin" if that is what a request comes by; else an empty string.
+    """Return "foreign host" or "foreign origin" for such a request, else an empty string.
 
-    A request without an Origin passes: no browser sends one.
+    A request without an Origin is accepted, since it does not come from a script of a page.
     """
     named = headers.get_all("Host")
     if len(named) != 1 or named[0] not in hosts:
@@ -38,7 +38,7 @@ def foreign(headers: Headers, hosts: Container[str], origins: Container[str]) ->
 
 
 def refusal(why: str, hint: str, status: HTTPStatus = HTTPStatus.FORBIDDEN) -> Response:
-    """Return the answer to a request that is refused."""
+    """Return the response to a rejected request."""
     text = f"refused: {why}; {hint}\n".encode()
     headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(text))})
     return Response(status.value, status.phrase, headers, text)
@@ -65,7 +65,7 @@ def as_origins(texts: Iterable[str] | None) -> tuple[str, ...]:
     """Return the origins that a person allows, as browsers send them.
 
     Raises:
-        TaskError: one is no origin of a single page; `null` is what any page can send.
+        TaskError: one is not the origin of a page; any page can send `null`.
     """
     origins = tuple(text.lower().removesuffix("/") for text in texts or ())
     for origin in origins:

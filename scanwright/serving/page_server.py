@@ -1,8 +1,8 @@
-"""The server of a live page: behind a gate, until its last visitor has left.
+"""The server of a live page, with access checks, until its last visitor has left.
 
-viser serves its page and its websocket from one asyncio server of the `websockets` library and knows no visitors. So
-that server is opened through here: on a socket that is bound to 127.0.0.1 before viser sees it, each connection behind
-the gate. One server and one port: no relay whose hidden port a page in the browser could find.
+viser serves its page and its websocket from one asyncio server of the `websockets` library without access checks. That
+server is opened here, on a socket that is bound to 127.0.0.1, with a `Gate` for each connection. There is no second
+port without checks, which a relay would have.
 """
 
 from __future__ import annotations
@@ -24,26 +24,23 @@ BRAND = (35, 77, 140)  # dark blue, readable under white text
 
 @contextmanager
 def guarded_server(title: str, port: int = 0, *, recall: bool = False) -> Iterator[tuple[viser.ViserServer, Gate]]:
-    """Run a viser server behind a gate while the body runs.
+    """Run a viser server behind a gate while the body runs, on a port of 127.0.0.1 (0 chooses a free one).
 
-    Args:
-        title: of the page.
-        port: of 127.0.0.1; 0 chooses a free one.
-        recall: whether to use port and token of the last time, so that links still work.
+    With `recall` it uses port and token of the last run, so that links still work.
 
     Raises:
         TaskError: the port is taken.
     """
     gate = Gate(port, title, recall=recall)
-    rich.get_console().quiet = True  # viser greets on standard output, with an address that lacks the token
-    # viser 1.1 takes a host and a port (`ViserServer`, `viser.infra.WebsockServer`), no socket and no check of its own
+    rich.get_console().quiet = True  # viser prints an address without the token
+    # viser 1.1 accepts a host and a port (`ViserServer`, `viser.infra.WebsockServer`), but no socket and no check
     opening = library.serve
     library.serve = _opening(gate, opening)  # type: ignore[assignment, misc]
     try:
         server = viser.ViserServer(host="127.0.0.1", port=gate.port, verbose=False)
     finally:
         library.serve = opening  # type: ignore[misc]
-    if not gate.opened:  # viser serves in another way than it did: never without the gate
+    if not gate.opened:  # another version of viser, which would serve without the checks
         server.stop()
         raise RuntimeError("viser did not open its server through websockets.asyncio.server.serve")
     server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND)
@@ -94,7 +91,7 @@ def _opening(gate: Gate, opening: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def wait_until_alone(gate: Gate, alone_s: float) -> None:
-    """Return when no page has been open for that long."""
+    """Return when no page has been open for `alone_s`."""
     seen_s = time.monotonic()
     while time.monotonic() - seen_s < alone_s:
         time.sleep(min(0.5, alone_s / 4))

@@ -1,4 +1,4 @@
-"""The port and the token of the studio that ran last, so that a link to a setting works after a restart."""
+"""The port and the token of the last studio, so that links work after a restart."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def recalled() -> tuple[int, str] | None:
 
 
 def remember(port: int, token: str) -> None:
-    """Write port and token, readable by this user only; a folder that cannot be written is no fault."""
+    """Write port and token, readable by this user only; do nothing if the folder cannot be written."""
     path = state_file()
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)

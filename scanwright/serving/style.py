@@ -11,10 +11,8 @@ from scanwright.report.colours import Bands
 def banner_html(kind: str, lines: Iterable[str], *, lost: Iterable[str] = ()) -> str:
     """Return the hidden element that `state_banner.js` shows as a banner over the page; no lines, no banner.
 
-    Args:
-        kind: of the state, for its colour: `running`, or an outcome of a scan.
-        lines: what the banner says; the first one is its heading.
-        lost: what it says instead if the connection to the program breaks.
+    `kind` is the state, for its colour: `running`, or an outcome of a scan. `lost` replaces the lines if the connection
+    to the program breaks.
     """
     words, without = (escape("\n".join(some)) for some in (lines, lost))
     return f'<div class="sw-state" hidden data-kind="{kind}" data-lost="{without}">{words}</div>'
@@ -28,7 +26,7 @@ def note_html(text: str, *, bad: bool = False) -> str:
 
 
 def key_html(bands: Bands, words: str) -> str:
-    """Return the colours of beam densities, with the fewest beams of each, and what they count."""
+    """Return the colour key of beam densities with the lower bounds of its bands; `words` explains the numbers."""
     cells = "".join(
         f'<span style="flex:1;text-align:center;border-top:9px solid {colour}">{word}</span>'
         for colour, word in bands.key()

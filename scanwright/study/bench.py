@@ -1,7 +1,4 @@
-"""One candidate with its parts: its best mount that can be built, and its columns.
-
-From its solids: what they hide, weigh, bear, bend and cost.
-"""
+"""One candidate with its parts: its best mount that can be built, and the columns of its row."""
 
 from __future__ import annotations
 
@@ -43,11 +40,11 @@ BENDS = "deflection"  # of linkage and shaft, by finite elements
 
 @dataclass(frozen=True, slots=True)
 class BuiltSetting:
-    """The parts of a mount in numbers.
+    """Figures of the parts of a mount.
 
     Attributes:
-        shadow: what they hide.
-        values: of those columns that they decide.
+        shadow: the beams that they block.
+        values: columns that depend on them.
         weakest: the load nearest to its rating.
     """
 
@@ -58,7 +55,7 @@ class BuiltSetting:
 
 @dataclass(frozen=True, slots=True)
 class PartsBench:
-    """A `Workshop` of one set of products: makes the parts of a mount once, and rejects it if a check fails."""
+    """A `Workshop` of one set of products that makes the parts of each mount once, and rejects failed checks."""
 
     scanner: Scanner
     _made: dict[tuple[float, ...], BuiltSetting | Refused] = field(default_factory=dict)
@@ -81,14 +78,10 @@ class PartsBench:
 
 
 def judge_candidate(loaded: LoadedTask, searched: Result) -> Result:
-    """Return the best mount of a candidate that can be built, with its columns.
-
-    Args:
-        loaded: the candidate's task.
-        searched: `search_candidate` of its search record.
+    """Return the best mount of a candidate that can be built, with its columns; `searched` is its `search_candidate`.
 
     Raises:
-        InstallError: the CAD kernel is not there.
+        InstallError: the CAD kernel is not installed.
     """
     require_kernel("study")
     families = tuple(_family(entry) for entry in searched["families"])
@@ -138,7 +131,7 @@ def _family(entry: dict[str, Any]) -> Family:
 
 
 def _shortest(problem: Problem, loaded: LoadedTask, family: Family) -> float | None:
-    """Return the column of `COLUMNS`; None if even the row's own period is too short."""
+    """Return the column `shortest_period_s`; None if even the period of the row is too short."""
     least = int(np.ceil(loaded.task.limits.min_density or 1))
     if loaded.task.motion.mode != "spin" or family.score.least < least:
         return None

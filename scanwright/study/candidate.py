@@ -1,6 +1,6 @@
 """One candidate before its parts: its record, the search of its angles, and bounds of its columns.
 
-What a search finds does not depend on servo, slip ring and printer, so candidates that differ in these share one.
+A search does not depend on servo, slip ring and printer, so candidates that differ only in these share one.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from scanwright.design.task.task import LoadedTask, Task
 from scanwright.study.front import six_digits
 from scanwright.study.results import Result, address
 
-ANYBODY = "candidate"  # the name of a task changes nothing
-BOUNDED = ("log", "required", "worst")  # objectives that fewer beams can only make worse
+ANYBODY = "candidate"  # replaces the name of a task, which has no effect on results
+BOUNDED = ("log", "required", "worst")  # objectives that never improve with fewer beams
 PARTS_DECIDE = {"load_margin": np.inf, "hidden_fraction": 0.0, "deflection_deg": 0.0}
 
 Bought = Lidar | Servo | SlipRing | Bearing | Belt

@@ -28,12 +28,12 @@ class Combination:
     """One candidate before any work.
 
     Attributes:
-        number: its place in the study.
+        number: its index in the study.
         name: of the task record, and of its build folder.
-        group: the number of its task: only candidates of one task compete.
-        choice: the value chosen on each axis, empty if the task decides.
-        loaded: the task, None if it is refused.
-        refused: why these products can never do this task.
+        group: index of its task: only candidates of one task compete.
+        choice: the value on each axis; empty for that of the task.
+        loaded: the task; None if it is rejected.
+        refused: why these products cannot do this task.
     """
 
     number: int
@@ -46,7 +46,7 @@ class Combination:
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """The product of the axes of a study, the last one changing fastest."""
+    """The product of the axes of a study; the last axis changes fastest."""
 
     loaded: LoadedStudy
 
@@ -84,9 +84,9 @@ class Crossing:
         try:
             task = _merged(base.task, chosen, name, self._own_files())
             products = Catalogue(base.products.products | self._own_products())
-            doubts = [str(fault) for fault in motion_faults(task.product_names(), task.motion, products)]
-            doubts = doubts or replace(base, task=task, products=products).unread_angles()
-            refused = doubts[0] if doubts else ""
+            faults = [str(fault) for fault in motion_faults(task.product_names(), task.motion, products)]
+            faults = faults or replace(base, task=task, products=products).unread_angles()
+            refused = faults[0] if faults else ""
         except ValidationError as error:
             refused = format_validation_error(error, name, Task).splitlines()[0]
         except TaskError as error:
@@ -113,7 +113,7 @@ def _merged(task: Task, chosen: dict[str, Any], name: str, catalogue: tuple[str,
     for axis in ("sensor", "servo", "slip_ring", "printer"):
         if chosen[axis] is not None:
             table[axis] = chosen[axis]
-    if table.get("slip_ring") == NO_RING or task.motion.mode == "sweep":  # a ring would lie in a drawer
+    if table.get("slip_ring") == NO_RING or task.motion.mode == "sweep":  # a sweep needs no ring
         table.pop("slip_ring", None)
     mounting: Mounting | None = chosen["mounting"]
     if mounting is not None:

@@ -14,7 +14,7 @@ from scanwright.design.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One number of a row; `better` is the end that wins."""
+    """One number of a row; `better` is the better direction."""
 
     name: str
     better: Literal["low", "high"]
@@ -65,7 +65,7 @@ class Front:
 
     Attributes:
         costs: lower is better, shape (rows, columns).
-        numbers: what each row is called, shape (rows,).
+        numbers: identifier of each row, shape (rows,).
     """
 
     columns: int

@@ -9,27 +9,20 @@ from typing import Any
 
 from scanwright.study.front import COLUMNS
 
-DPI = 110  # readable at its own size on a screen
-MOST = 20_000  # rows that a picture shows; more are a blot
-NAMED = 12  # members of a front that get their name
+DPI = 110  # readable on a screen at 100 %
+MOST = 20_000  # rows that a picture shows
+NAMED = 12  # members of a front that are labelled
 
 
 def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -> int:
-    """Draw the first column of the front against each other one; returns the number of rows not drawn.
-
-    Args:
-        path: PNG to write; an SVG of the same name is written too.
-        table: CSV to read.
-        title: above the picture.
-        front: columns of the front.
-    """
+    """Draw the first column of the front against each other one from a CSV; return the number of rows not drawn."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     from scanwright.design.files.picture_files import save_picture
 
     by_task: dict[str, list[dict[str, str]]] = {}
-    shown = left = 0
+    shown = omitted = 0
     with table.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             rows = by_task.setdefault(row["task"], [])
@@ -38,7 +31,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
                 if shown <= MOST or row["status"] == "front":
                     rows.append(row)
                 else:
-                    left += 1
+                    omitted += 1
     others = front[1:] or ("period_s",)
     figure = Figure(figsize=(5.2 * len(others), 3.9 * max(1, len(by_task))), layout="constrained", dpi=DPI)
     FigureCanvasAgg(figure)
@@ -49,7 +42,7 @@ def front_picture(path: Path, table: Path, title: str, front: tuple[str, ...]) -
             ax.set_title(task, fontsize=10)
     figure.suptitle(title, fontsize=11)
     save_picture(figure, path, DPI)
-    return left
+    return omitted
 
 
 def _panel(ax: Any, rows: list[dict[str, str]], across: str, up: str) -> None:

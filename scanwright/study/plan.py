@@ -18,11 +18,7 @@ COSTS = Path(__file__).parent / "costs.csv"
 def plan_study(study: Path, out: Path | None, results: Path | None, progress: Progress) -> list[str]:
     """Return the size and the remaining cost of a study as lines; computes and writes nothing.
 
-    Args:
-        study: file, or name of a shipped study.
-        out: folder of tables and winners; by default out/STUDY.
-        results: folder of results; by default OUT/results. It may not even exist.
-        progress: progress callback.
+    Arguments as for `scanwright.study.run.run_study`; the folder of results need not exist.
 
     Raises:
         TaskError: the study is malformed.

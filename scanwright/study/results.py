@@ -1,7 +1,7 @@
 """The results folder: one file per result, named by the digest of its record and of the program.
 
-So none is ever computed twice. It may be shared: then workers read and write it themselves, and what they finish stays
-even if everybody else dies.
+So no result is computed twice. If the folder is shared, workers read and write it themselves, and finished results stay
+even if the client ends.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Result = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """A results folder, and the mark by which a worker recognises it."""
+    """A results folder, and the mark with which a worker verifies that it has the same folder."""
 
     folder: Path
     mark: str
@@ -35,7 +35,7 @@ class Results:
         """Return a result; None if there is none."""
         try:
             result: Result = json.loads(self._path(address).read_text(encoding="utf-8"))
-        except (FileNotFoundError, json.JSONDecodeError):  # a file system may have lost its end
+        except (FileNotFoundError, json.JSONDecodeError):  # a file system can lose the end of a file
             return None
         return result
 

@@ -1,8 +1,8 @@
-"""A run of a study: search, bound, make the candidates that no bound excludes, and report each one's status.
+"""A run of a study: search, bound, make the candidates that no bound excludes, and report the status of each.
 
-The answer does not depend on who finished first. A candidate is left out if its bound is beaten by a finished one;
-what beats it is itself on the final front, or beaten by one that is. So a candidate counts as `dominated` where the
-final front beats its bound, also if it happened to be made before that was known, and every other one has been made.
+The result does not depend on the order in which candidates finish. A candidate is skipped if a finished one beats its
+bound; that one is on the final front, or is beaten by one that is. So a candidate has the status `dominated` if the
+final front beats its bound, even if it was made earlier, and all others have been made.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from scanwright.study.table import Row, write_answer
 from scanwright.study.units import Crew, Finished, Unit, finished
 from scanwright.study.workers import crew_of
 
-_REPORTED_S = 1.0  # a person reads no faster
+_REPORTED_S = 1.0  # between two progress reports
 
 
 def run_study(
@@ -47,17 +47,13 @@ def run_study(
 ) -> Iterator[str]:
     """Run the rest of a study, write its tables, and build its winners; yields the results as lines.
 
-    Args:
-        study: file, or name of a shipped study.
-        out: folder of tables and winners; by default out/STUDY.
-        results: folder of results, shared with the workers or not; by default OUT/results.
-        scheduler: address of a running Dask scheduler; None for processes of this computer.
-        processes: of this computer; by default one for each core.
-        progress: progress callback.
+    `study` is a file, or the name of a shipped study; `out` the folder of tables and winners, by default out/STUDY;
+    `results` the folder of results, by default OUT/results; `scheduler` the address of a running Dask scheduler, by
+    default `processes` of this computer, one for each core.
 
     Raises:
-        InstallError: the CAD kernel, or Dask for a scheduler, is not there.
-        TaskError: the study is malformed, or the scheduler is not there.
+        InstallError: the CAD kernel, or Dask for a scheduler, is not installed.
+        TaskError: the study is malformed, or the scheduler does not answer.
         BuildError: a folder cannot be written, or no worker is left.
     """
     require_kernel("study")
@@ -105,11 +101,11 @@ class StudyRun:
 
     Attributes:
         crossing: its candidates.
-        results: so far.
-        judge: what makes a candidate.
-        search: what searches one.
-        tally: of this run.
-        fronts: of each task.
+        results: results folder.
+        judge: makes and evaluates a candidate.
+        search: searches the angles of a candidate.
+        tally: work of this run.
+        fronts: front of each task.
     """
 
     crossing: Crossing
@@ -278,7 +274,7 @@ class _Watch:
             self.report()
 
     def report(self, width: int | None = None) -> None:
-        """Report how many are over; also that no worker is there, if the width of the crew is known to be 0."""
+        """Report the number of finished units, and that there is no worker if the width of the crew is 0."""
         self.reported_s = time.monotonic()
         waiting = "; waiting for a worker: none is there" if width == 0 else ""
         share = self.over / self.total if self.total else 1.0

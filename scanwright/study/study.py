@@ -1,6 +1,6 @@
 """The study file: tasks and products to combine, and columns to trade off.
 
-Every list multiplies the candidates; one that is left out leaves each task as it is.
+Every list multiplies the candidates; without a list each task keeps its own value.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Period = Annotated[float, Field(strict=True, ge=SHORTEST_S, le=LONGEST_S)] | Lit
 
 
 class Mounting(Record):
-    """A way to mount the scanner: keys of `[angles]` and `[limits]` that replace those of a task."""
+    """Restriction of the mount: keys of `[angles]` and `[limits]` that replace those of a task."""
 
     name: str = Field(pattern=NAME)
     angles: AngleRanges = AngleRanges()

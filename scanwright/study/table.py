@@ -19,7 +19,7 @@ from scanwright.study.front_picture import front_picture
 from scanwright.study.study import Study
 
 Row = dict[str, Any]
-"""One candidate: see `FIELDS`; what it has no value for is left out."""
+"""Values of one candidate by the names of `FIELDS`; unknown values are missing."""
 
 NUMBERS = (*(f"{name}_deg" for name in NAMES), *COLUMNS, "J_error")
 FIELDS = ("name", *AXES, "status", "reason", *NUMBERS, "weakest")
@@ -30,8 +30,8 @@ STATUSES = {
     "refused": "cannot be built",
     "failed": "could not be finished",
 }
-GROUP = 10_000  # rows of a Parquet group, which is what is held in memory
-MOST_REASONS = 5  # lines that a person reads; the table has all
+GROUP = 10_000  # rows of a Parquet group, which are in memory at once
+MOST_REASONS = 5  # reasons in the summary
 
 
 def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
@@ -58,14 +58,14 @@ def write_answer(study: Study, rows: Iterable[Row], folder: Path) -> list[str]:
     statuses = write_tables(folder, noted())
     candidates = f"{statuses.total():,} candidates"
     title = f"{study.name}: {statuses['front']:,} of {candidates} on the front of their task"
-    left = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
+    omitted = front_picture(place_in(folder, "front.png", BuildError), folder / "study.csv", title, study.front)
     shares = [f"{statuses[status]:,} {status} ({means})" for status, means in STATUSES.items() if statuses[status]]
     lines = [*_front_lines(front, study.front), f"{candidates}: {', '.join(shares)}"]
     lines += [f"{status} {count:,}: {reason}" for (status, reason), count in reasons.most_common(MOST_REASONS)]
     if len(reasons) > MOST_REASONS:
         lines.append(f"{len(reasons) - MOST_REASONS} more reasons in the table")
-    if left:
-        lines.append(f"front.png leaves out {left:,} rows that are not on a front: too many to see")
+    if omitted:
+        lines.append(f"front.png leaves out {omitted:,} rows that are not on a front: too many to see")
     return lines
 
 
@@ -91,7 +91,7 @@ def write_tables(folder: Path, rows: Iterable[Row]) -> Counter[str]:
 
 @contextmanager
 def _parquet(path: Path) -> Iterator[Callable[[list[Row]], None]]:
-    """Yield a function that adds rows to a table; without pyarrow it adds none, and an older table is removed."""
+    """Yield a function that adds rows to a table; without pyarrow it does nothing, and an older table is removed."""
     try:
         import pyarrow as pa
         import pyarrow.parquet as pq

@@ -1,7 +1,7 @@
 """Units of work over an executor, a window at a time, so that the client's memory stays small.
 
-A unit is looked up, else computed under a time limit, and stored at once by the worker that has it. One that fails or
-whose worker dies is tried again, `TRIES` times in all, and then reported as failed.
+A unit is looked up, or else computed under a time limit and stored by its worker. If it fails or its worker dies, it is
+tried again, `TRIES` times in all, and then reported as failed.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ try:
 except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
-TRIES = 3  # one for a worker killed by chance, one more for a second one
-TICK_S = 5.0  # between two words on a long silence
-DEATHS = ("BrokenProcessPool", "KilledWorker")  # by name: Dask need not be there
+TRIES = 3  # of a unit, since workers can be killed by chance
+TICK_S = 5.0  # between two calls of `tick` while no unit finishes
+DEATHS = ("BrokenProcessPool", "KilledWorker")  # by name, since Dask need not be installed
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +40,12 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The answer of a worker.
+    """The result of a worker.
 
     Attributes:
         result: of the unit.
-        seconds: it took, None if the result existed.
-        memory_mb: the most that the worker has ever had; 0 if the system does not tell.
+        seconds: computing time; None if the result existed.
+        memory_mb: peak memory of the worker; 0 if unknown.
         stored: whether the result is in the results folder.
     """
 
@@ -66,11 +66,9 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Crew:
-    """An executor and its width.
+    """An executor, and a function that returns the number of units that can run now.
 
-    Attributes:
-        executor: takes the units.
-        width: how many of them can be at work now; raises BuildError if none will come.
+    The function raises BuildError if there will be no worker.
     """
 
     executor: Executor
@@ -84,16 +82,10 @@ def finished(
     limit_s: float,
     tick: Callable[[int], None] = lambda _: None,
 ) -> Iterator[Finished]:
-    """Do units, and yield them in the order in which they finish.
+    """Do units, and yield them in the order in which they finish; those in the results folder are looked up.
 
-    The next unit is taken from `units` only when a worker is free, so it can depend on finished results.
-
-    Args:
-        crew: who does them.
-        units: what to do; those in the results folder are looked up and not sent.
-        results: where results are stored.
-        limit_s: that a unit may take.
-        tick: called in a long silence with the width of the crew.
+    The next unit is taken from `units` only when a worker is free, so it can depend on finished results. `tick` is
+    called with the width of the crew while no unit finishes.
 
     Raises:
         BuildError: no worker is left, or the results of one would differ.
@@ -120,7 +112,7 @@ def finished(
             unit, tries = at_work.pop(future)
             try:
                 done = future.result()
-            except (ScanwrightError, CancelledError):  # not the unit's fault: what it refuses is a result
+            except (ScanwrightError, CancelledError):  # not a fault of the unit, which returns rejections as results
                 raise
             except ImportError as error:
                 raise BuildError(f"a worker lacks a package ({error}): install the same scanwright there") from error
@@ -136,16 +128,12 @@ def finished(
 
 
 def do(unit: Unit, results: Results, client: dict[str, str], limit_s: float) -> Done:
-    """Do a unit, as a worker.
+    """Do a unit, as a worker, with the results folder of the client if this worker has access to it.
 
-    Args:
-        unit: what to do.
-        results: folder of the client; used if this worker sees it.
-        client: `program` of the client.
-        limit_s: after which the worker ends itself.
+    `client` is the `program` of the client; the process ends after `limit_s`.
 
     Raises:
-        BuildError: this worker's program is another one.
+        BuildError: the program of this worker differs.
     """
     own = program()
     differs = sorted(name for name in own.keys() | client.keys() if own.get(name) != client.get(name))
@@ -168,15 +156,15 @@ def do(unit: Unit, results: Results, client: dict[str, str], limit_s: float) -> 
     return Done(result, time.monotonic() - start, _memory_mb(), here)
 
 
-_deadlines: dict[int, float] = {}  # of the threads of this process, which has but one alarm
+_deadlines: dict[int, float] = {}  # of the threads of this process, which has only one alarm
 _lock = threading.Lock()
 
 
 @contextmanager
 def _limited(limit_s: float) -> Iterator[None]:
-    """End the process if the block takes longer, by an alarm of the system.
+    """End the process by an alarm of the system if the block takes longer.
 
-    A process without a parent is the client itself, or a worker that would not be started again: none there.
+    There is no limit in a process without a parent: the client, or a worker that would not be restarted.
     """
     if multiprocessing.parent_process() is None:
         yield
@@ -204,7 +192,7 @@ def _memory_mb() -> float:
 
 
 def _reason(error: Exception, limit_s: float) -> str:
-    """Return why a unit has no result, in words that do not depend on the worker."""
+    """Return why a unit has no result, in a text that does not depend on the worker."""
     if type(error).__name__ in DEATHS:
         return f"every worker that tried died: killed, out of memory, or longer than time_limit_s = {limit_s:g}"
     lines = str(error).splitlines()

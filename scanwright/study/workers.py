@@ -22,31 +22,24 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 ADDRESS = re.compile(r"(tcp|tls|wss?)://[^\s/]+:\d{1,5}")
-CONNECT_S = 10.0  # for a scheduler of the network to answer
-ALONE_S = 60.0  # without any worker: a nanny whose worker dies while it starts gives up
-LOOK_S = 5.0  # between two looks at who is there
+CONNECT_S = 10.0  # for a scheduler to answer
+ALONE_S = 60.0  # without any worker, before the run ends
+COUNT_S = 5.0  # between two counts of the workers
 
 
 def crew_of(scheduler: str | None, processes: int | None = None) -> AbstractContextManager[Crew]:
-    """Return the crew of a running scheduler, or of processes that end with the block.
-
-    Args:
-        scheduler: address such as tcp://HOST:PORT; None for this computer.
-        processes: of this computer; by default one for each core.
+    """Return the crew of a scheduler at tcp://HOST:PORT, or of processes, one for each core by default.
 
     Raises:
         InstallError: Dask is not installed.
-        TaskError: the scheduler is not there, or no scheduler at all can be.
-        BuildError: while it works: the scheduler is gone, or no worker has been there for a minute.
+        TaskError: the scheduler does not answer, or its address is invalid.
+        BuildError: during the work: the scheduler has stopped, or there was no worker for a minute.
     """
-    return _here(processes or cores()) if scheduler is None else _at_scheduler(scheduler)
+    return _local_crew(processes or cores()) if scheduler is None else _scheduler_crew(scheduler)
 
 
 class SingleProcesses(Executor):
-    """Processes, each in a separate pool, so that one that dies does not stop the others.
-
-    In one pool the death of a worker ends all the others, and the unit that killed it is unknown.
-    """
+    """Processes in separate pools: in one pool the death of a worker would end all others, with an unknown culprit."""
 
     def __init__(self, processes: int) -> None:
         self._pools = [spawn_pool() for _ in range(processes)]
@@ -73,19 +66,19 @@ class SingleProcesses(Executor):
 
 
 @contextmanager
-def _here(processes: int) -> Iterator[Crew]:
+def _local_crew(processes: int) -> Iterator[Crew]:
     with one_thread_each(), SingleProcesses(processes) as executor:
         yield Crew(executor, lambda: processes)
 
 
 @contextmanager
-def _at_scheduler(address: str) -> Iterator[Crew]:
+def _scheduler_crew(address: str) -> Iterator[Crew]:
     require("cluster", "a scheduler needs Dask", "dask", "distributed")
     from distributed import Client
 
     if not ADDRESS.fullmatch(address):
         raise TaskError(f"scheduler = '{address}': must be tcp://HOST:PORT, such as tcp://127.0.0.1:8786")
-    for name in ("distributed", "distributed.client"):  # deaths are in the table, or in one line
+    for name in ("distributed", "distributed.client"):  # deaths of workers are in the table
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)
@@ -97,9 +90,9 @@ def _at_scheduler(address: str) -> Iterator[Crew]:
         ) from error
     with client:
         try:
-            # pure: the same unit asked for again would get the future of its failure
+            # not pure: a repeated unit would get the future of its failure
             yield Crew(client.get_executor(pure=False), _Threads(client, address))
-        except Exception as error:  # whatever the transport raises, and futures that it has cancelled
+        except Exception as error:  # errors of the transport, and futures that it has cancelled
             if client.status == "running":
                 raise
             raise BuildError(f"the scheduler at {address} has stopped: run the study again, it continues") from error
@@ -110,13 +103,13 @@ class _Threads:
 
     def __init__(self, client: Client, address: str) -> None:
         self._client, self._address = client, address
-        self._looked = self._seen = time.monotonic()
+        self._counted = self._present = time.monotonic()
         self._number = self._now()
 
     def __call__(self) -> int:
-        if time.monotonic() - self._looked > (LOOK_S if self._number else 0.1):
+        if time.monotonic() - self._counted > (COUNT_S if self._number else 0.1):
             self._number = self._now()
-        if self._seen < self._looked - ALONE_S:
+        if self._present < self._counted - ALONE_S:
             raise BuildError(
                 f"no worker has been there for {ALONE_S:g} s: start `dask worker {self._address} --nthreads 1`, "
                 "and run the study again: it continues"
@@ -125,6 +118,6 @@ class _Threads:
 
     def _now(self) -> int:
         number = sum(self._client.nthreads().values())
-        self._looked = time.monotonic()
-        self._seen = self._looked if number else self._seen
+        self._counted = time.monotonic()
+        self._present = self._counted if number else self._present
         return number

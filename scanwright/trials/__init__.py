@@ -1,1 +1,1 @@
-"""Error against run time of the choices that are not J: meshes, the emulated servo, the axis angle."""
+"""Error against run time of numerical choices other than J: meshes, the emulated servo, the axis angle."""

@@ -17,8 +17,8 @@ from scanwright.firmware_io.emulators.servo_plant import Actuation, Load, Plant
 
 METHODS: tuple[Literal["LSODA", "Radau", "BDF"], ...] = ("LSODA", "Radau", "BDF")
 TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8  # relative, of the integrator
-REFERENCE = Solver("Radau", 1e-11)  # three digits better than the best one tried, by another method than the default
-SECONDS = 2.0  # of motion: spun up from rest with a head that hangs to one side, through the backlash
+REFERENCE = Solver("Radau", 1e-11)  # three digits better than the best trial, by another method than the default
+SECONDS = 2.0  # of motion: from rest with an unbalanced head, through the backlash
 RATE_RAD_S = math.pi
 HEAD = Load(gravity_nm=0.2)  # of a lidar on a tilted axis
 

@@ -1,8 +1,8 @@
-"""Stiff and extreme cases of the emulated servo and of de-skewing, whose results are known.
+"""Stiff and extreme cases of the emulated servo and of de-skewing with known results.
 
-The servo: whatever it carries, however its teeth and loops are, it ends at the speed at which its torque is that of
-friction, or at the one that its loop holds; what is stalled is held where the two springs balance. Ranges: a point is
-as far from the optical centre as its beam was long, from a millimetre to ten kilometres.
+The servo, with any load, stiffness and loop gains, ends at the speed at which its torque equals friction, or at the
+goal of its loop; a stalled one at the angle at which the springs of brake and gear balance. A point has the distance of
+its range from the optical centre, from a millimetre to ten kilometres.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from scanwright.firmware_io.samples import JointLog, Scan
 SETTLED = 25.0  # time constants of rotor and load
 GOAL_RAD_S = 1.0  # a turn in 6.3 s
 RINGS_S, RK_STEPS = 0.05, 25_000  # time of the reference, in steps of 2 us
-BRAKE = 50.0  # stall torques a radian: the spring that holds a blocked horn
+BRAKE = 50.0  # stiffness of the brake of a blocked horn, in stall torques per radian
 SIZES = 1e-3, 1.0, 1e3, 1e4  # metres of a beam, and scales of a room
 ROTORS_KG_M2 = {"next to nothing": 1e-8, "a screw": 1e-6, "a lidar": 5e-4, "a machine": 0.5, "a car": 50.0}
 
@@ -46,7 +46,7 @@ def servo_rows(plant: Plant) -> Iterator[StressRow]:
         loop = replace(plant, velocity_p=factor * plant.velocity_p, velocity_i=factor * plant.velocity_i)
         end = _end(loop, Load(), Actuation("velocity", GOAL_RAD_S))
         yield row(f"servo's loop, gains {factor:g} times as high", "speed held", GOAL_RAD_S, end.rate_rad_s, 1e-3)
-    for factor in (10.0, 100.0):  # it rings, and hits its teeth on both sides: no law, but another integrator
+    for factor in (10.0, 100.0):  # oscillates against both flanks: compared with another integrator
         yield _ringing(f"servo's loop, gains {factor:g} times as high: it rings", plant, factor)
     for name, inertia in ROTORS_KG_M2.items():
         yield _stalled(f"servo stalled at full duty with {name}", plant, Load(inertia))
@@ -102,7 +102,7 @@ def _ringing(case: str, plant: Plant, factor: float) -> StressRow:
     axis = HornMotion(loop, Load(), 0)
     axis.drive(0, drive)
     rhs, t, h = equations(loop, Load(), drive, 0.0, 0.0, 0.0), 0.0, RINGS_S / RK_STEPS
-    y = np.array([0, 0, 0, 0, GOAL_RAD_S / plant.no_load_rad_s, 0])  # the integral begins at what the speed will need
+    y = np.array([0, 0, 0, 0, GOAL_RAD_S / plant.no_load_rad_s, 0])  # the integral begins at its final value
     for _ in range(RK_STEPS):
         a = np.array(rhs(t, y))
         b = np.array(rhs(t + h / 2, y + h / 2 * a))

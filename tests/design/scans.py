@@ -3,7 +3,7 @@
 import numpy as np
 
 from scanwright.design.density.beams import scan_at
-from scanwright.design.density.phase_walk import half_width, halves
+from scanwright.design.density.phase_walk import half_angles, half_width
 
 
 def simulated_scan(bearings_rad, lines, angles_rad, start_phase_rad=0.0):
@@ -13,7 +13,9 @@ def simulated_scan(bearings_rad, lines, angles_rad, start_phase_rad=0.0):
 
 def count_at(polar_rad, azimuth_rad, beam_polar_rad, beam_azimuth_rad, lines, ball_rad):
     """Beams within the ball about one direction of the rotation frame, first line at azimuth 0."""
-    half = np.array([half_width(*halves(polar_rad), *halves(b), *halves(ball_rad)) for b in beam_polar_rad])
+    half = np.array(
+        [half_width(*half_angles(polar_rad), *half_angles(b), *half_angles(ball_rad)) for b in beam_polar_rad]
+    )
     seen = half >= 0
     first = (azimuth_rad - beam_azimuth_rad[seen] - half[seen]) % (2 * np.pi)
     last = first + 2 * half[seen]

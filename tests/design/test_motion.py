@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from scanwright.design.density.beams import beam_directions_rot, scan_at
 from scanwright.design.density.spin import ball_search
-from scanwright.design.density.sweep import SweepLines, mean_count_swept, zones_swept
+from scanwright.design.density.sweep import SweepLines, mean_count_swept, phase_statistics_swept
 from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import empty_cap, gaps
 from scanwright.design.frames import R_world_rot
@@ -92,7 +92,7 @@ def test_a_sweep_counts_what_simulated_scans_hold(limits, period):
     counts = counts_over_phases(lines, setting, directions, ball, phases)
     in_rot = directions @ R_world_rot(*setting[:2])
     beams = beam_directions_rot(FAN, *setting[2:])
-    z = zones_swept(in_rot, beams, lines, ball, log_density)
+    z = phase_statistics_swept(in_rot, beams, lines, ball, log_density)
     # each of the windows that a direction has moves the mean by less than one phase
     np.testing.assert_allclose(z.mean, counts.mean(axis=0), atol=0.25)
     np.testing.assert_allclose(z.mean_g, log_density(counts).mean(axis=0), atol=0.02)

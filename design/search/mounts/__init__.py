@@ -1,1 +1,1 @@
-"""Simple mounts: the four references, the gain of an answer over them, and the search's preference for them."""
+"""Simple mounts: the four references, the gain of a result over them, and the search's preference for them."""

@@ -1,4 +1,4 @@
-"""What an answer is worth against the reference mounts, the best of them first."""
+"""Gain of a mount over the reference mounts."""
 
 from __future__ import annotations
 
@@ -14,20 +14,19 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.objective.stated_error import error_words
 from scanwright.design.search.mounts.reference import TunedMount, angles_used
 
-AS_GOOD = 1.02  # a factor up to this is not worth a mount that is harder to build
+AS_GOOD = 1.02  # factors up to this do not justify a mount that is harder to build
 
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """An answer against one reference mount, which is without parts.
+    """Gain over one reference mount without parts.
 
     Attributes:
         mount: the reference mount.
-        factor: beams per direction of the answer over those of the mount, in the geometric mean; None if J is no
-            logarithm.
-        J_less: J of the mount less J of the answer: what the answer gains.
-        same: whether the answer is this mount.
-        simpler: whether the mount has fewer angles that are not 0 than the answer.
+        factor: ratio of the beams per direction (geometric mean) to those of the mount; None for objectives but `log`.
+        J_less: J of the mount minus J of the result.
+        same: whether the result is this mount.
+        simpler: whether the mount has fewer angles other than 0 than the result.
     """
 
     mount: TunedMount
@@ -38,18 +37,18 @@ class Gain:
 
     @property
     def value(self) -> str:
-        """The gain in words: a factor, or a difference of J."""
+        """The gain as text: a factor, or a difference of J."""
         return f"{self.J_less:+.4f} in J" if self.factor is None else f"{self.factor:.2f} x"
 
     @property
     def flaws(self) -> str:
-        """What the mount does not do that the task may ask for; nothing if there is nothing."""
+        """Limits that the mount breaks and its blind share, as text; empty if there are none."""
         flaws = [] if self.mount.keeps_limits else ["breaks the limits"]
         blind = self.mount.score.blind_weight
         return ", ".join(flaws + ([f"blind to {percent(blind)} of the weight"] if blind > NO_BLIND_WEIGHT else []))
 
     def words(self) -> str:
-        """The gain, the mount, its angles and its J, in a line."""
+        """Return the gain, the mount, its angles and its J as a line."""
         J = f"J = {self.mount.score.J:.4f}"
         if self.factor is None:
             J += f" +- {error_words(self.mount.score.J, self.mount.score.J_error)}"
@@ -57,7 +56,7 @@ class Gain:
         return f"{self.value} {self.mount.name} {angles_words(self.mount.angles_deg)}: {inside}"
 
     def facts(self) -> dict[str, Any]:
-        """Names with units and values, for JSON."""
+        """Return the figures by name, for JSON."""
         return {
             "name": self.mount.name,
             "angles_deg": list(self.mount.angles_deg),
@@ -70,8 +69,8 @@ class Gain:
 
 
 def gains(problem: Problem, angles_deg: Sequence[float], J: float, mounts: Iterable[TunedMount]) -> tuple[Gain, ...]:
-    """Compare an answer, a setting and its J, with reference mounts: the best of them, the smallest gain, first."""
-    logarithmic = problem.objective.name == "log"  # the one objective whose differences are ratios of densities
+    """Return the gains of a mount over reference mounts, the smallest first."""
+    logarithmic = problem.objective.name == "log"  # only its differences are ratios of densities
     result = []
     for mount in mounts:
         less = mount.score.J - J
@@ -82,19 +81,19 @@ def gains(problem: Problem, angles_deg: Sequence[float], J: float, mounts: Itera
 
 
 def gain_lines(result: tuple[Gain, ...]) -> list[str]:
-    """Return the gains, one line each, the smallest first; and whether a simple mount is as good."""
+    """Return the gains as lines, and the verdict."""
     what = "J" if result[0].factor is None else "beam density in the region"
     lines = [f"{what}, against simple mounts tuned to the task, without parts:"]
     return [*lines, *(f"  {gain.words()}" for gain in result), *verdict(result)]
 
 
 def verdict(result: tuple[Gain, ...]) -> list[str]:
-    """A sentence about a simple mount that is as good or better; of several the one that nothing speaks against."""
+    """Return a sentence about a simple mount that is as good or better, preferably one without flaws."""
     good = [gain for gain in result if gain.factor is not None and gain.factor <= AS_GOOD]
     if not good:
         return []
     free = [gain for gain in good if not _against(gain)] or good
-    better = _better(free[0])  # the best one first
+    better = free[0].factor is not None and free[0].factor < 2 - AS_GOOD  # the best one is first
     best = free[0] if better else min(free, key=lambda gain: (not gain.same, not gain.simpler))
     if best.same:
         return [f"the optimum is itself a simple mount: {best.mount.name}"]
@@ -108,12 +107,7 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     return [f"{mount} has {1 / best.factor:.2f} times the beams if its parts block none{rest}"]
 
 
-def _better(gain: Gain) -> bool:
-    """Whether the mount is better than the answer by more than makes it as good."""
-    return gain.factor is not None and gain.factor < 2 - AS_GOOD
-
-
 def _against(gain: Gain) -> str:
-    """What speaks against a mount."""
+    """Return the flaws of a mount and whether the task excludes its angles, as text."""
     flaws = gain.flaws if not gain.flaws or gain.flaws.startswith("breaks") else f"is {gain.flaws}"
     return ", ".join(filter(None, [flaws, "" if gain.mount.in_ranges else "the angles of the task exclude it"]))

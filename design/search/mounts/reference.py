@@ -1,13 +1,13 @@
-"""The four mounts that anybody would build without a search, each tuned to a task: what a gain is stated against.
+"""Four usual mounts, each tuned to a task, with which a result is compared.
 
-- rolling and pitching, the standard alignments (Schubert 2016, section 4), have nothing to tune;
-- upright, one tilt: the axis stands upright and the scan plane is tilted to it by one angle, by pitching or by rolling
-  the lidar (pitched as in Malaga: Mandow; Morales 2018). The better of both, at the best tilt;
+- rolling and pitching, the standard alignments (Schubert 2016, section 4), have no free angle;
+- upright, one tilt: vertical axis, and a lidar that is pitched (as in Malaga: Mandow; Morales 2018) or rolled by the
+  best angle;
 - Bonn, 45 deg: axis 45 deg down ahead, scan plane along the axis, heading twisted away from it "slightly" (the
-  UTM-30LX-EW on an MX-28 that their MAV carries). How far was not found: the best twist up to 45 deg.
+  UTM-30LX-EW on an MX-28 of their MAV). The angle is unknown: the best twist up to 45 deg.
 
-Their builders are bound by the limits of the task, not by its ranges of angles: whoever builds one of these chooses its
-angles. An angle is tuned in steps down to `STEPS_DEG[-1]`. If the servo sweeps, the first steps compare mean counts.
+They must meet the limits of the task, but not its ranges of angles. Angles are tuned in steps down to `STEPS_DEG[-1]`.
+For a sweep the first steps compare mean counts.
 """
 
 from __future__ import annotations
@@ -27,20 +27,27 @@ from scanwright.design.search.with_parts import equivalents
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.task import Task
 
-STEPS_DEG = (5.0, 1.0, 0.2)  # of an angle: over all of its range, then about the best one so far
-AROUND = 4  # steps to either side of it
-QUICK_NODES = 243  # of a score that only tunes an angle
-SWEEP_LOOKS = 12  # of the first steps of a sweep, by their mean counts: these are scored
-SWEEP_NODES = 2187  # that a score of a sweep begins with
-SWEEP_TOLERANCE = 5e-3  # of J of a mount that sweeps: half a percent of its beams
-LOOKS = 5  # settings scored exactly, before a mount is taken that breaks what the task asks
+STEPS_DEG = (5.0, 1.0, 0.2)  # of an angle: over its range, then about the best value
+AROUND = 4  # steps to either side of the best value
+QUICK_NODES = 243  # of the scores that tune an angle
+SWEEP_SCORED = 12  # angles of a sweep that are scored, the best by their mean counts
+SWEEP_NODES = 2187  # initial nodes of a score of a sweep
+SWEEP_TOLERANCE = 5e-3  # of J of a sweep: half a percent of its beams
+EXACT = 5  # angles that are scored exactly to find one that meets the limits
 
 Four = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class OneFreeAngle:
-    """Settings (alpha_rot, beta_rot, alpha_laser, beta_laser) [deg] of which one angle is free, between two ends."""
+    """Mounts with one free angle.
+
+    Attributes:
+        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
+        free: index of the free angle.
+        low_deg: its lower limit.
+        high_deg: its upper limit.
+    """
 
     angles_deg: Four
     free: int
@@ -48,7 +55,7 @@ class OneFreeAngle:
     high_deg: float
 
     def at(self, angle_deg: float) -> Four:
-        """The setting with the free angle at a value."""
+        """Return the angles with the free angle at a value."""
         angles = list(self.angles_deg)
         angles[self.free] = angle_deg
         return angles[0], angles[1], angles[2], angles[3]
@@ -67,9 +74,9 @@ class TunedMount:
     Attributes:
         name: of the mount.
         angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        score: its exact J, and what it leaves blind.
-        keeps_limits: whether it keeps the limits of the task; a blind spot breaks none of them.
-        in_ranges: whether the task allows its angles, or others of the same J, which are then `angles_deg`.
+        score: its exact score.
+        keeps_limits: whether it meets the limits of the task; blind spots do not matter.
+        in_ranges: whether `angles_deg`, chosen among mounts of the same J, are in the ranges of the task.
     """
 
     name: str
@@ -85,18 +92,14 @@ class TunedMount:
 
 
 def angles_used(angles_deg: Iterable[float]) -> int:
-    """How many mounting angles are not 0: the fewer, the simpler the mount."""
+    """Return the number of mounting angles that are not 0: the fewer, the simpler the mount."""
     return sum(abs(angle) > 1e-9 for angle in angles_deg)
 
 
 def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
-    """The four reference mounts of a task: rolling, pitching, upright with one tilt, 45 deg.
+    """Return the four reference mounts, tuned to a task.
 
-    Each has the lowest J of its settings that keep the limits and, if the task avoids holes, have none; if there is no
-    such setting, the lowest J of all.
-
-    Raises:
-        TaskError: no direction has a weight.
+    Each has the lowest J within the limits and, if the task avoids them, without blind spots; or else the lowest J.
     """
     if problem.sweep is not None:
         tolerance = max(problem.tolerance, SWEEP_TOLERANCE)
@@ -114,12 +117,12 @@ def reference_mounts(problem: Problem, task: Task) -> tuple[TunedMount, ...]:
 
 
 def _tuned(space: SearchSpace, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, Score]:
-    """The best setting of some lines, found by quick scores, and its exact score."""
+    """Return the best mount of some lines by quick scores, and its exact score."""
     problem = space.problem
     known: dict[Four, tuple[bool, float]] = {}
     places: list[tuple[OneFreeAngle, float]] = []
 
-    def look(line: OneFreeAngle, angles_deg: Setting) -> None:
+    def try_angles(line: OneFreeAngle, angles_deg: Setting) -> None:
         for angle_deg in np.unique(np.clip(angles_deg, line.low_deg, line.high_deg).round(6) + 0.0).tolist():
             setting = line.at(angle_deg)
             if setting not in known:
@@ -137,25 +140,25 @@ def _tuned(space: SearchSpace, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, S
             for k, (line, angles_deg) in enumerate(first)
             for angle_deg in angles_deg.tolist()
         ]
-        first = [(first[k][0], np.array([angle_deg])) for _, k, angle_deg in sorted(bounds)[:SWEEP_LOOKS]]
+        first = [(first[k][0], np.array([angle_deg])) for _, k, angle_deg in sorted(bounds)[:SWEEP_SCORED]]
     for line, angles_deg in first:
-        look(line, angles_deg)
+        try_angles(line, angles_deg)
     for step_deg in STEPS_DEG[1:]:
         line, angle_deg = min(places, key=lambda place: known[place[0].at(place[1])])
-        look(line, angle_deg + step_deg * np.arange(-AROUND, AROUND + 1))
+        try_angles(line, angle_deg + step_deg * np.arange(-AROUND, AROUND + 1))
     ordered = sorted(known, key=known.__getitem__)
-    for setting in [each for each in ordered if not known[each][0]][:LOOKS]:
+    for setting in [each for each in ordered if not known[each][0]][:EXACT]:
         if (result := space.score(np.array(setting))) is not None:
             return setting, result
     return ordered[0], score(space.problem, np.radians(ordered[0]))
 
 
 def _same(problem: Problem, angles_deg: Four) -> list[Four]:
-    """Settings of the same J, itself first; an axis that is turned over may be turned either way."""
+    """Return mounts of the same J, itself first, with alpha_rot = -180 also as 180."""
     result = equivalents(problem, angles_deg, AngleRanges())
     return [*result, *((180.0, b, c, d) for a, b, c, d in result if a == -180)]
 
 
 def _rolls_alike(problem: Problem) -> bool:
-    """Whether a lidar rolled to the left sees what one rolled to the right sees."""
+    """Return whether a lidar rolled to the left has the same view as one rolled to the right."""
     return problem.sweep is None and len(mirrors_of(problem.bearings_rad)) > 1

@@ -1,7 +1,7 @@
-"""`angles.prefer = "simple"`: the mount with the fewest angles that costs no more than the task accepts.
+"""`angles.prefer = "simple"`: the mount with the fewest angles other than 0 within the accepted loss.
 
-Candidates are the settings of the grid in which at most one of the angles that the task leaves free is not 0, the
-reference mounts with their tuned angle on the grid, and the families that the search found.
+Candidates are the mounts of the grid with at most one free angle other than 0, the reference mounts with their tuned
+angle on the grid, and the results of the search.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from scanwright.design.search.mounts.reference import QUICK_NODES, TUNED, Four, 
 from scanwright.design.search.space import SearchSpace
 from scanwright.design.task.angle_ranges import NAMES, AngleRanges
 
-ROUGH_J = 0.05  # a quick J may be too high by this: then the exact one decides
+ROUGH_J = 0.05  # error of a quick J
 
 
 def simplest_first(space: SearchSpace, families: tuple[Family, ...]) -> tuple[Family, ...]:
-    """Put the simplest mount that costs at most `prefer_loss` before the families of a search, lowest J first.
+    """Return the families of a search (lowest J first) after the simplest mount that costs at most `prefer_loss`.
 
-    Simplest: the fewest angles that are not 0, then the lowest J. It keeps the limits, and has no hole if the optimum
-    has none.
+    The simplest mount has the fewest angles other than 0, then the lowest J. It meets the limits, and has no blind spot
+    if the optimum has none.
     """
     ranges, optimum = space.ranges, families[0]
     most_J = highest_J(space.problem, optimum.score.J, ranges.prefer_loss)
@@ -36,23 +36,22 @@ def simplest_first(space: SearchSpace, families: tuple[Family, ...]) -> tuple[Fa
     quick = {setting: space.J(np.array(setting), QUICK_NODES) for setting in _simple_settings(ranges)}
     quick |= {angles_deg: family.score.J for angles_deg, family in known.items()}
     near = [setting for setting, J in quick.items() if most_J + ROUGH_J >= J]
-    answer = optimum
+    simplest = optimum
     for setting in sorted(near, key=lambda setting: (angles_used(setting), quick[setting])):
         result = space.score(np.array(setting))
         if result is not None and most_J + EQUAL >= result.J:
-            answer = known.get(setting) or Family(setting, result, 1, "")
+            simplest = known.get(setting) or Family(setting, result, 1, "")
             break
-    others = [family for family in families if family.angles_deg != answer.angles_deg]
-    return (answer, *others)
+    return (simplest, *(family for family in families if family.angles_deg != simplest.angles_deg))
 
 
 def highest_J(problem: Problem, J: float, loss: float) -> float:
-    """The highest J that costs no more than a share: of the beams per ball, or of J for another objective than log."""
+    """Return the highest J within a relative loss: of beams per ball, or of J for objectives other than `log`."""
     return J - math.log1p(-loss) if problem.objective.name == "log" else J + loss * abs(J)
 
 
 def _simple_settings(ranges: AngleRanges) -> list[Four]:
-    """The candidates that the ranges hold, each once."""
+    """Return the candidates within the ranges, each once."""
     limits = [ranges.limits(name) for name in NAMES]
     none = [float(np.clip(0.0, *each)) for each in limits]
     result = [tuple(none), *STANDARD_DEG.values()]

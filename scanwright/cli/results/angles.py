@@ -1,4 +1,4 @@
-"""What `optimise`, `evaluate` and `compare` print with `--json`."""
+"""Records of the `--json` output of `optimise`, `evaluate` and `compare`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the commands print with `--json`: one record for each, and its JSON schema.
+"""Records of the `--json` output of the commands, and their JSON schemas.
 
 The attributes of a record are its documentation: `scanwright schema COMMAND` and the reference page print them.
 """
@@ -388,7 +388,7 @@ RESULTS: dict[str, Any] = {
 
 
 def result_schema(command: str) -> dict[str, Any]:
-    """Return the JSON schema of what a command prints with `--json`; descriptions come from the records."""
+    """Return the JSON schema of the `--json` output of a command, with descriptions from the records."""
     schema = TypeAdapter(RESULTS[command]).json_schema(mode="serialization")
     kinds = {kind.__name__: kind for kind in _records_in(RESULTS[command])}
     for record in (schema, *schema.get("$defs", {}).values()):
@@ -414,6 +414,6 @@ def _attributes(kind: type[Any]) -> dict[str, str]:
     described: dict[str, str] = {}
     for base in reversed(kind.__mro__):
         _, _, text = inspect.cleandoc(base.__doc__ or "").partition("\nAttributes:\n")
-        found = re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", text, re.MULTILINE)
-        described |= {name: " ".join(words.split()) for name, words in found}
+        attributes = re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", text, re.MULTILINE)
+        described |= {name: " ".join(words.split()) for name, words in attributes}
     return described

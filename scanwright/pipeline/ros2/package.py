@@ -1,6 +1,6 @@
 """The ament_python package of a scanner: description with `package://` meshes, launch files, layouts for viewers.
 
-It holds what `scanwright ros2` reads, so that its installed share folder is a scanner like the build folder is.
+It contains all files that `scanwright ros2` reads, so that its share folder can replace the build folder.
 """
 
 from __future__ import annotations
@@ -82,11 +82,7 @@ def package_name(task: str) -> str:
 
 
 def write_package(build: Path) -> None:
-    """Write `ros2/` into a build folder from its angles, URDF, meshes and mask.
-
-    Args:
-        build: folder with `angles.json`, `scanner.urdf`, `own_body.npz` and the meshes that the URDF names.
-    """
+    """Write `ros2/` into a build folder from its angles, URDF, meshes and mask."""
     angles = load_angles(build / "angles.json")
     name, root = package_name(angles.task), build / FOLDER
     for folder in (name, "resource", "meshes", "launch", "layouts"):

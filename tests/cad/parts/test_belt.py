@@ -453,7 +453,7 @@ def test_what_else_cannot_be_built_is_refused():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"flange": None}, "bore_mm = 0 is a capsule: tell its flange and rotor"),
+        ({"flange": None}, "bore_mm = 0 is a capsule: state its flange and rotor"),
         ({"length_mm": 2.0}, "below_top_mm 0 lies beyond length_mm"),
         ({"outer_diameter_mm": 30.0}, "circle_mm 35 puts its holes into outer_diameter_mm"),
         ({"outer_diameter_mm": 7.0}, "rotor.diameter_mm 7.8 is not below"),

@@ -15,7 +15,7 @@ from scanwright.design.accuracy.methods import METHODS, by_ball_count, by_ball_s
 from scanwright.design.accuracy.reference import smooth_reference
 from scanwright.design.accuracy.work_precision import measure_methods
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth
-from scanwright.design.density.spin import zones
+from scanwright.design.density.spin import phase_statistics
 from scanwright.design.errors import TaskError
 from scanwright.design.objective.problem import FRONT, NODES, nodes_for, problem_of
 from scanwright.design.objective.score import quick_J, score
@@ -40,7 +40,7 @@ def test_the_reference_is_right_without_any_of_our_quadrature(ground):
     problem = problem_of(replace(task, task=narrow))
 
     t = np.linspace(*band, 400_001)
-    g = zones(t, polar, azimuth, problem.lines, problem.ball_rad, problem.objective.moments[0].g).mean_g
+    g = phase_statistics(t, polar, azimuth, problem.lines, problem.ball_rad, problem.objective.moments[0].g).mean_g
     total = simpson(g * np.sin(t), x=t)
     expected = total / (np.cos(band[0]) - np.cos(band[1]))
     truth = smooth_reference(problem, ANGLES)

@@ -15,7 +15,7 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import ScanLines, beam_directions_rot, polar_and_azimuth, scan_lines
 from scanwright.design.density.phase_walk import sort_by_buckets
-from scanwright.design.density.spin import ball_search, mean_count, zones
+from scanwright.design.density.spin import ball_search, mean_count, phase_statistics
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective import ball_search as oracle
 from scanwright.design.objective.named_objectives import log_density
@@ -133,7 +133,7 @@ def test_zones_are_exact_over_all_start_phases(seed):
     g = log_density(np.arange(lines.count * len(polar) + 1.0))
     near = np.clip(polar[rng.integers(len(polar), size=4)] + rng.uniform(-1, 1, 4) * ball, 0, pi)
     t = np.concatenate([rng.uniform(0, pi, 3), near, [1e-9, pi - 1e-9]])
-    z = zones(t, polar, azimuth, lines, ball, log_density)
+    z = phase_statistics(t, polar, azimuth, lines, ball, log_density)
     for i, ti in enumerate(t):
         mean_g, mean, least, most = exact_over_phases(ti, polar, azimuth, lines, ball, g)
         assert z.mean_g[i] == pytest.approx(mean_g, abs=2e-6), np.degrees(ti)
@@ -153,7 +153,7 @@ def test_polar_angles_where_window_edges_meet_lines_are_no_exception(utm, plane_
     polar, azimuth = polar_and_azimuth(beam_directions_rot(utm, *np.radians(plane_deg)))
     lines = scan_lines(turns, 1.0)
     t = np.radians(np.arange(0, 181.0))
-    z = zones(t, polar, azimuth, lines, radians(ball_deg), np.positive)
+    z = phase_statistics(t, polar, azimuth, lines, radians(ball_deg), np.positive)
     expected = mean_count(t, polar, lines, radians(ball_deg))
     np.testing.assert_allclose(z.mean_g, expected, rtol=1e-6, atol=1e-6)
     assert (z.least <= expected + 1e-6).all()
@@ -174,7 +174,7 @@ def test_the_scan_plane_across_the_axis_has_its_mean_count_in_closed_form(utm):
 def test_a_beam_on_the_axis_counts_with_every_line_near_it_and_with_none_elsewhere(ball_deg):
     lines, ball = ScanLines(count=7, step_rad=2 * pi / 7), radians(ball_deg)
     t = np.array([0.0, 0.999 * ball, min(1.001 * ball, pi), pi])
-    z = zones(t, np.zeros(1), np.zeros(1), lines, ball, log_density)
+    z = phase_statistics(t, np.zeros(1), np.zeros(1), lines, ball, log_density)
     np.testing.assert_array_equal(z.mean, [7, 7, 0, 0])
     np.testing.assert_array_equal(z.least, [7, 7, 0, 0])
     np.testing.assert_array_equal(z.most, [7, 7, 0, 0])

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from scanwright.design.density.ball_count import ball_count
 from scanwright.design.density.beams import ScanLines, beam_directions_rot, scan_lines
 from scanwright.design.errors import TaskError
-from scanwright.design.evaluation.gaps import _in_fan, gaps, interlaced_period_s
+from scanwright.design.evaluation.gaps import _in_field_of_view, gaps, interlaced_period_s
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.search.shortest_period import shortest_period_s
@@ -53,7 +53,7 @@ def test_a_bearing_on_the_seam_of_a_turn_is_one_of_the_fan(first_deg, off_rad):
     bearings = np.radians(first_deg + np.arange(0.0, 240.0, 30.0))
     asked = np.array([[off_rad, -2 * np.pi + off_rad, 2 * np.pi + off_rad], [np.pi, np.radians(first_deg - 20), np.pi]])
     expected = [[True, True, True], [first_deg > -120.0 + 60, False, first_deg > -120.0 + 60]]
-    np.testing.assert_array_equal(_in_fan(bearings, asked), expected)
+    np.testing.assert_array_equal(_in_field_of_view(bearings, asked), expected)
 
 
 @pytest.mark.parametrize("angles_deg", SETTINGS[:4])

@@ -144,9 +144,9 @@ def test_no_random_setting_beats_the_search(name, monkeypatch):
 
 
 def test_required_needs_a_number_for_every_region():
-    with pytest.raises(TaskError, match=r"t.toml: density.objective = 'required': weight.1.required: say how many"):
+    with pytest.raises(TaskError, match=r"t.toml: density.objective = 'required': weight.1.required: set the number"):
         problem("required", (AHEAD | {"required": 60}, GROUND))
-    with pytest.raises(TaskError, match="say how many beams per ball"):
+    with pytest.raises(TaskError, match="set the number of beams per ball"):
         problem("required", (GROUND | {"required": 3},), background=0.5)
 
 

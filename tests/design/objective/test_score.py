@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth, scan_lines
-from scanwright.design.density.spin import zones
+from scanwright.design.density.spin import phase_statistics
 from scanwright.design.errors import TaskError
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective import named_objectives
@@ -113,7 +113,7 @@ def by_spirals(p, setting, count=60_000, sets=8):
         d = turn.apply(spiral)
         w = p.field.weight_at(d)
         t = np.arccos(np.clip(d[w > 0] @ axis, -1, 1))
-        found.append(w[w > 0] @ zones(t, polar, azimuth, p.lines, p.ball_rad, log_density).mean_g / w.sum())
+        found.append(w[w > 0] @ phase_statistics(t, polar, azimuth, p.lines, p.ball_rad, log_density).mean_g / w.sum())
     return np.mean(found), 5 * np.std(found, ddof=1) / np.sqrt(sets)
 
 
@@ -139,7 +139,7 @@ def test_a_region_of_one_degree_and_less_is_right(setting_deg, half_angle_deg, a
     cap = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z], axis=1)
     d = Rotation.align_vectors([axis], [[0, 0, 1]])[0].apply(cap)
     t = polar_and_azimuth(d @ R_world_rot(*setting[:2]))[0]
-    g = zones(
+    g = phase_statistics(
         t,
         *polar_and_azimuth(beam_directions_rot(p.bearings_rad, *setting[2:])),
         p.lines,
@@ -169,7 +169,7 @@ def test_equal_angle_is_the_literal_sum_of_the_paper():
             n = np.array([[sin(a) * cos(b), sin(a) * sin(b), cos(a)]])
             w = p.field.weight_at(n)[0]
             t, _ = polar_and_azimuth(n @ R_world_rot(*setting[:2]))
-            above += w * zones(t, *beams, p.lines, p.ball_rad, log_density).mean_g[0]
+            above += w * phase_statistics(t, *beams, p.lines, p.ball_rad, log_density).mean_g[0]
             below += w
     one = score(p, setting)
     assert pytest.approx(above / below, abs=1e-9) == one.J
@@ -245,10 +245,12 @@ def test_a_lowest_count_is_that_of_every_polar_angle(seed):
     assert least < score_on(p, setting, 729, stated=False).least
     rule, polar, azimuth = polar_rule(p, setting, 20_000)
     t = rule.polar_rad[rule.fine > 0]
-    lowest = zones(t, polar, azimuth, p.lines, p.ball_rad, log_density).least
+    lowest = phase_statistics(t, polar, azimuth, p.lines, p.ball_rad, log_density).least
     about = t[np.argsort(lowest, kind="stable")[:200], None] + rng.uniform(-1e-4, 1e-4, (200, 40))
     about = np.clip(about.ravel(), t.min(), t.max())
-    assert least <= min(lowest.min(), zones(about, polar, azimuth, p.lines, p.ball_rad, log_density).least.min())
+    assert least <= min(
+        lowest.min(), phase_statistics(about, polar, azimuth, p.lines, p.ball_rad, log_density).least.min()
+    )
 
 
 @pytest.mark.parametrize("period_s", [2.0, 2.013])
@@ -258,9 +260,9 @@ def test_a_bound_of_a_range_is_below_every_count_in_it(period_s):
     polar, azimuth = polar_and_azimuth(p.with_beams(p.bearings_rad[::7], p.lines).beams_rot(np.array([0.4, -0.7])))
     low = rng.uniform(0, pi, 60)
     high = np.minimum(low + 10 ** rng.uniform(-5, -1.5, 60), pi)
-    bound = zones(low, polar, azimuth, p.lines, p.ball_rad, log_density, high).least
+    bound = phase_statistics(low, polar, azimuth, p.lines, p.ball_rad, log_density, high).least
     inside = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, 25)
-    counts = zones(inside.ravel(), polar, azimuth, p.lines, p.ball_rad, log_density).least.reshape(60, 25)
+    counts = phase_statistics(inside.ravel(), polar, azimuth, p.lines, p.ball_rad, log_density).least.reshape(60, 25)
     assert (bound <= counts.min(axis=1)).all()
     assert (bound == counts.min(axis=1)).mean() > 0.2
 

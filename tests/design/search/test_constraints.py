@@ -77,7 +77,7 @@ def every_score(task):
     ids=["holes", "holes, another objective", "density", "blind weight", "holes of a sweep"],
 )
 def test_the_best_that_keeps_them_is_the_best_of_the_grid_that_does(task, limits, monkeypatch):
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
     problem = problem_of(task)
     found = search(problem, task.task.angles, limits=limits)
     blind = limits.max_blind_weight or (NO_BLIND_WEIGHT if task.task.angles.holes == "avoid" else 1.0)
@@ -138,7 +138,7 @@ def test_a_walk_ends_where_a_fan_no_longer_reaches_a_corner_of_a_painted_region(
 
 
 def test_where_nothing_is_free_of_holes_the_smallest_share_is_told(monkeypatch):
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
     task = loaded(weight=[{"shape": "all"}], angles=RANGES | {"beta_laser_deg": [60, 70]})
     found = search(problem_of(task), task.task.angles)
     everything = every_score(task)
@@ -170,7 +170,7 @@ def test_the_reach_of_a_fan_is_that_of_its_beams():
 @pytest.mark.parametrize("half_angle_deg", [0.001, 0.05])
 @pytest.mark.parametrize("axis", [[0, 0, 1], [0.4, 0.2, -0.6]], ids=["pole", "oblique"])
 def test_a_region_smaller_than_any_step_of_the_search_is_found(axis, half_angle_deg, monkeypatch):
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
     tiny = {"shape": "cone", "axis": axis, "half_angle_deg": half_angle_deg}
     rough = {"angles": {"step_deg": 30}, "density": {"tolerance": 0.05}}
     task = loaded(weight=[tiny], **rough)
@@ -180,7 +180,7 @@ def test_a_region_smaller_than_any_step_of_the_search_is_found(axis, half_angle_
 
 
 def test_a_small_region_of_a_sweep_is_found(monkeypatch):
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
     task = loaded(**SWEEP | {"weight": [CONE | {"half_angle_deg": 0.3}]})
     found = search(problem_of(task), task.task.angles)
     assert found.best[0].score.J < 0 and found.best[0].score.blind_weight == 0
@@ -189,7 +189,7 @@ def test_a_small_region_of_a_sweep_is_found(monkeypatch):
 @pytest.mark.parametrize("ball_radius_deg", [0.9, 1.5, 1.75])
 def test_the_coarse_J_counts_the_equator_once(ball_radius_deg, monkeypatch):
     """4 pi / ball + 1 nodes were even for these, and the node in the middle counted one and a half times."""
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
     task = loaded(
         weight=[CONE | {"half_angle_deg": 2}],
         density={"ball_radius_deg": ball_radius_deg},

@@ -14,7 +14,7 @@ from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.progress import no_progress
 from scanwright.design.search import families
-from scanwright.design.search.families import MOST_WALKS
+from scanwright.design.search.families import MOST_RUNS
 from scanwright.design.search.grid_classes import plane_key
 from scanwright.design.search.refinement import NARROW, _Chart, _on_the_grid, descended, lowest_by_simplex
 from scanwright.design.search.search import search
@@ -121,7 +121,7 @@ def test_walks_go_on_along_a_valley_that_is_narrower_than_the_grid(start):
     """One simplex ends up to 0.4 above the lowest J, -1 with an upright axis."""
     first = descended(Valley(), [(np.array(start), False)], 1, no_progress)
     assert first[0].J > -0.9
-    found = descended(Valley(), [(np.array(start), False)], MOST_WALKS[2], no_progress)
+    found = descended(Valley(), [(np.array(start), False)], MOST_RUNS[2], no_progress)
     assert found[0].J < -0.999
     assert found[0].J == Valley().J(found[0].angles_deg, 0)
 

@@ -60,7 +60,7 @@ CASES = {
 @pytest.fixture
 def unrefined(monkeypatch):
     """The answer of the grid."""
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
 
 
 def every_setting(ranges):
@@ -147,7 +147,7 @@ def test_refinement_never_makes_it_worse(monkeypatch):
     monkeypatch.setattr(families, "FAMILIES", 3)
     problem, ranges = CASES["one angle fixed, one range short"]
     refined = search(problem, ranges).best[0].score
-    monkeypatch.setattr(families, "MOST_WALKS", (0, 0, 0))
+    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
     plain = search(problem, ranges).best[0].score
     assert refined.J <= plain.J
     assert refined.J < plain.J - 1e-3, "at 30 deg there is something to gain"

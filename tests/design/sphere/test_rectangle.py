@@ -69,19 +69,16 @@ def solid_angle_of_triangle(a, b, c):
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_its_solid_angle_its_cap_and_its_directions(name):
+def test_its_solid_angle_and_its_directions(name):
     corners = np.array(region(ALL[name]).corners_m())
     normals = edge_normals(corners)
     seen = seen_rectangle(normals)
     unit = corners / np.linalg.norm(corners, axis=1)[:, None]
-    np.testing.assert_allclose(np.sort(seen.corners(), axis=0), np.sort(unit, axis=0), atol=1e-9)
     triangles = solid_angle_of_triangle(*unit[:3]) + solid_angle_of_triangle(unit[0], unit[2], unit[3])
     rng = np.random.default_rng(1)
     d, solid_angle = seen.spread(rng.random(20_000), rng.random(20_000))
     assert solid_angle == pytest.approx(triangles, rel=1e-7)
     assert (d @ normals.T).min() > -1e-12
-    centre, radius = seen.cap()
-    assert radius < np.pi / 2 and (d @ centre).min() >= np.cos(radius) - 1e-12
     # equal shares of the solid angle hold equal numbers of directions: halves cut by a plane through two corners
     first = solid_angle_of_triangle(*unit[:3]) / triangles
     side = d @ np.cross(unit[0], unit[2])

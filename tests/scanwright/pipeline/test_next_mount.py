@@ -42,8 +42,8 @@ def test_the_next_mount_is_tried_and_the_best_one_kept_if_none_passes(monkeypatc
         files.append(int(tried[0].family.angles_deg[0]))
         return f"parts {files[-1]}", FAULT if files[-1] in fails else ()
 
-    monkeypatch.setattr(build, "_chosen_and_made", choose)
-    monkeypatch.setattr(build, "_written_and_checked", write)
-    result = build._that_passes(in_turn, None, "", attempt(0), None, no_progress)
+    monkeypatch.setattr(build, "_choose_and_make", choose)
+    monkeypatch.setattr(build, "_write_and_check", write)
+    result = build._make_passing(in_turn, None, "", attempt(0), None, no_progress)
     assert result == (attempt(kept)[0], f"scanner {kept}", f"parts {kept}")
     assert files == written
