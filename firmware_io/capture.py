@@ -61,7 +61,7 @@ class _Device:
     received: bytes = b""
     asked: bool = False
 
-    def hear(self, data: bytes, now_ns: int) -> None:
+    def receive(self, data: bytes, now_ns: int) -> None:
         """Take a part of a request; bytes that begin no request of the capture are dropped."""
         self.received += data
         while self.received:
@@ -139,7 +139,7 @@ def replaying(path: Path) -> Iterator[dict[str, str]]:
             times_ns = [device.due[0][0] for device in masters.values() if device.due]
             wait_s = min((min(times_ns, default=1 << 62) - time.monotonic_ns()) / 1e9, _WAIT_S)
             for master in select.select(list(masters), [], [], max(wait_s, 0.0))[0]:
-                masters[master].hear(os.read(master, 4096), time.monotonic_ns())
+                masters[master].receive(os.read(master, 4096), time.monotonic_ns())
             for master, device in masters.items():
                 with suppress(BlockingIOError):  # the buffer is full: no program reads
                     os.write(master, device.send(time.monotonic_ns()))
