@@ -56,7 +56,7 @@ class Unwatched(Viewer):
     """The `Viewer` of a recording without viewers."""
 
 
-UNWATCHED = Unwatched()
+UNWATCHED = Unwatched()  # type: ignore[abstract]  # the empty bodies of `Viewer` are its implementation
 
 
 @dataclass(frozen=True, slots=True)
