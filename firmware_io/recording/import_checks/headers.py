@@ -87,7 +87,7 @@ class Headers:
 
     @property
     def mirror_turn_s(self) -> float:
-        """Duration of a mirror turn: scan_time, or the median time between scans if that is no multiple (0: unknown)."""
+        """Duration of a mirror turn: scan_time, or the median time between scans if it is no multiple (0: unknown)."""
         if self.stamp_ns.size < 2:
             return 0.0
         usual_s = float(np.median(np.diff(np.sort(self.stamp_ns)))) / 1e9
