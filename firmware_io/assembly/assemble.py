@@ -47,18 +47,31 @@ _FLOAT32_LIMIT_M = 8192.0  # beyond, the resolution of float32 is 1 mm
 
 @dataclass(frozen=True, slots=True)
 class AssembleSummary:
-    """Result of an assembly: `beams == points + sum(left_out.values())`."""
+    """Result of an assembly: `beams == points + sum(left_out.values())`.
 
-    out: Path  # the cloud, or the name after which several are numbered
-    clouds: tuple[Path, ...]  # written files
-    points: int  # beams with a point
-    rows: int  # of all files; `points` in flat clouds
-    beams: int  # in the recording
-    width: int  # rows per scan of an organised cloud; 0 of a flat one
-    height: int  # scans
-    padding: int  # rows of scans shorter than `width`
-    left_out: dict[str, int]  # reason -> beams; NaN rows in an organised cloud, absent in a flat one
-    notes: tuple[str, ...]  # one sentence each
+    Attributes:
+        out: the cloud, or the name after which several are numbered.
+        clouds: written files.
+        points: beams with a point.
+        rows: of all files; `points` in flat clouds.
+        beams: in the recording.
+        width: rows per scan of an organised cloud; 0 of a flat one.
+        height: scans.
+        padding: rows of scans shorter than `width`.
+        left_out: reason -> beams; NaN rows in an organised cloud, absent in a flat one.
+        notes: one sentence each.
+    """
+
+    out: Path
+    clouds: tuple[Path, ...]
+    points: int
+    rows: int
+    beams: int
+    width: int
+    height: int
+    padding: int
+    left_out: dict[str, int]
+    notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
         """Format the result."""

@@ -33,13 +33,21 @@ _FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cloud:
-    """Points of one scan position; row i of each column belongs to point i. Invalid values raise RecordingError."""
+    """Points of one scan position; row i of each column belongs to point i. Invalid values raise RecordingError.
 
-    points_m: Float[ndarray, "n 3"]  # float32 or float64, in the frame of the cloud; NaN without a return
-    columns: Mapping[str, Column] = field(default_factory=dict)  # further scalars by name, shape (n,) each
-    shape: tuple[int, int] = (1, 0)  # rows and columns of an organised cloud, row by row; (1, n) of a flat one
+    Attributes:
+        points_m: float32 or float64, in the frame of the cloud; NaN without a return.
+        columns: further scalars by name, shape (n,) each.
+        shape: rows and columns of an organised cloud, row by row; (1, n) of a flat one.
+        T_world_cloud: pose of the cloud, shape (4, 4).
+        start_ns: time of `time_s` = 0 since 1970, if known.
+    """
+
+    points_m: Float[ndarray, "n 3"]
+    columns: Mapping[str, Column] = field(default_factory=dict)
+    shape: tuple[int, int] = (1, 0)
     T_world_cloud: Pose = field(default_factory=lambda: np.eye(4))
-    start_ns: int | None = None  # time of `time_s` = 0 since 1970, if known
+    start_ns: int | None = None
 
     def __post_init__(self) -> None:
         n = len(self.points_m) if self.points_m.ndim else 0

@@ -15,13 +15,21 @@ from scanwright.firmware_io.samples import JointLog, Scan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingArrays:
-    """All scans and angles; beam i of scan k is at [k, i]."""
+    """All scans and angles; beam i of scan k is at [k, i].
 
-    time_ns: Times  # of each beam, shape (scans, beams)
-    bearing_rad: Floats  # in the scan plane, shape (scans, beams); NaN after the last beam of a short scan
-    range_m: NDArray[np.float32]  # shape (scans, beams); NaN, inf or 0 without a return
-    intensity: NDArray[np.float32]  # shape (scans, beams), or (scans, 0) if the sensor measures none
-    joint_log: JointLog  # angle of the servo
+    Attributes:
+        time_ns: of each beam, shape (scans, beams).
+        bearing_rad: in the scan plane, shape (scans, beams); NaN after the last beam of a short scan.
+        range_m: shape (scans, beams); NaN, inf or 0 without a return.
+        intensity: shape (scans, beams), or (scans, 0) if the sensor measures none.
+        joint_log: angle of the servo.
+    """
+
+    time_ns: Times
+    bearing_rad: Floats
+    range_m: NDArray[np.float32]
+    intensity: NDArray[np.float32]
+    joint_log: JointLog
 
     @property
     def joint_rad(self) -> Floats:

@@ -51,15 +51,26 @@ _AS_IT_IS = Corrections()
 
 @dataclass(frozen=True, slots=True)
 class ImportSummary:
-    """Result of an import."""
+    """Result of an import.
+
+    Attributes:
+        out: the recording.
+        scans: written.
+        beams: in them, with or without a return.
+        joint_samples: written.
+        duration_s: from the first to the last scan.
+        angle_deg: smallest and largest angle of the joint log.
+        left_out: dropped scans or angles, reason -> count.
+        findings: of the checks.
+    """
 
     out: Path
-    scans: int  # written
-    beams: int  # in them, with or without a return
-    joint_samples: int  # written
-    duration_s: float  # from the first to the last scan
-    angle_deg: tuple[float, float]  # smallest and largest angle of the joint log
-    left_out: dict[str, int]  # dropped scans or angles, reason -> count
+    scans: int
+    beams: int
+    joint_samples: int
+    duration_s: float
+    angle_deg: tuple[float, float]
+    left_out: dict[str, int]
     findings: tuple[Finding, ...]
 
     @property

@@ -131,14 +131,23 @@ def recording_writer(path: Path, note: Mapping[str, str]) -> Iterator[MessageWri
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """An open recording; its scans stay in the file."""
+    """An open recording; its scans stay in the file.
+
+    Attributes:
+        path: of the file.
+        joint_log: all samples of the spin joint.
+        beams: number of beams of each scan.
+        stamp_ns: time of the first beam of each scan.
+        has_intensity: of any scan.
+        at_rest: whether the motor rested during each scan (`scanwright import --hold`).
+    """
 
     path: Path
-    joint_log: JointLog  # all samples of the spin joint
-    beams: Int64[ndarray, " scans"]  # number of beams of each scan
-    stamp_ns: Int64[ndarray, " scans"]  # time of the first beam of each scan
-    has_intensity: bool  # of any scan
-    at_rest: bool  # whether the motor rested during each scan (`scanwright import --hold`)
+    joint_log: JointLog
+    beams: Int64[ndarray, " scans"]
+    stamp_ns: Int64[ndarray, " scans"]
+    has_intensity: bool
+    at_rest: bool
 
     @property
     def start_ns(self) -> int:

@@ -39,13 +39,22 @@ _ADVICE = {
 
 
 class ServoDriver:
-    """One servo; made by `open_servo`, used as a context manager."""
+    """One servo; made by `open_servo`, used as a context manager.
+
+    Attributes:
+        model: catalogue name.
+        protocol: name given by the maker, such as "2.0".
+        baud: baud rate.
+        id: on the bus.
+        port: name of the port.
+        step_rad: resolution of the encoder.
+    """
 
     def __init__(self, unit: ServoUnit, warnings: tuple[str, ...], undo_folder: Path | None = None) -> None:
         table, bus = unit.table, unit.bus
         self.model, self.protocol, self.id = table.model, table.protocol, unit.id
         self.baud, self.port = bus.baud, bus.port
-        self.step_rad = abs(table.position.unit)  # resolution of the encoder
+        self.step_rad = abs(table.position.unit)
         self._unit, self._bus, self._table, self._warnings = unit, bus, table, warnings
         self._product = load_catalogue().get(table.model, Servo)
         self._undo_folder = undo_folder

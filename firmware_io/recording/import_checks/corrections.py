@@ -33,17 +33,29 @@ def read_time_increment(text: str) -> float | Literal["auto"]:
 
 @dataclass(frozen=True, slots=True)
 class Corrections:
-    """Corrections applied by the import."""
+    """Corrections applied by the import.
 
-    angle_scale: float = 1.0  # turns of the axis per turn of the angle; negative reverses, 0.75 is a gear
-    angle_zero: float = 0.0  # angle at joint position 0, in the unit of the angle
-    time_increment: float | Literal["auto"] | None = None  # seconds between two beams; "auto": by the mirror turn
-    stamp: Literal["first", "last", "receipt"] = "first"  # beam of the stamp of a scan; receipt uses no stamps
-    bearings: Literal["increment", "limits"] = "increment"  # limits spreads the beams from angle_min to angle_max
-    scan_offset_s: float = 0.0  # added to the times of the scans
-    no_return_from_m: float | None = None  # smallest range without a return
-    echo: Echo = "first"  # ranges of a MultiEchoLaserScan: first, last, strongest or all
-    drop_outliers: bool = False  # drop angles far off both neighbours
+    Attributes:
+        angle_scale: turns of the axis per turn of the angle; negative reverses, 0.75 is a gear.
+        angle_zero: angle at joint position 0, in the unit of the angle.
+        time_increment: seconds between two beams; "auto" is the step's part of a mirror turn.
+        stamp: beam of the stamp of a scan; receipt uses no stamps.
+        bearings: limits spreads the beams from angle_min to angle_max.
+        scan_offset_s: added to the times of the scans.
+        no_return_from_m: ranges from this one on are no returns.
+        echo: ranges of a MultiEchoLaserScan: first, last, strongest or all.
+        drop_outliers: drop angles far off both neighbours.
+    """
+
+    angle_scale: float = 1.0
+    angle_zero: float = 0.0
+    time_increment: float | Literal["auto"] | None = None
+    stamp: Literal["first", "last", "receipt"] = "first"
+    bearings: Literal["increment", "limits"] = "increment"
+    scan_offset_s: float = 0.0
+    no_return_from_m: float | None = None
+    echo: Echo = "first"
+    drop_outliers: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.angle_scale) and self.angle_scale):
