@@ -1,4 +1,4 @@
-"""Registered clouds as one map: every voxel one point, the mean of all that fell into it."""
+"""Merging of registered clouds to one map: the mean point of each voxel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 
 
 def merge(clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"], spacing_m: float) -> Cloud:
-    """The map in the world.
+    """Return the map in the world frame.
 
     Its columns: `count`, the number of points in a row, and the mean `intensity` if every cloud has one.
 
