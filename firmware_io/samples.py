@@ -207,8 +207,8 @@ class JointLog:
         if not (np.abs(self.position_rad) <= _MOST_RAD).all():
             raise RecordingError(f"joint log: a position is not a finite number, or beyond {_MOST_RAD:g} rad")
         if np.any(np.diff(self.time_ns) <= 0):
-            where = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
-            raise RecordingError(f"joint log: sample {where} is not later than the one before it")
+            number = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
+            raise RecordingError(f"joint log: sample {number} is not later than the one before it")
 
     def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
         """Return the angle [rad] at each time by linear interpolation, in its shape; NaN outside the log."""

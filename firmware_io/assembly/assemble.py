@@ -78,11 +78,11 @@ class AssembleSummary:
         rows = f"wrote {self.points:,} points of {self.beams:,} beams"
         if self.width:
             rows = f"wrote {self.rows:,} rows ({self.points:,} points, {self.width:,} rows a scan)"
-        where = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
+        target = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
         return [
             *self.notes,
             *(f"left out {count:,} beams: {reason.replace('_', ' ')}" for reason, count in self.left_out.items()),
-            f"{rows} to {where}",
+            f"{rows} to {target}",
         ]
 
 
@@ -115,7 +115,7 @@ def assemble_recording(
     if options.smooth:
         curve, notes = axis_curve(source.joint_log, at_rest=source.at_rest)
     else:
-        curve, notes = straight(source.joint_log), "axis angle: straight between samples, as asked"
+        curve, notes = straight(source.joint_log), "axis angle: straight between samples, as set"
     cloud_from_rows = _cloud_of(source, per, round(lag_s * 1e9))
     fields = cloud_fields(source.has_intensity, columns)
     if source.beams.max() > _RINGS:
@@ -284,7 +284,7 @@ def _about_slivers(clouds: dict[Path, int], per: Per) -> Iterator[str]:
     of = f"the usual {usual:,} scans of {'a turn' if per == 'turn' else 'half a turn'}"
     for path, scans in clouds.items():
         if scans < usual / 2:
-            yield f"warning: {path.stem} holds {scans:,} of {of}: leave it out where clouds are registered"
+            yield f"warning: {path.stem} holds {scans:,} of {of}: leave it out if clouds are registered"
 
 
 def _comments(source: Recording, angles: AngleSet, width: int, scans: int, lag_s: float, on_map: bool) -> list[str]:

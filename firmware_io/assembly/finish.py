@@ -41,7 +41,9 @@ def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
     return of
 
 
-def finish_clouds(summary: AssembleSummary, out: Path, options: AssembleOptions, where: SeenFrom) -> AssembleSummary:
+def finish_clouds(
+    summary: AssembleSummary, out: Path, options: AssembleOptions, seen_from: SeenFrom
+) -> AssembleSummary:
     """Filter the clouds of a summary and write them in the format and with the name of `out`.
 
     Raises:
@@ -52,7 +54,7 @@ def finish_clouds(summary: AssembleSummary, out: Path, options: AssembleOptions,
     written: list[Path] = []
     for path in summary.clouds:
         (cloud, *_), _ = read_clouds(path)
-        cloud, dropped = _finished(cloud, options, where)
+        cloud, dropped = _finished(cloud, options, seen_from)
         left_out.update(dropped)
         target = out.with_name(f"{path.stem}{out.suffix}")
         wrote = write_clouds(target, [cloud], organised=options.organised)
@@ -70,7 +72,7 @@ def finish_clouds(summary: AssembleSummary, out: Path, options: AssembleOptions,
     )
 
 
-def _finished(cloud: Cloud, options: AssembleOptions, where: SeenFrom) -> tuple[Cloud, dict[str, int]]:
+def _finished(cloud: Cloud, options: AssembleOptions, seen_from: SeenFrom) -> tuple[Cloud, dict[str, int]]:
     dropped: dict[str, int] = {}
     if options.outliers is not None:
         stray = filters.outliers(cloud.points_m, options.outliers)
@@ -83,6 +85,6 @@ def _finished(cloud: Cloud, options: AssembleOptions, where: SeenFrom) -> tuple[
     if options.normals:
         there = cloud.valid
         normal = np.full(cloud.points_m.shape, np.nan, np.float32)
-        normal[there] = filters.normals(cloud.points_m[there], where(cloud)[there])
+        normal[there] = filters.normals(cloud.points_m[there], seen_from(cloud)[there])
         cloud = replace(cloud, columns={**cloud.columns, **dict(zip(("nx", "ny", "nz"), normal.T.copy(), strict=True))})
     return cloud, {reason: count for reason, count in dropped.items() if count}

@@ -62,7 +62,7 @@ def witness(
     rng = np.random.default_rng(0)
     halves = [np.flatnonzero(side == k) for k in (0, 1)]
     sample = np.concatenate([rng.choice(half, min(half.size, _SAMPLE), replace=False) for half in halves])
-    few, one = beams.select(sample), side[sample] == 0
+    few, first = beams.select(sample), side[sample] == 0
 
     # The same weights for all parameters, so that only the cloud changes
     weight = _areas(mount, estimated, few)
@@ -72,7 +72,7 @@ def witness(
     def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
         origin, direction = beam_rays(mount, x, late)
-        return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, one, width_m)
+        return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, first, width_m)
 
     before, after = crispness(start), crispness(estimated)
     around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, estimated, k, after.entropy) for k in MOUNT}
@@ -107,15 +107,15 @@ class _Crispness:
 
 
 def _between(
-    point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], one: Bool[ndarray, " n"], width_m: float
+    point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], first: Bool[ndarray, " n"], width_m: float
 ) -> _Crispness:
-    weight = weight / np.where(one, weight[one].sum(), weight[~one].sum())
-    trees = [cKDTree(point[half]) for half in (one, ~one)]
+    weight = weight / np.where(first, weight[first].sum(), weight[~first].sum())
+    trees = [cKDTree(point[half]) for half in (first, ~first)]
     pairs = trees[0].sparse_distance_matrix(trees[1], _REACH * width_m, output_type="ndarray")
     i, j = pairs["i"], pairs["j"]
     near = np.exp(-(pairs["v"] ** 2) / (4 * width_m**2))
-    share = np.empty(len(one))
-    share[one] = np.bincount(i, near * weight[~one][j], trees[0].n)
-    share[~one] = np.bincount(j, near * weight[one][i], trees[1].n)
-    total = max(float(share[one] @ weight[one]), 1e-300)
+    share = np.empty(len(first))
+    share[first] = np.bincount(i, near * weight[~first][j], trees[0].n)
+    share[~first] = np.bincount(j, near * weight[first][i], trees[1].n)
+    total = max(float(share[first] @ weight[first]), 1e-300)
     return _Crispness(-float(np.log(total)), weight, share / total)

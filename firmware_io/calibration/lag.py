@@ -61,7 +61,7 @@ def find_lag(recording: Recording) -> Lag:
     still_s = float(np.median(np.diff(recording.stamp_ns))) / 2e9 if recording.at_rest else 0.0
     sd_s = float(np.hypot(curve.sd_s, still_s))
     if sd_s > _VAGUE_S or curve.best_s in (_LAGS_S[0], _LAGS_S[-1]):
-        raise RecordingError(f"{recording.path}: the scene does not tell how late the angles are")
+        raise RecordingError(f"{recording.path}: the lag of the angles cannot be measured in this scene")
     log = recording.joint_log
     first_ns, _, last_ns = _there_and_back(log)
     positions = log.position_rad[(log.time_ns >= first_ns) & (log.time_ns <= last_ns)]
@@ -93,7 +93,7 @@ def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Float64[ndarray
         back = (logged_ns > turn_ns) & (logged_ns <= last_ns)
         capped_m[k], compared[k] = _differences(joint_rad, range_m.astype(float), there, back)
     if not compared.any(axis=1).all():
-        raise RecordingError("the way there and the way back see no angle in common, so the lag cannot be measured")
+        raise RecordingError("the turns there and back have no angle in common, so the lag cannot be measured")
     cost_m = capped_m.sum(axis=1) / compared.sum(axis=1)
     sd_s = float(np.hypot(_jackknife(lag_s, capped_m, compared), (lag_s[1] - lag_s[0]) / 7))
     return LagCurve(np.asarray(lag_s, float), cost_m, _minimum(lag_s, cost_m), sd_s)

@@ -84,9 +84,9 @@ def choose_observable(
     if twice < _TWICE:
         raise RecordingError(
             f"too little is seen twice: {twice:.1%} of the flat surface is seen by both sides of the fan (needed: "
-            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg. Mounting errors then look like a scene of another "
-            "shape: record a full turn. A scanner that can only tilt shows them only where both ends of its fan see "
-            f"the same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches"
+            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg. Mounting errors then look like another shape of the "
+            "scene: record a full turn. A scanner that can only tilt shows them only if both ends of its fan see the "
+            f"same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches"
         )
     free = np.array(MOUNT)
     sd = _sd(reduced(normal, grouping, free, BUILDERS_BULGE_M), free)
@@ -105,7 +105,7 @@ def choose_observable(
                 free = tried
                 continue
             why = (
-                f"found together with the others, {PARAMETERS[worst].words} would be known to "
+                f"estimated together with the others, {PARAMETERS[worst].words} would be known to "
                 f"+-{_shown(worst, sd[worst])} only (limit {_shown(worst)})"
             )
             if group == model.BACKLASH and model.LAG[0] in free:
@@ -114,7 +114,7 @@ def choose_observable(
     share = _facing(tiles, grouping)[0]
     notes = []
     if share[0] < _ONE_LINE:
-        notes.append(f"{_geometry(tiles, grouping)}; what was found rests on the other surfaces alone")
+        notes.append(f"{_geometry(tiles, grouping)}; the result depends on the other surfaces alone")
     joined = tiles.count[grouping.used].sum() / tiles.count.sum()
     if joined < _JOINED:
         notes.append(f"only {joined:.0%} of the flat patches join surfaces: the true error may exceed the stated one")

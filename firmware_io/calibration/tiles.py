@@ -218,7 +218,7 @@ def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x:
     widest = np.degrees(_WINDOWS_RAD[0])
     raise RecordingError(
         f"fewer than {_FEWEST} windows of {widest:.0f} x {widest:.0f} deg hold {_LEAST} beams: the scan is too coarse, "
-        "or too short, to tell flat surfaces; turn the axis more slowly or scan longer"
+        "or too short, to find flat surfaces; turn the axis more slowly or scan longer"
     )
 
 

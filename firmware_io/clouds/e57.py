@@ -257,7 +257,7 @@ def _write_points(file: Any, points: Any, parts: Iterable[dict[str, Column]]) ->
             if writer is None:
                 buffers = libe57.VectorSourceDestBuffer()
                 for name, values in fields.items():
-                    # The bindings take int64 for int32, and libe57 refuses an infinity on its way to single
+                    # The bindings take int64 for int32, and libe57 refuses to convert an infinity to single
                     arrays[name] = np.empty(_AT_ONCE, np.float32 if values.dtype == np.float32 else np.float64)
                     buffers.append(libe57.SourceDestBuffer(file, name, arrays[name], _AT_ONCE, True, True))
                 writer = points.writer(buffers)

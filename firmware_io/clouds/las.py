@@ -110,7 +110,7 @@ def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[
         header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
     notes = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
     if known.head.placed:
-        notes.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
+        notes.append("LAS has no scan pose: the points are moved into the world, a Scanwright record keeps the pose")
     exact = "intensity" in names and "intensity" not in known.integers
     if exact:
         notes.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")

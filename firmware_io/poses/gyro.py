@@ -121,12 +121,12 @@ def _fits(gyro_rad: Floats, pose_rad: Floats, gap_s: Floats) -> list[str]:
     missed_rad, turned_rad = _rms(left_rad), _rms(pose_rad)
     if missed_rad > _WORSE * turned_rad + _NOISE_RAD:
         raise RecordingError(
-            f"gyro: turns otherwise than the poses, from one to the next by {math.degrees(missed_rad):.2g} deg (rms), "
-            f"where the poses turn by {math.degrees(turned_rad):.2g}{_hint(gyro_rad, pose_rad)}"
+            f"gyro: differs from the turns between poses by {math.degrees(missed_rad):.2g} deg (rms), "
+            f"while the poses turn by {math.degrees(turned_rad):.2g}{_hint(gyro_rad, pose_rad)}"
         )
     return [
-        f"gyro: orientation between poses; bias {math.degrees(float(np.linalg.norm(bias_rad_s))):.2g} deg/s, beside it "
-        f"{math.degrees(missed_rad):.2g} deg (rms) off at the next pose, where the poses turn by "
+        f"gyro: orientation between poses; bias {math.degrees(float(np.linalg.norm(bias_rad_s))):.2g} deg/s, residual "
+        f"{math.degrees(missed_rad):.2g} deg (rms) at the next pose, while the poses turn by "
         f"{math.degrees(turned_rad):.2g}"
     ]
 

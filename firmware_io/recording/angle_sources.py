@@ -128,7 +128,7 @@ def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -
     else:
         yield (
             "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
-            "to 9 mm per metre of range, the way from command to motion comes on top"
+            "to 9 mm per metre of range, in addition to the delay from command to motion"
         )
 
 

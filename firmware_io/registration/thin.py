@@ -26,11 +26,7 @@ _LEVELS = 3  # voxels grow up to 2**3 times
 def thin(means: Floats, counts: NDArray[np.int64], spacing_m: float, step_rad: float) -> Float64[ndarray, "kept 3"]:
     """Return mean points of voxels, evenly spread over the surfaces that a scanner at the origin measured.
 
-    Args:
-        means: of the finest voxels, from `voxel_means`, like `counts`.
-        counts: number of points in each.
-        spacing_m: their edge.
-        step_rad: from `beam_step_rad`.
+    `means` and `counts` are those of the finest voxels, with an edge of `spacing_m`; `step_rad` is `beam_step_rad`.
     """
     gap_m = np.linalg.norm(means, axis=1) * line_gaps_rad(means, counts, step_rad)
     level = np.clip(np.ceil(np.log2(np.maximum(gap_m, spacing_m) / spacing_m)), 0, _LEVELS).astype(np.uint8)

@@ -20,7 +20,7 @@ _CLOCK_LEAST_S = 3.0  # three one-second buckets give a rate
 _CLOCK_PATIENCE_S = 10.0  # more does not help on a busy computer
 _AWAY_S = 10.0  # to plug it in again, and for its start
 _MOST_LOST, _LOST_WITHIN_S = 10, 600.0  # a loose plug or a weak supply
-_SERVO_UNKNOWN = "the servo has not answered that it stands: look, and cut its power if it turns"
+_SERVO_UNKNOWN = "the servo did not confirm that it stopped: check it, and cut its power if it turns"
 
 
 class LidarScans:

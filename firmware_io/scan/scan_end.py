@@ -11,7 +11,7 @@ from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 Outcome = Literal["done", "lossy", "stopped", "failed", "unsafe"]
 
-_SERVO_UNKNOWN = "state of the servo unknown: look, and cut its power if it turns"
+_SERVO_UNKNOWN = "state of the servo unknown: check it, and cut its power if it turns"
 _HEADINGS: dict[Outcome, str] = {
     "done": "The scan is done.",
     "lossy": "The scan is done, but data were lost.",
@@ -38,7 +38,7 @@ LOST = ScanEnd(
     "unsafe",
     (
         "The connection to the scan program is lost, and the state of the devices is unknown.",
-        "The servo may turn and the laser may be on: look, and cut their power.",
+        "The servo may turn and the laser may be on: check them, and cut their power.",
     ),
 )
 """The end of a scan whose program died."""

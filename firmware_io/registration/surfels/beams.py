@@ -30,22 +30,15 @@ _OFF, _BESIDE, _ON = 0, 1, 2  # a beam ends in the cube but off the plane; not o
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Beams:
-    """The measurements of one scan position.
-
-    Attributes:
-        joint_rad: angle of the axis at each beam; empty if the calibration is taken as exact.
-        frame: columns x and y of the rotation frame in that of the cloud, at joint 0.
-        covariance: of the laser's tilt about them [rad] and its offset along them [m]; None if the calibration is
-            taken as exact.
-    """
+    """The measurements of one scan position; `joint_rad` and `covariance` only if the calibration is uncertain."""
 
     points_m: Float32[ndarray, "n 3"]  # in the frame of the cloud
     voxels_m: Float64[ndarray, "k 3"]  # means of small voxels
     counts: Int64[ndarray, " k"]  # points of each voxel
     eye_m: Float64[ndarray, " 3"]  # origin of the beams
-    joint_rad: Float32[ndarray, " joints"]
-    frame: Float64[ndarray, "3 2"]
-    covariance: Float64[ndarray, "4 4"] | None
+    joint_rad: Float32[ndarray, " joints"]  # angle of the axis at each beam, or empty
+    frame: Float64[ndarray, "3 2"]  # columns x and y of the rotation frame in that of the cloud, at joint 0
+    covariance: Float64[ndarray, "4 4"] | None  # of the laser's tilt about x, y [rad] and offset along them [m]
 
 
 class BeamRun(NamedTuple):

@@ -71,14 +71,10 @@ def find_cells(
     eyes_m: Float64[ndarray, "2 3"],
     spacing_m: float,
 ) -> Cells:
-    """Return the largest cubes of the octree with all points on one plane, measured from the same side by both.
+    """Return the largest cubes of the octree with all points on one plane, measured from the same side by both clouds.
 
-    Args:
-        points_m: means of voxels of both clouds in one frame.
-        counts: points in each voxel.
-        of_first: whether the voxels are those of the first cloud.
-        eyes_m: the optical centres of both.
-        spacing_m: edge of the voxels.
+    The points are means of voxels of both clouds in one frame, with the points in each counted and those of the first
+    cloud marked; `eyes_m` are the optical centres.
     """
     results = []
     reach_m = _REACH * spacing_m

@@ -110,7 +110,7 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
         scans.next()
     assert servo.held >= 1
     assert ("the servo has answered that it holds" in said[0]) == hears
-    assert ("the servo has not answered that it stands: look, and cut its power" in said[0]) != hears
+    assert ("the servo did not confirm that it stopped: check it, and cut its power" in said[0]) != hears
 
 
 def test_a_servo_that_does_not_answer_at_all_is_not_waited_for_for_ever(monkeypatch):
@@ -136,7 +136,7 @@ def test_ctrl_c_waits_for_the_thread_that_could_turn_the_servo_again():
     ("interrupt", "says"),
     [
         (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo was not started"),
-        (None, "state of the servo unknown: look, and cut its power if it turns"),
+        (None, "state of the servo unknown: check it, and cut its power if it turns"),
     ],
 )
 def test_ctrl_c_before_the_servo_is_opened_claims_nothing_of_it(tmp_path, command, monkeypatch, interrupt, says):
