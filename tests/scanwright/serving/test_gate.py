@@ -2,8 +2,8 @@
 
 import http.client
 import random
-import socket
 import time
+from socket import IPPROTO_TCP
 
 import msgspec
 import pytest
@@ -218,7 +218,7 @@ def test_only_so_many_visitors_get_in(page):
 
 def test_small_messages_are_sent_at_once():
     with bound(0) as listening:
-        assert listening.proto == socket.IPPROTO_TCP  # by which asyncio decides
+        assert listening.proto == IPPROTO_TCP  # by which asyncio decides
 
 
 def test_a_port_that_is_taken_is_said_in_one_line(page):
