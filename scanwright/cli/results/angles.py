@@ -148,7 +148,8 @@ class Optimised:
         evaluated: number of values of J that it computed.
         seconds: run time of the search.
         left_out: skipped work, with the reason.
-        expected_error: error of a point to expect.
+        expected_error: error of a point to expect at 3 m.
+        expected_error_far: the same at 5 m; null if the lidar does not reach it.
         wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
         planes: points on ground, walls and ceilings of the task.
         hidden_regions: regions that the robot hides in part.
@@ -170,6 +171,7 @@ class Optimised:
     seconds: float
     left_out: list[LeftOut]
     expected_error: ExpectedError
+    expected_error_far: ExpectedError | None
     wide_gap: Finding | None
     planes: list[PlaneFigures]
     hidden_regions: list[Finding]
@@ -218,7 +220,8 @@ class Evaluated:
         crossing_deg: mean angle at which lines cross there; null if there is no double coverage.
         half_turn_misses: share that half a turn misses of what a full turn sees; null for a sweep.
         J_rises_1_deg_off: angle -> rise of J if it is 1 deg off.
-        expected_error: error of a point to expect.
+        expected_error: error of a point to expect at 3 m.
+        expected_error_far: the same at 5 m; null if the lidar does not reach it.
         wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
         planes: points on ground, walls and ceilings of the task.
         hidden_regions: regions that the robot hides in part.
@@ -252,6 +255,7 @@ class Evaluated:
     half_turn_misses: float | None
     J_rises_1_deg_off: dict[str, float]
     expected_error: ExpectedError
+    expected_error_far: ExpectedError | None
     wide_gap: Finding | None
     planes: list[PlaneFigures]
     hidden_regions: list[Finding]
