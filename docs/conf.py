@@ -36,6 +36,16 @@ html_theme = "furo"
 html_title = f"Scanwright {__version__}"
 html_show_sphinx = False
 default_role = "py:obj"
+ACCESS = """addEventListener("DOMContentLoaded", () => {
+  const set = (where, name, value) =>
+    document.querySelectorAll(where).forEach((each) => each.setAttribute(name, value));
+  set("pre", "tabindex", "0");
+  set(".caption[role=heading]", "aria-level", "2");
+  set(".sidebar-drawer", "aria-label", "All pages");
+  set(".toc-drawer", "aria-label", "This page");
+  set(".content-icon-container", "role", "navigation");
+});"""
+"""What the theme leaves out: scrolling by keyboard, levels of headings, names of landmarks."""
 
 myst_heading_anchors = 3
 myst_enable_extensions = ["deflist"]
@@ -161,6 +171,7 @@ def setup(app: Any) -> None:
     """Called by Sphinx."""
     for heavy in ("cadquery", "matplotlib.figure", "numba", "scipy.spatial"):
         import_module(heavy)  # once: Sphinx forks its readers
+    app.add_js_file(None, body=ACCESS)
     app.connect("source-read", name_packages)
     app.connect("builder-inited", describe_commands)
     app.connect("builder-inited", describe_checks)

@@ -267,6 +267,16 @@ def parts_of(once):
     return lambda scanner: once(f"parts {scanner}", lambda _: make_parts(scanner))
 
 
+@pytest.fixture(scope="session")
+def optimum_ahead(once):
+    """The optimum of the shipped task `ground_ahead`: for reading only."""
+    from scanwright.design.progress import no_progress
+    from scanwright.design.search.optimum import find_optimum
+    from scanwright.design.task.task import load_task
+
+    return once("optimum of ground_ahead", lambda _: find_optimum(load_task(Path("ground_ahead")), no_progress))
+
+
 TILTED = """
 name = "tilted"
 sensor = "UTM-30LX"

@@ -36,6 +36,11 @@ def entries_of(checks: Iterable[Finding]) -> list[dict[str, Any]]:
     ]
 
 
+def add_check(path: Path, check: Finding) -> None:
+    """Add a check of the scanner on its robot to the checks of its parts; raises as `read_checks`."""
+    path.write_text(checks_text((*read_checks(path), check)), encoding="utf-8")
+
+
 def read_checks(path: Path) -> tuple[Finding, ...]:
     """Return the checks of a `checks.json`; an unknown severity counts as an error.
 

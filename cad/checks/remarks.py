@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.layout.deck import USUAL, Deck
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE
@@ -22,6 +23,8 @@ def remarks_of(scanner: Scanner, assembly: Assembly) -> tuple[Finding, ...]:
     ]
     if layout.deck.flat:
         remarks.append(_screwed_to_deck(scanner, layout.drive.mounted))
+    elif scanner.deck is None:
+        remarks.append(_usual_holes(layout.deck))
     return tuple(remarks)
 
 
@@ -44,6 +47,13 @@ def without_traps(printer: Printer, joints: Sequence[Joint]) -> list[Finding]:
 def _turn_from_metal(part: str, why: str) -> Finding:
     hint = "have it turned from aluminium or steel after its STEP file"
     return Finding("turn_from_metal", "note", part, f"{part}: {why}", hint=hint)
+
+
+def _usual_holes(deck: Deck) -> Finding:
+    places = ", ".join(f"({x:g}, {y:g})" for x, y in USUAL.holes())
+    message = f"{BASE_MOUNT}: the deck needs {deck.screw.name} holes at {places} mm"
+    hint = "if your robot has other holes, write them as [deck] in the task, and build again"
+    return Finding("usual_deck_holes", "note", BASE_MOUNT, message, hint=hint)
 
 
 def _screwed_to_deck(scanner: Scanner, mounted: Mounted) -> Finding:

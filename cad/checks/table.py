@@ -89,6 +89,7 @@ TABLE = (
     CheckRow("deflection", "constant bend by gravity", f"{NOISE}; error above 1 deg", "catalogue"),
     CheckRow("deflection_turning", "bend by gravity that changes over a turn", NOISE, "catalogue"),
     CheckRow("mount_lean", "lean of the mount", f"warning above {LEAN_DEG:g} deg", "chosen"),
+    CheckRow("deck_height", "optical centre above the deck", "10 mm off the height of the task", "chosen"),
     CheckRow(
         "natural_frequency",
         "first natural frequency of linkage, shaft, servo and mount; deck rigid, servo keeps its position",

@@ -98,8 +98,9 @@ def build_parts(
     meshes_of_parts: dict[str, TriMesh] = {}
     progress("engraving the labels")
     labels = labelled_parts(scanner, assembly, digest)
-    for name, solid in (assembly.made | labels.parts).items():
-        progress(f"meshing and writing {name}")
+    made = assembly.made | labels.parts
+    for number, (name, solid) in enumerate(made.items()):
+        progress(f"meshing and writing {name}", number / len(made))
         part = assembly.parts[name]
         mesh = labels.meshes[name] if name in labels.meshes else checked(assembly.mesh(name), solid, name)
         meshes_of_parts[name] = mesh

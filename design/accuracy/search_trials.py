@@ -57,11 +57,15 @@ def search_trials(loaded: LoadedTask, progress: Progress) -> Iterator[Trial]:
     variants = _variants(loaded.task.angles, steps)
     search(problems[0], loaded.task.angles.model_copy(update={"step_deg": STEPS_DEG[0]}))  # compiles
     J, seconds = np.empty((len(variants), TASKS)), np.empty((len(variants), TASKS))
+    done: dict[tuple[float, Effort, int], tuple[float, float]] = {}  # all choices contain the default search
     for i, variant in enumerate(variants):
         progress(f"{variant.choice}: {variant.setting}", i / len(variants))
         for k, problem in enumerate(problems):
-            result = search(problem, variant.ranges, effort=variant.effort)
-            J[i, k], seconds[i, k] = result.best[0].score.J, result.seconds
+            key = variant.ranges.step_deg, variant.effort, k
+            if key not in done:
+                result = search(problem, variant.ranges, effort=variant.effort)
+                done[key] = result.best[0].score.J, result.seconds
+            J[i, k], seconds[i, k] = done[key]
     regret = np.maximum(J - J.min(axis=0), LEAST_REGRET)
     for variant, lost, spent in zip(variants, regret, seconds, strict=True):
         yield Trial(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
 from pydantic import Field
@@ -70,3 +71,9 @@ class Servo(Product):
     def continuous_torque_nm(self) -> float:
         """Continuous torque: a fifth of the stall torque."""
         return self.stall_torque_nm / 5
+
+
+def most_backlash_deg(products: Iterable[Product]) -> float:
+    """Return the largest known full backlash [deg] of the servos among some products; 0 if none is known."""
+    servos = (product for product in products if isinstance(product, Servo))
+    return max((servo.backlash_deg for servo in servos if servo.backlash_deg is not None), default=0.0)

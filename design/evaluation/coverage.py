@@ -13,6 +13,7 @@ from scanwright.design.density.beams import blind_zones, polar_and_azimuth
 from scanwright.design.density.spin import mean_count
 from scanwright.design.density.sweep import mean_count_swept
 from scanwright.design.density.visible import free_lines, mean_count_free
+from scanwright.design.findings import Finding, Severity
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.holes import percent
 from scanwright.design.objective.problem import Problem
@@ -28,17 +29,25 @@ CIRCLES = 10_000
 TABLE = 3601  # polar angles
 UNSEEN = 1e-9  # mean beams in a ball that are rounding
 HIDDEN = 0.005  # masked share of a region that is not reported
+MOST_HIDDEN = 0.5  # masked share of a region above which the scanner misses its purpose
 
 
-def hidden_lines(loaded: LoadedTask) -> list[str]:
-    """Return one line with the share of each region that the masks hide, or none if all shares are below `HIDDEN`."""
-    shares = {
-        region.words() if isinstance(region, OnPlane) else f"weight.{i} ({region.shape})": hidden_share(loaded, region)
-        for i, region in enumerate(loaded.task.weight)
-        if region.value > 0 and loaded.task.mask
-    }
-    hidden = [f"{percent(share)} of {words}" for words, share in shares.items() if share > HIDDEN]
-    return [f"the robot hides {'; '.join(hidden)}"] if hidden else []
+def hidden_regions(loaded: LoadedTask) -> tuple[Finding, ...]:
+    """Return one finding for each region of which the masks hide more than `HIDDEN`: a warning above `MOST_HIDDEN`."""
+    if not loaded.task.mask:
+        return ()
+    findings = []
+    for i, region in enumerate(loaded.task.weight):
+        share = hidden_share(loaded, region) if region.value > 0 else 0.0
+        if share <= HIDDEN:
+            continue
+        words = region.words() if isinstance(region, OnPlane) else f"weight.{i} ({region.shape})"
+        message = f"the robot hides {percent(share)} of the directions to {words}"
+        most = share > MOST_HIDDEN
+        hint = "move the scanner to the robot's edge or higher up, or choose a region farther away" if most else ""
+        severity: Severity = "warning" if most else "note"
+        findings.append(Finding("hidden_region", severity, f"weight.{i}", message, share, MOST_HIDDEN, "1", hint))
+    return tuple(findings)
 
 
 def hidden_share(loaded: LoadedTask, region: Region) -> float:

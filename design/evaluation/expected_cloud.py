@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from scanwright.design.arrays import Setting
-from scanwright.design.evaluation.coverage import hidden_lines
+from scanwright.design.catalogue.servo import most_backlash_deg
+from scanwright.design.evaluation.coverage import hidden_regions
 from scanwright.design.evaluation.gaps import wide_gap
 from scanwright.design.evaluation.metres import AT_M, PlaneFigures, free_beams, on_planes, rounded
 from scanwright.design.findings import Finding, sentence
@@ -20,6 +21,7 @@ from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import weighted_samples
 from scanwright.design.task.task import LoadedTask
 
+FAR_M = 5.0  # the second range of the error
 DIRECTIONS = 5000  # of the region, for the mean distance from the axis
 
 
@@ -35,6 +37,7 @@ class ExpectedError:
         backlash_calibrated: whether `calibrate` can correct it: the servo turns both ways, without load by gravity.
         bending_mm: largest bending by gravity that changes over a turn; null without a build.
         total_mm: root of the sum of the squares of the known errors.
+        most_mm: the same with the largest backlash of the catalogue in place of an unknown one.
     """
 
     at_m: float
@@ -44,6 +47,7 @@ class ExpectedError:
     backlash_calibrated: bool
     bending_mm: float | None
     total_mm: float
+    most_mm: float
 
     def words(self) -> str:
         """Return the error and its parts as text."""
@@ -56,8 +60,13 @@ class ExpectedError:
         parts.append(f"encoder steps {_figure(self.encoder_mm)}")
         bending = "unknown" if self.bending_mm is None else _figure(self.bending_mm)
         parts.append(f"bending {bending}")
-        about = "at least" if self.backlash_mm is None else "about"
-        return f"expect {about} {rounded(self.total_mm)} mm at {self.at_m:g} m ({', '.join(parts)})"
+        return f"expect {self.short()} ({', '.join(parts)})"
+
+    def short(self) -> str:
+        """Return the error and its range."""
+        known = rounded(self.total_mm)
+        figure = f"{known} to {rounded(self.most_mm)}" if self.backlash_mm is None else f"about {known}"
+        return f"{figure} mm at {self.at_m:g} m"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,32 +74,37 @@ class ExpectedCloud:
     """The cloud of one full scan. Console, report and JSON print this record.
 
     Attributes:
-        error: of a point.
+        error: of a point at 3 m.
+        far: of a point at 5 m; None if the lidar does not reach it.
         gap: warning of a gap much wider than the spacing of the lines, if there is one.
         planes: points on ground, ceiling and walls of the task.
-        hidden: lines on the shares of the regions that the masks hide.
+        hidden: regions that the masks hide in part.
     """
 
     error: ExpectedError
+    far: ExpectedError | None
     gap: Finding | None
     planes: tuple[PlaneFigures, ...]
-    hidden: tuple[str, ...]
+    hidden: tuple[Finding, ...]
 
     def lines(self) -> list[str]:
         """Return the record as lines of text."""
+        far = "" if self.far is None else f", {self.far.short()}"
         return [
-            self.error.words(),
+            f"{self.error.words()}{far}",
             *(f"one full scan, {plane.words()}" for plane in self.planes),
             *([] if self.gap is None else [f"warning: {sentence(self.gap)}"]),
-            *self.hidden,
+            *(f"{each.severity}: {sentence(each)}" for each in self.hidden),
         ]
 
     def facts(self) -> dict[str, Any]:
         """Return names with units and values, for JSON."""
         return {
             "expected_error": asdict(self.error),
+            "expected_error_far": None if self.far is None else asdict(self.far),
             "wide_gap": None if self.gap is None else asdict(self.gap),
             "planes": [asdict(plane) for plane in self.planes],
+            "hidden_regions": [asdict(each) for each in self.hidden],
         }
 
 
@@ -105,11 +119,13 @@ def expected_cloud(
 
     `shadow` are the beams that its parts block and `checks` the checks of these parts, if it was built.
     """
+    far = expected_error(loaded, problem, angles_rad, checks, FAR_M)
     return ExpectedCloud(
         expected_error(loaded, problem, angles_rad, checks),
+        far if far.at_m == FAR_M else None,
         wide_gap(problem, angles_rad, free_beams(problem, angles_rad, shadow)),
         on_planes(loaded, problem, angles_rad, shadow),
-        tuple(hidden_lines(loaded)),
+        hidden_regions(loaded),
     )
 
 
@@ -137,6 +153,8 @@ def expected_error(
     bending_mm = None if bend is None or bend.value is None else 1000 * at_m * math.radians(bend.value)
     noise_mm = float(lidar.sigma_mm(1000 * at_m))
     encoder_mm = off_mm * math.radians(servo.position_step_deg) / math.sqrt(12)
+    most_mm = backlash_mm if backlash_mm is not None else off_mm * math.radians(most_backlash_deg(loaded.products) / 2)
+    others_mm = noise_mm, encoder_mm, bending_mm or 0.0
     return ExpectedError(
         at_m=at_m,
         range_noise_mm=noise_mm,
@@ -144,7 +162,8 @@ def expected_error(
         backlash_mm=backlash_mm,
         backlash_calibrated=loose and sweeps and not by_gravity,
         bending_mm=bending_mm,
-        total_mm=math.hypot(noise_mm, encoder_mm, backlash_mm or 0.0, bending_mm or 0.0),
+        total_mm=math.hypot(*others_mm, backlash_mm or 0.0),
+        most_mm=math.hypot(*others_mm, most_mm),
     )
 
 

@@ -197,7 +197,7 @@ def lowest_by_simplex(
         order = np.argsort(values, kind="stable")
         corners, values = corners[order], values[order]
         small = np.abs(corners[1:] - corners[0]).max(initial=0.0) <= run.size_deg  # one corner: no angle is free
-        if left < STEP or (small and not values[-1] - values[0] > run.spread):
+        if left < STEP or (small and not values[-1] > values[0] + run.spread):  # all of them can be inf
             return corners[0], float(values[0])
         middle = corners[:-1].mean(axis=0)
         away = middle - corners[-1]

@@ -70,6 +70,7 @@ class Chosen:
         built: number of mounts whose solids were made.
         refused: J without parts and the reason, for each rejected mount.
         open: families with a bound below the best J that were not built because of `MOST_BUILT`.
+        worse: families with a lower J without parts that are worse with them.
     """
 
     family: Family
@@ -79,6 +80,7 @@ class Chosen:
     built: int
     refused: tuple[tuple[float, str], ...]
     open: int
+    worse: int = 0
 
     def lines(self) -> list[str]:
         """Return the chosen mount, and the rejected ones with reasons."""
@@ -87,6 +89,8 @@ class Chosen:
             f"considered {self.bounded} mounts, built {self.built}, rejected {len(self.refused)}",
             *(f"{each.what} rejected: {each.why}" for each in self.left_out()),
         ]
+        if self.worse:
+            lines.append(f"{self.worse} more mounts with a lower J without parts lose more beams to their parts")
         if self.open:
             lines.append(f"{self.open} more mounts can be better with their parts, but were not built")
         return lines
@@ -120,6 +124,7 @@ def choose_with_parts(
     lowest: tuple[bool, int, float] | None = None  # rank of the best one
     avoid, simple = ranges.holes == "avoid", ranges.prefer == "simple"
     refused: list[tuple[float, str]] = []
+    considered: list[float] = []
     bounded = built = 0
     queue = families if simple else sorted(families, key=lambda family: family.score.J)
     for place, family in enumerate(queue):
@@ -130,6 +135,7 @@ def choose_with_parts(
             left = sum(other.score.J < best.family.score.J for other in queue[place:])
             best = replace(best, open=left)
             break
+        considered.append(family.score.J)
         bounds = []
         for angles_deg in equivalents(problem, family.angles_deg, ranges):
             if angles_deg in failed:
@@ -166,7 +172,9 @@ def choose_with_parts(
                 best = Chosen(chosen, family.score, shadow, 0, 0, (), 0)
     if best is None:
         raise BuildError(f"none of the {len(families)} best families can be built: {refused[0][1]}")
-    return replace(best, bounded=bounded, built=built, refused=tuple(refused))
+    rejected = {J for J, _ in refused}
+    worse = sum(J < best.bare.J and J not in rejected for J in considered)
+    return replace(best, bounded=bounded, built=built, refused=tuple(refused), worse=worse)
 
 
 def score_with(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion) -> Score:

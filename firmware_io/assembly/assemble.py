@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
 from statistics import median_high
@@ -35,12 +35,13 @@ from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
 from scanwright.firmware_io.clouds.ply import ply_writer
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
-from scanwright.firmware_io.samples import Block, straight
+from scanwright.firmware_io.samples import Block, Scan, straight
 
 _PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
 _LONGEST_LAG_S = 3600.0  # an hour: two clocks of the same day
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
 _LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
+_FIRST_SCANS = 10  # of which the widest is compared with the sensor
 _STEP_ERROR = 0.02  # of a whole number of the sensor's steps: clusters are told as such, rounded
 _FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
 
@@ -220,12 +221,17 @@ def _left_out(counts: Counter[int]) -> dict[str, int]:
     return {reason.name.lower(): counts[reason] for reason in Verdict if reason and counts[reason]}
 
 
+def _extent_rad(scan: Scan) -> float:
+    return float(np.ptp(scan.bearing_rad)) if scan.bearing_rad.size else 0.0
+
+
 def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
     """Scans that the sensor of the angle set cannot have made: the cloud would be as whole, and bent."""
     named = load_catalogue().products.get(sensor)
     if not isinstance(named, Lidar):
         return
-    scan = next(iter(source.scans()))
+    # a scan can be incomplete: packets are lost
+    scan = max(islice(source.scans(), _FIRST_SCANS), key=_extent_rad)
     own_deg, scan_deg = np.degrees(named.bearings_rad()), np.degrees(np.sort(scan.bearing_rad))
     if scan_deg.size < 2:
         return
@@ -238,9 +244,9 @@ def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
         other = beyond or abs(steps - max(round(steps), 1)) > _STEP_ERROR * steps
     if other:
         yield (
-            f"warning: its beams go from {scan_deg[0]:.4g} to {scan_deg[-1]:.4g} deg, {grid_deg:.3g} deg apart, "
-            f"those of {sensor} from {own_deg[0]:.4g} to {own_deg[-1]:.4g} deg, {step_deg:.3g} deg apart: are these "
-            "the angles of another scanner?"
+            f"warning: the beams of the recording go from {scan_deg[0]:.4g} to {scan_deg[-1]:.4g} deg, "
+            f"{grid_deg:.3g} deg apart, those of {sensor} from {own_deg[0]:.4g} to {own_deg[-1]:.4g} deg, "
+            f"{step_deg:.3g} deg apart: use the angle set of the scanner that made it"
         )
 
 

@@ -23,7 +23,7 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Floats, Rotation
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.servo import Servo, most_backlash_deg
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.axis_curve import axis_curve
 from scanwright.firmware_io.assembly.beam_outcome import Verdict, beam_verdicts
@@ -173,10 +173,11 @@ def start_vector(angles: AngleSet) -> Float64[ndarray, " parameters"]:
 
 
 def backlash_rad(servo: str) -> float:
-    """Full play of the gear of a servo; the most of any in the catalogue where that does not tell it."""
-    servos = [product for product in load_catalogue() if isinstance(product, Servo)]
-    known = {product.name: product.backlash_deg for product in servos if product.backlash_deg is not None}
-    return float(np.radians(known.get(servo, max(known.values()))))
+    """Return the full backlash of a servo; the largest of the catalogue if its own is unknown."""
+    products = load_catalogue()
+    known = next((each for each in products if isinstance(each, Servo) and each.name == servo), None)
+    own_deg = None if known is None else known.backlash_deg
+    return float(np.radians(most_backlash_deg(products) if own_deg is None else own_deg))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -154,6 +154,7 @@ def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedB
         causes = [
             "a person walked through the scene",
             "an object was moved",
+            "times of scans or angles were wrong",
             *["the scanner was moved between recordings (one_place excludes that)"] * joined,
         ]
         warnings.append(

@@ -11,7 +11,7 @@ import dataclasses
 import math
 import re
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,6 +110,12 @@ def open_bag(path: Path, *more: Path) -> Iterator[Bag]:
         yield Bag(path, reader)
     finally:
         reader.close()
+
+
+def topics_in(paths: Sequence[Path]) -> str:
+    """Return the topics of a bag with their types, in words; raises as `open_bag`."""
+    with open_bag(*paths) as bag:
+        return ", ".join(f"{topic} ({kind})" for topic, kind in sorted(bag.topics.items())) or "no topic"
 
 
 def _bag_file(path: Path) -> Path:

@@ -19,7 +19,6 @@ import numpy as np
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import DeviceError
-from scanwright.design.findings import sentence
 from scanwright.design.motion import Motion, Spin, StopAndGo
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.lidar.families import open_lidar
@@ -192,7 +191,7 @@ class _Run:
             self._begin_turns()
             return
         for finding in self._checks.scan(scan, time.monotonic_ns()):
-            self._reporter.warn(sentence(finding))
+            self._reporter.warn(finding.message)  # its hints are options of `import`
         if self.done < self.wanted:
             self.waiting.append(scan)
         self._write_complete()
@@ -208,7 +207,7 @@ class _Run:
     def summary(self) -> ScanSummary:
         """Check the last scans and return the summary; DeviceError without a scan."""
         for finding in self._checks.check():
-            self._reporter.warn(sentence(finding))
+            self._reporter.warn(finding.message)  # its hints are options of `import`
         if not self._recorded:
             raise DeviceError("not one scan was recorded: the axis did not stand still at a stop; make dwell_s longer")
         lidar = self._scans.lidar

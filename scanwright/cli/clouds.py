@@ -13,6 +13,7 @@ from scanwright.cli.arguments import Angles, AsJson
 from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
+from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, read_time_increment
 
@@ -25,12 +26,16 @@ Organised = Annotated[bool, Option("--organised", help="Keep one row per beam; N
 @record_options(Corrections, "time_increment")
 def import_(
     bag: Annotated[list[Path], Argument(metavar="BAG", help="ROS 1 or ROS 2 bag, or all parts of a split one.")],
-    scan: Annotated[str, Option(metavar="TOPIC[:FIELD]", help="LaserScan or MultiEchoLaserScan.")],
-    angle: Annotated[
-        str, Option(metavar="TOPIC[:FIELD]", help="Joint angle; or TOPIC:JOINT, /tf:PARENT:CHILD, FILE.csv[:COLUMN].")
-    ],
-    out: Annotated[Path, Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")],
     options: Corrections,
+    scan: Annotated[
+        str | None,
+        Option(metavar="TOPIC[:FIELD]", help="LaserScan or MultiEchoLaserScan; omit it to list the topics."),
+    ] = None,
+    angle: Annotated[
+        str | None,
+        Option(metavar="TOPIC[:FIELD]", help="Joint angle; or TOPIC:JOINT, /tf:PARENT:CHILD, FILE.csv[:COLUMN]."),
+    ] = None,
+    out: Annotated[Path | None, Option("--out", "-o", metavar="FILE.mcap", help="Recording to write.")] = None,
     angle_unit: Annotated[
         str | None, Option(metavar="UNIT", help="deg, rad or 4096/turn; not for a transform or quaternion.")
     ] = None,
@@ -47,7 +52,12 @@ def import_(
     that costs at 5 m, and the option that corrects it.
     """
     from scanwright import api
+    from scanwright.firmware_io.recording.bags import topics_in
 
+    if scan is None or angle is None or out is None:
+        needed = {"--scan": scan, "--angle": angle, "--out": out}
+        missing = ", ".join(option for option, value in needed.items() if value is None)
+        raise RecordingError(f"missing {missing}; {bag[0]} has {topics_in(bag)}")
     if time_increment is not None:
         options = replace(options, time_increment=read_time_increment(time_increment))
     summary = api.import_bag(

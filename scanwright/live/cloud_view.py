@@ -126,7 +126,7 @@ class CloudView:
                 self.forgotten += len(oldest.points_m)
                 oldest.handle.remove()
         left = f"; the view dropped the oldest {self.forgotten:,}" if self.forgotten else ""
-        left += f"; it dropped {growth.lost:,} scans, the recording none" if growth.lost else ""
+        left += f"; the view dropped {growth.lost:,} scans, the recording none" if growth.lost else ""
         self.facts.content = note_html(f"{self.points:,} points{self._progress()}{left}")
         for line in growth.lines:
             self.tell(line)

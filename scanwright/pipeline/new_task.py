@@ -20,7 +20,8 @@ from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import scanner_of
 from scanwright.design.task.shapes import LEAST_M, MOST_M, MeshRegion
-from scanwright.design.task.task import load_task
+from scanwright.design.task.task import LoadedTask, load_task
+from scanwright.pipeline.deck_height import deck_height
 from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.seen_regions import density_lines, known_regions, parse_region, region_lines, require_positive
 
@@ -44,6 +45,14 @@ ANGLES = r"""
 #
 # A pair [from, to] is searched, one value fixes the angle.
 """
+
+DECK = (
+    "",
+    "# [deck]  # holes of your robot for the mount, about the origin of the world; without it these",
+    '# shape = "rectangle"',
+    "# size_mm = [80, 80]  # between their centres, along x and y",
+    '# screw = "M4"',
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +120,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         *density_lines(things),
         *(line for word, numbers in regions for line in region_lines(word, numbers, answers.height_m)),
         *_mask(answers, path.parent),
+        *DECK,
     ]
     return "\n".join(blocks) + "\n"
 
@@ -249,6 +259,22 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
     ]
 
 
+def _too_low(loaded: LoadedTask) -> list[str]:
+    """Return a warning if the scanner of a task is lower over its robot than it can be built with its axis upright."""
+    task = loaded.task
+    angles = AngleSet(
+        task=task.name, angles_deg=UPRIGHT, sensor=task.sensor, servo=task.servo, slip_ring=task.slip_ring
+    )
+    deck = placement_of(loaded.scanner(angles)).deck
+    height = deck_height(loaded, angles.model_copy(update={"t_world_rot_mm": deck.t_world_rot}))
+    if height.severity != "warning" or height.limit is None or height.value is None or height.limit > height.value:
+        return []
+    return [
+        f"the scanner is {height.limit:.0f} mm above the robot, and {height.value:.0f} mm or more are needed: use a "
+        f"height_m that is {(height.value - height.limit) / 1000:.2g} m larger"
+    ]
+
+
 def check_answers(answers: Answers, products: Catalogue) -> None:
     """Reject answers that make no valid task, before a file is written; mesh paths are relative to the working folder.
 
@@ -264,7 +290,8 @@ def write_task_file(path: Path, text: str) -> list[str]:
     Raises:
         TaskError: the file exists or cannot be written, or an answer makes no task; then there is no file.
     """
-    warnings = load_task(tomllib.loads(text), path.parent).warnings()
+    loaded = load_task(tomllib.loads(text), path.parent)
+    warnings = [*loaded.warnings(), *_too_low(loaded)]
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)

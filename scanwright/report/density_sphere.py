@@ -5,16 +5,17 @@ A map is unrolled: theta from up to down, phi from -180 to 180 deg, so that its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
-from scanwright.design.evaluation.coverage import mean_density_at
+from scanwright.design.evaluation.coverage import UNSEEN, mean_density_at
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.search.mounts.reference import TunedMount
@@ -24,6 +25,7 @@ from scanwright.report.build_files import png_uri
 from scanwright.report.colours import Bands, bands_to, ramp
 
 STEP_DEG = 0.5  # of a cell: two pixels of the ball on a wide page
+SMOOTH_CELLS = 1.5  # standard deviation, less than the ball: else an edge of a band follows single scan lines
 DENSEST = 0.995  # of the sphere is not denser than the highest edge or twice of it: the rest lies about the axis
 # the palette: shades of the map, then what is no shade
 SHADES = 250
@@ -114,17 +116,18 @@ def _directions() -> tuple[Array, tuple[int, int]]:
 
 
 def _drawn(densities: dict[str, Array], bands: Bands, weight: Array, masked: NDArray[np.bool_]) -> list[SphereMap]:
-    maps = {name: density.reshape(weight.shape) for name, density in densities.items()}
     return [
-        SphereMap(f"density of {name}", _png(_framed(_shades(density, bands, density < 1e-9), weight, masked)))
-        for name, density in maps.items()
+        SphereMap(f"density of {name}", _png(_framed(_shades(density.reshape(weight.shape), bands), weight, masked)))
+        for name, density in densities.items()
     ]
 
 
-def _shades(values: Array, scale: Callable[[Array], ArrayLike], nothing: NDArray[np.bool_]) -> Indices:
-    """Return palette entries of values, the brightest shade for the highest."""
-    shade = (SHADES - 1) * np.asarray(scale(values))
-    return np.where(nothing, NOTHING, shade).astype(np.uint8)
+def _shades(density: Array, bands: Bands) -> Indices:
+    """Return palette entries of densities, smoothed among the directions that are seen."""
+    seen = density > UNSEEN
+    total, share = (gaussian_filter(each, SMOOTH_CELLS, mode=("nearest", "wrap")) for each in (density, seen * 1.0))
+    shade = (SHADES - 1) * bands(total / np.maximum(share, UNSEEN))
+    return np.where(seen, shade, NOTHING).astype(np.uint8)
 
 
 def _framed(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> Indices:

@@ -124,18 +124,22 @@ def _sees(answer: BuildAnswer) -> Card:
     lines = f"Scan lines at most {own.line_gap_deg:.2f} deg apart, {rounded(gap_mm)} mm at {GAP_M:g} m."
     unseen = own.blind_weight > NO_BLIND_WEIGHT
     headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
-    if cloud.hidden:
+    lost = [each.message for each in cloud.hidden if each.severity == "warning"]
+    if lost:
+        headline = _capital(lost[0])
+    elif cloud.hidden:
         headline += ", except behind the robot"
-    warned = [] if cloud.gap is None else [cloud.gap.message]
-    if cloud.gap is not None and cloud.gap.value is not None:
-        headline += f", but with a gap of {cloud.gap.value:.1f} deg"
-    text = [f"{_capital(words)}." for words in (*warned, *cloud.hidden, *(plane.words() for plane in cloud.planes))]
+    warned = [each.message for each in cloud.hidden if each.message not in lost[:1]]
+    if cloud.gap is not None:
+        headline += ", but with a gap" if not lost else ""
+        warned, lines = [cloud.gap.message.partition(";")[0], *warned], ""
+    text = [f"{_capital(words)}." for words in (*warned, *(plane.words() for plane in cloud.planes))]
     if own.blind:
         text.append(f"{_capital(', '.join(words.partition(':')[0] for words in own.blind))}.")
     elif not cloud.planes:
         disc_cm = rounded(200 * DISC_M * np.tan(np.radians(answer.ball_deg)))
         text.append(f"At least {own.least:,} beams on a disc of {disc_cm} cm, {DISC_M:g} m away.")
-    return Card("What it sees", headline, " ".join([*text, lines]))
+    return Card("What it sees", headline, " ".join([*text, lines]).rstrip())
 
 
 def _gain(built: AsBuilt) -> Card:
@@ -152,10 +156,10 @@ def _gain(built: AsBuilt) -> Card:
 def _scan(angles: AngleSet, answer: BuildAnswer) -> Card:
     motion, blocked = angles.motion, answer.as_built.blocked
     beams = f"{answer.lines * answer.beams:,} beams"
-    hidden = "" if blocked is None else f" Parts block {percent(blocked)}."
+    hidden = f" Parts block {percent(blocked)}." if blocked else ""
     words = _capital(motion_in_words(motion))
     headline = beams if motion is None else f"{motion.duration_s:g} s, {beams}"
-    error = _capital(answer.cloud.error.words())
+    error = _capital(answer.cloud.error.words().partition(" (")[0])  # its parts are among the details
     return Card("One scan", headline, f"{error}. {words}: {answer.lines:,} lines of {answer.beams:,}.{hidden}")
 
 
@@ -163,8 +167,6 @@ def _make(parts: PartsList | None) -> Card:
     if parts is None or parts.total is None:
         return Card("To make it", "Price unknown", "Missing: bom.csv with a total.")
     text = f"{parts.made('printed')} to print, {parts.made('turned', 'sawn')} to have machined, {parts.screws} screws."
-    if tools := parts.group("tool"):
-        text += f" {count(len(tools.rows), 'tool')}, {tools.usd} of that."
     return Card("To make it", parts.usd, text)
 
 
@@ -178,6 +180,11 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
     if failed := [finding for finding in findings if finding.severity == "error"]:
         text = "Change the task until no check fails: each check states what to change."
         todo.append(ToDo(f"Fix {count(len(failed), 'failed check')}", text, ("#checks", "task.toml")))
+    for finding in findings:
+        if finding.code == "deck_height" and finding.severity == "warning":
+            todo.append(
+                ToDo("Correct the scanner's height in the task", f"{_capital(finding.message)}.", ("task.toml",))
+            )
     how = (
         "Copy the device's file next to your own task file: scanwright catalogue NAME -v prints its path. Change the "
         'values, write catalogue = ["COPY.toml"] at the top of your task file (not of the task.toml in this folder, '

@@ -208,7 +208,7 @@ const inflated = async (text) => {
     }
     gl.bindBuffer(gl.ARRAY_BUFFER, fan.buffer);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, fan.stopped);
-    element("fan-shown").textContent = `${count} of ${fan.beams} beams hidden`;
+    element("fan-shown").textContent = count ? `${count} of ${fan.beams} beams hidden` : "";
   };
   const use = (mode, model, colour) => {
     gl.uniform1i(uniform.mode, mode);

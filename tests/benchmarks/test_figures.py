@@ -4,7 +4,6 @@ import re
 
 import pytest
 
-import scanwright as sw
 from benchmarks.scanwright.printed.figures import FIGURES, pages, with_figures
 
 
@@ -22,8 +21,7 @@ def test_a_figure_that_differs_is_replaced_and_an_unknown_one_is_an_error():
         with_figures("<!-- figure: none -->3 s<!-- end -->")
 
 
-def test_figures_of_the_shipped_task_are_those_of_a_search():
-    optimum = sw.optimise("ground_ahead")
-    gains = {gain.mount.name.partition(",")[0].lower(): f"{gain.factor:.2f}" for gain in optimum.gains}
+def test_figures_of_the_shipped_task_are_those_of_a_search(optimum_ahead):
+    gains = {gain.mount.name.partition(",")[0].lower(): f"{gain.factor:.2f}" for gain in optimum_ahead.gains}
     assert gains == {name: FIGURES[f"gain_{name}"] for name in ("bonn", "upright", "rolling", "pitching")}
-    assert any(FIGURES["no_hole_cost"].replace(" ", "") in line for line in optimum.hole_lines())
+    assert any(FIGURES["no_hole_cost"].replace(" ", "") in line for line in optimum_ahead.hole_lines())

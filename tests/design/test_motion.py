@@ -87,7 +87,7 @@ SWEEPS = [((-180, 180), 7.3), ((-20, 150), 4.0), ((30, 30.2), 2.0), ((-90, 90), 
 @pytest.mark.parametrize("limits, period", samples(SWEEPS, SWEEPS[:3]))
 def test_a_sweep_counts_what_simulated_scans_hold(limits, period):
     lines = SweepLines(Sweep(limits_deg=limits, period_s=period, accel_deg_s2=400.0), 10.0)
-    setting, ball, phases = np.radians([20, -40, 60, 20]), np.radians(4), 400
+    setting, ball, phases = np.radians([20, -40, 60, 20]), np.radians(4), 200
     directions = spiral(60)
     counts = counts_over_phases(lines, setting, directions, ball, phases)
     in_rot = directions @ R_world_rot(*setting[:2])

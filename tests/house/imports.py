@@ -34,15 +34,15 @@ def modules(root=ROOT, floors=FLOORS):
 
 
 @functools.cache
-def trees(root=ROOT, floors=FLOORS):
+def trees(*where):
     """The syntax tree of every module, by its name."""
-    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules(root, floors).items()}
+    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules(*where).items()}
 
 
 @functools.cache
-def imports(root=ROOT, floors=FLOORS):
+def imports(*where):
     """All imports of all modules, of the house and of libraries; those of the house name the module, not the name."""
-    known = trees(root, floors)
+    known = trees(*where)
     return [one for name, tree in known.items() for one in _imports(name, tree, "module", known)]
 
 
@@ -58,8 +58,8 @@ def _imports(name, node, where, known):
     elif isinstance(node, ast.Import):
         for alias in node.names:
             yield Import(name, alias.name, where)
-    for child in ast.iter_child_nodes(node):
-        if not isinstance(child, ast.expr):  # most of all nodes, and none of them imports
+    for block in ("body", "orelse", "handlers", "finalbody", "cases"):  # all that can hold an import
+        for child in getattr(node, block, ()):
             yield from _imports(name, child, where, known)
 
 

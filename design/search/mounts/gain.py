@@ -98,13 +98,13 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     if best.same:
         return [f"the optimum is itself a simple mount: {best.mount.name}"]
     assert best.factor is not None
-    how = (
-        f"better ({1 / best.factor:.2f} times the beams, if its parts block none)"
-        if better
-        else f"as good within {AS_GOOD - 1:.0%}"
-    )
-    rest = f", but {_against(best)}" if _against(best) else ", and easier to build" if best.simpler else ""
-    return [f"{best.mount.name} {angles_words(best.mount.angles_deg)} is {how}{rest}"]
+    mount = f"{best.mount.name} {angles_words(best.mount.angles_deg)}"
+    against = _against(best)
+    if not better:
+        rest = f", but {against}" if against else ", and easier to build" if best.simpler else ""
+        return [f"{mount} is as good within {AS_GOOD - 1:.0%}{rest}"]
+    rest = f", but {against}" if against else ": fix its angles in the task to build it"
+    return [f"{mount} has {1 / best.factor:.2f} times the beams if its parts block none{rest}"]
 
 
 def _against(gain: Gain) -> str:

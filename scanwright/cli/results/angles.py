@@ -151,6 +151,7 @@ class Optimised:
         expected_error: error of a point to expect.
         wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
         planes: points on ground, walls and ceilings of the task.
+        hidden_regions: regions that the robot hides in part.
         warnings: limits of the task that can surprise.
     """
 
@@ -171,6 +172,7 @@ class Optimised:
     expected_error: ExpectedError
     wide_gap: Finding | None
     planes: list[PlaneFigures]
+    hidden_regions: list[Finding]
     warnings: list[str]
 
 
@@ -219,6 +221,7 @@ class Evaluated:
         expected_error: error of a point to expect.
         wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
         planes: points on ground, walls and ceilings of the task.
+        hidden_regions: regions that the robot hides in part.
         lever: offset of the optical centre that the figures are for; null if it is on the axis.
         empty_cap: largest cone without a beam, of a sweep.
         interlaced_period_s: period for which the lines of the next turn fall between those of this one.
@@ -251,6 +254,7 @@ class Evaluated:
     expected_error: ExpectedError
     wide_gap: Finding | None
     planes: list[PlaneFigures]
+    hidden_regions: list[Finding]
     lever: Lever | None = None
     empty_cap: BlindCone | None = None
     interlaced_period_s: float | None = None

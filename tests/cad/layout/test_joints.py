@@ -189,11 +189,11 @@ DAILY = (  # every way to hold something, and every part that takes a screw, onc
     "tilted, nuts",
     "tilted, inserts",
     "upright on the deck",
-    "a sub-plate in nuts",
     "small, without a ring",
     "printed throughout, inserts",
     "tilted, with a bearing",
-    "a belt on a tripod, nuts M5",
+    "a tripod",
+    "a belt",
 )
 
 

@@ -207,7 +207,7 @@ def test_an_ear_over_the_index_mark_carries_it():
 
 
 def test_both_halves_of_the_studio_together_name_it_once():
-    scanner = scanner_for(*SHIPPED[1])
+    scanner = scanner_at((0, 40, -20, -70), slip_ring=None, **SMALL)
     names = [body.name for turning in (True, False) for body in make_bodies(scanner, turning)]
     assert names.count("counterweight") == 1 and len(names) == len(set(names))
 

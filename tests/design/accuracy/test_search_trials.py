@@ -23,7 +23,7 @@ def test_what_is_spent_on_a_search_and_what_it_gains(tmp_path, monkeypatch):
     efforts = [(choice, field, label, values[field]) for choice, field, label, _ in search_trials.EFFORTS]
     monkeypatch.setattr(search_trials, "EFFORTS", efforts)
     loaded = load_task(Path("ground_ahead"))
-    coarse = loaded.task.angles.model_copy(update={"step_deg": 30.0})
+    coarse = loaded.task.angles.model_copy(update={"step_deg": 30.0, "alpha_rot_deg": 0.0})
     told = report_search(replace(loaded, task=loaded.task.model_copy(update={"angles": coarse})), tmp_path, no_progress)
     rows = rows_of(tmp_path / "search.csv")
     assert {row["setting"] for row in rows if row["chosen"] == "true"} == {"30 deg", "1 times", "2 rounds"}

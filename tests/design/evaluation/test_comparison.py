@@ -33,9 +33,7 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import homogeneity, log_density
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
-from scanwright.design.progress import no_progress
 from scanwright.design.search.mounts.reference import reference_mounts
-from scanwright.design.search.optimum import find_optimum
 from scanwright.design.search.search import search
 from scanwright.design.sphere.directions import sample_set, spiral
 from scanwright.design.task.task import load_task
@@ -199,9 +197,8 @@ def test_what_sees_nothing_is_blind_to_all_of_the_weight_and_no_more(ceiling, ro
     assert not [line for line in notes(loaded, rows) if "sees nothing" in line]
 
 
-def test_what_j_alone_would_take_is_told_without_a_table():
-    optimum = find_optimum(load_task(Path("ground_ahead")), no_progress)
-    (_, first, _), (_, alone, _) = optimum.hole_lines(), optimum.hole_lines(tabled=False)
+def test_what_j_alone_would_take_is_told_without_a_table(optimum_ahead):
+    (_, first, _), (_, alone, _) = optimum_ahead.hole_lines(), optimum_ahead.hole_lines(tabled=False)
     assert first.startswith("if blind spots were allowed, the last row would be best; it is blind ahead and ")
     assert re.search(r"allowed, \(-?[\d.]+, -5\d.*\) with J = -6\.12\d\d would be best", alone)
 

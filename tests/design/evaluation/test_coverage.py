@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.evaluation.coverage import coverage, hidden_lines, hidden_share
+from scanwright.design.evaluation.coverage import MOST_HIDDEN, coverage, hidden_regions, hidden_share
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.ball_search import scan_tree
 from scanwright.design.objective.named_objectives import log
@@ -127,7 +127,9 @@ def test_the_share_that_masks_hide_of_each_region_is_that_of_a_count(seed):
     expected = np.average(on_robot, weights=(x**2 + 1 + z**2) ** -1.5)
     shares = [hidden_share(loaded, region) for region in loaded.task.weight]
     assert shares == pytest.approx([0, expected, expected], abs=0.004) and expected > 0.02
-    (line,) = hidden_lines(loaded)
-    assert line.startswith("the robot hides ") and "to the left; " in line and line.endswith("to the right")
+    left, right = hidden_regions(loaded)
+    assert left.message.startswith("the robot hides ") and left.message.endswith(" to the left")
+    assert right.value == pytest.approx(expected, abs=0.004) and right.message.endswith(" to the right")
+    assert [each.severity for each in (left, right)] == ["warning" if expected > MOST_HIDDEN else "note"] * 2
     bare = LoadedTask(loaded.task.model_copy(update={"mask": ()}), Path(), loaded.products, ())
-    assert hidden_lines(bare) == []
+    assert hidden_regions(bare) == ()

@@ -98,11 +98,13 @@ def test_backlash_counts_if_the_servo_turns_both_ways_or_gravity_changes_the_fla
     assert ("until calibrated" in result.words()) == calibrated
 
 
-def test_an_unknown_backlash_is_named_and_the_total_is_at_least():
+def test_an_unknown_backlash_is_named_and_bounded_by_the_largest_known_one():
     assert task(servo="XL430-W250", motion=SWEEP).products.get("XL430-W250", Servo).backlash_deg is None
     result = expected(task(SWEEP, "XL430-W250", "LD19"), (0, 0, 0, 45))
     assert result.backlash_mm is None and result.bending_mm is None
-    assert result.words().startswith("expect at least 10 mm at 3 m (range noise 10, servo backlash unknown, ")
+    assert result.words().startswith("expect 10 to 22 mm at 3 m (range noise 10, servo backlash unknown, ")
+    known = expected(task(SWEEP, "STS3215", "LD19"), (0, 0, 0, 45))
+    assert result.most_mm == pytest.approx(known.total_mm, rel=0.01)  # STS3215 has the largest one
     near = replace(result, backlash_mm=0.0, backlash_calibrated=False)
     assert near.words().startswith("expect about 10 mm at 3 m (range noise 10, encoder steps ")
 

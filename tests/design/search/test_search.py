@@ -165,7 +165,7 @@ def test_all_is_covered_with_fewer_evaluations():
 
 def test_the_number_of_threads_changes_no_digit(monkeypatch):
     monkeypatch.setattr(families, "FAMILIES", 3)
-    problem, ranges = CASES["all four free, two seconds"]
+    problem, ranges = CASES["one angle fixed, one range short"]
     one, other = (found_with(cores, problem, ranges, monkeypatch) for cores in (1, 3))
     assert other.best == one.best and len(one.best) == 3
     np.testing.assert_array_equal(other.planes, one.planes)

@@ -100,7 +100,9 @@ def test_the_beams_of_another_sensor_are_told(tmp_path, sensor, first_deg, last_
     recording = write(tmp_path / "r.mcap", [scan], a_log(0.0, 1.0))
     angles = angle_set().model_copy(update={"sensor": sensor})
     said = [
-        line for line in assemble_recording(recording, angles, tmp_path / "o.ply").notes if "another scanner" in line
+        line
+        for line in assemble_recording(recording, angles, tmp_path / "o.ply").notes
+        if "the scanner that made it" in line
     ]
     assert len(said) == other
     assert all(sensor in line and f"from {first_deg} to {last_deg:.4g} deg" in line for line in said)

@@ -310,6 +310,15 @@ def test_an_angle_without_a_usable_value_is_refused(ros1, tmp_path):
         imported(ros1, tmp_path)
 
 
+def test_without_topics_the_command_names_those_of_the_bag(ros1, command, tmp_path):
+    slices(ros1)
+    ros1.finish()
+    code, out, (complaint,) = command("import", ros1.path, "--angle", "/a", "-o", tmp_path / "r.mcap")
+    assert (code, out) == (2, "")
+    assert complaint.startswith(f"error: missing --scan; {ros1.path} has ")
+    assert all(f"{topic} (" in complaint for topic in ("/slice", "/early"))
+
+
 def test_a_type_that_the_bag_does_not_define_is_told(tmp_path):
     with BagMaker(tmp_path, "sqlite3") as maker:
         slices(maker)

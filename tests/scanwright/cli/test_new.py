@@ -2,21 +2,26 @@
 
 import os
 import pty
+import re
 import select
 import shlex
 import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
+from scanwright.cad.layout.placement import placement_of
+from scanwright.design.angles import AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import TaskError
 from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
 from scanwright.design.task.task import load_task
-from scanwright.pipeline.new_task import ANGLES, Answers, task_text, write_task_file
+from scanwright.pipeline.deck_height import deck_height
+from scanwright.pipeline.new_task import ANGLES, UPRIGHT, Answers, task_text, write_task_file
 from scanwright.pipeline.robot_around import robot_around
 from scanwright.pipeline.seen_regions import SEEN
 
@@ -241,3 +246,27 @@ def test_a_scanner_hangs_only_below_a_part_of_the_robot_mesh(command, here, roof
     assert loaded.task.angles.alpha_rot_deg == ((-180, 180) if roof else (-90, 90))
     around = robot_around(loaded.task.mask, here)
     assert (around.below_m, around.above_m) == (pytest.approx(0.1), pytest.approx(0.49) if roof else float("inf"))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_scanner_lower_over_its_robot_than_it_can_be_built_is_told_before_the_build(command, here, seed):
+    """The height that the warning names is enough, and its deck is then where the task has it."""
+    rng = np.random.default_rng(seed)
+    lidar, servo = rng.choice(["LD19", "UST-10LX", "URG-04LX"]), rng.choice(["XL430-W250", "MX-64R"])
+    tall_m, over_m = round(rng.uniform(0.1, 1.0), 2), round(rng.uniform(0.01, 0.06), 3)
+    words = ["--lidar", lidar, "--servo", servo, "--see", "ground:1:3", "--robot", f"box:0.6:0.4:{tall_m}"]
+    code, _, (warning, _) = command("new", "low", *words, "--height-m", round(tall_m + over_m, 3))
+    assert code == 0 and warning.startswith("warning: the scanner is ")
+    larger_m = float(re.search(r"use a --height-m that is ([\d.]+) m larger", warning)[1])
+    code, _, complaints = command("new", "high", *words, "--height-m", round(tall_m + over_m + larger_m, 3))
+    assert code == 0 and len(complaints) == 1
+
+    loaded = load_task(here / "high.toml")
+    task = loaded.task
+    angles = AngleSet(task="high", angles_deg=UPRIGHT, sensor=task.sensor, servo=task.servo, slip_ring=task.slip_ring)
+    placed = angles.model_copy(update={"t_world_rot_mm": placement_of(loaded.scanner(angles)).deck.t_world_rot})
+    assert deck_height(loaded, placed).severity == "note"
+    for off_mm, change in ((40, "add 0.0"), (-40, "subtract 0.0")):
+        x, y, z = placed.t_world_rot_mm
+        off = deck_height(loaded, placed.model_copy(update={"t_world_rot_mm": (x, y, z + off_mm)}))
+        assert off.severity == "warning" and off.hint.startswith(change)

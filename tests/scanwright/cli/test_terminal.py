@@ -78,10 +78,10 @@ def test_a_bar_that_begins_late_estimates_from_there_on(screen):
     assert " 75% 0:00:20 writing" in screen.lines()[-1]
 
 
-def test_a_bar_begins_anew_with_other_work(screen):
+def test_a_bar_begins_anew_with_other_work_and_counts_no_time_before_any_work_is_done(screen):
     screen, clock = screen(), Clock()
     progress = ConsoleProgress(clock)
-    for fraction in (0.0, 1.0, 0.0, 0.5):
+    for fraction in (0.0, 1.0, 0.0, 0.0, 0.5):
         progress("scanning", fraction)
         clock.now_s += 10
     assert " 50% 0:00:10 scanning" in screen.lines()[-1]

@@ -1,6 +1,7 @@
 """The cloud while it grows: what is handed over, where its points lie, and that nobody waits for a viewer."""
 
 import io
+import itertools
 import os
 import re
 import threading
@@ -125,7 +126,7 @@ def test_the_view_states_its_progress_and_the_unit_of_its_colours():
         view = CloudView(server, "scan", np.zeros(3), 18.0)
         assert view.legend.content == ""
         view.add(CloudGrowth(points, np.zeros(101, np.float32), np.full(101, 22.5, np.float32), (), 2))
-        assert "101 points; full scan 2: 25% (4.5 of 18 s); it dropped 2 scans" in view.facts.content
+        assert "101 points; full scan 2: 25% (4.5 of 18 s); the view dropped 2 scans" in view.facts.content
         assert "0.0 m" in view.legend.content and "3.0 m" in view.legend.content
         view.by.value = "time"
         assert "22.5 s" in view.legend.content
@@ -256,28 +257,51 @@ def test_a_scan_that_ends_early_says_the_same_on_the_terminal_and_to_the_page(er
     assert (list(end.lines), end.outcome, closed) == (said, "unsafe", "closed")
 
 
-def test_in_a_browser_the_end_is_an_alert_that_stays_and_a_lost_program_is_one_too(browser):
-    red, amber = "rgb(165, 17, 17)", "rgb(255, 197, 61)"
+GREEN, AMBER, RED, GREY = "rgb(27, 94, 32)", "rgb(255, 197, 61)", "rgb(165, 17, 17)", "rgb(52, 58, 64)"
+BANNERS = {
+    "done": GREEN,
+    "lossy": AMBER,
+    "failed": RED,
+    "servo not stopped": RED,
+    "laser may be on": RED,
+    "stopped": GREY,
+}
+
+
+def test_in_a_browser_each_state_is_shown_and_keeps_nobody_out(browser):
+    """Waiting, scanning, each end as an alert that stays, and a program that is lost; each size in light and dark."""
+    sizes = itertools.cycle([(1440, 900), (720, 450), (390, 844)])
+    points, nothing = np.zeros((1234, 3), np.float32), np.zeros(1234, np.float32)
     with guarded_server("a page") as (server, gate):
-        view = CloudView(server, "hall", np.zeros(3))
-        page = browser.open(gate.address, width=900, height=600, device_scale_factor=0.5)
-        page.get_by_text("waiting for the first scan").wait_for()
-        banner = page.locator(".sw-banner[role=alert]")
-        assert banner.text_content() == "" and not banner.is_visible()
-        for case, colour in (("laser may be on", red), ("lossy", amber), ("failed", red)):
+        view = CloudView(server, "hall", np.zeros(3), 18.0)
+        light, dark = (
+            browser.open(gate.address, 900, 600, 300, device_scale_factor=0.5, color_scheme=scheme)
+            for scheme in ("light", "dark")
+        )
+        for page in (light, dark):
+            page.get_by_text("waiting for the first scan").wait_for()
+            assert not page.locator(".sw-banner[role=alert]").is_visible() and browser.barriers(page) == []
+        view.add(CloudGrowth(points, nothing, np.full(1234, 4.5, np.float32), (), 0))
+        light.get_by_text("1,234 points; full scan 1: 25%").wait_for()
+        assert browser.barriers(light) == []
+        for (case, colour), page in zip(BANNERS.items(), itertools.cycle((light, dark)), strict=False):
+            width, height = next(sizes)
+            page.set_viewport_size({"width": width, "height": height})
             end, words = ENDS[case]
             view.show_end(end)
-            banner.filter(has_text=words).wait_for()
+            banner = page.locator(".sw-banner[role=alert]").filter(has_text=words)
+            banner.wait_for()
             assert banner.text_content().splitlines() == [end.heading, *end.lines]
             assert banner.evaluate("e => getComputedStyle(e).backgroundColor") == colour
             box = banner.bounding_box()
             at = (box["x"] + 20, box["y"] + 20)
             assert page.evaluate("([x, y]) => document.elementFromPoint(x, y).className", at) == "sw-banner"
-        assert browser.barriers(page) == []
-        later = browser.open(gate.address, width=900, height=600, device_scale_factor=0.5)
-        later.locator(".sw-banner").filter(has_text=ENDS["failed"][1]).wait_for()
-        later.close()
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert browser.barriers(page) == []
+        later = browser.open(gate.address, 900, 600, 300, device_scale_factor=0.5)
+        later.locator(".sw-banner").filter(has_text=ENDS["stopped"][1]).wait_for()
         view.banner.content = CloudView(server, "next", np.zeros(3)).banner.content  # a new scan begins
+        banner = light.locator(".sw-banner[role=alert]")
         banner.wait_for(state="hidden")
         server.stop()
         banner.filter(has_text="the state of the devices is unknown").wait_for()

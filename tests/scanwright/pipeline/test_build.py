@@ -27,6 +27,7 @@ from scanwright.pipeline.build import Build, Made
 from scanwright.pipeline.folder import fresh_folder
 from scanwright.pipeline.manifest import enter, first_difference, is_current, require_as_built
 
+ROOMS = ("design", "cad", "scanwright")
 METAL = ("servo_shaft", "journal_sleeve")
 PARTS = ("alignment_linkage", "slip_ring_adapter", "bearing_cage", "base_mount", *METAL)
 FILES = {
@@ -75,6 +76,22 @@ def build(monkeypatch, *words):
 def tilted(made, tmp_path_factory):
     """The build of the tilted scanner, a copy that tests may change as long as they mend it."""
     return shutil.copytree(made.folder, tmp_path_factory.mktemp("builds") / "tilted")
+
+
+def test_a_build_reports_the_measured_share_of_each_step_and_a_part_of_the_way_to_the_next():
+    sources = "".join(path.read_text() for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+    assert all(f'progress("{words}' in sources or f'progress(f"{words}' in sources for words in pipeline.BEGINS)
+    assert list(pipeline.BEGINS.values()) == sorted(pipeline.BEGINS.values())
+    shown = []
+    for step in (
+        ("refining the minima", 0.5),
+        ("meshing and writing a", 0.0),
+        ("meshing and writing b", 0.5),
+        ("more",),
+    ):
+        pipeline.measured(lambda _, fraction=None: shown.append(fraction), *step)
+    begins, ends = pipeline.BEGINS["meshing and"], pipeline.BEGINS["writing assembly.step"]
+    assert shown == [0, begins, (begins + ends) / 2, None]
 
 
 def test_a_build_is_complete_and_its_manifest_true(tilted):

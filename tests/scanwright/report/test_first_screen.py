@@ -52,8 +52,7 @@ def test_cards_state_the_numbers_of_the_records(built):
     assert ("It has more beams than this scanner." in gain.text) == (factor < 0.98)
     assert all(f"{each.factor:.2f} x {each.name}" in gain.text for each in mounts[1:])
     assert scan.headline == "18 s, 778,320 beams"
-    assert scan.text.startswith("Expect about 10 mm at 3 m (range noise 10, ")
-    assert scan.text.endswith("). One turn at constant speed: 720 lines of 1,081.")
+    assert scan.text == "Expect about 10 mm at 3 m. One turn at constant speed: 720 lines of 1,081."
     assert make.headline == "Price unknown"
 
 
@@ -66,6 +65,19 @@ def test_blind_spots_are_named_and_no_ratio_is_stated_without_one(built):
     assert sees.text.startswith("Blind ahead, blind behind. Scan lines")
     assert " x " not in gain.headline + gain.text and "in J" in gain.headline
     assert scan.text.endswith("Parts block 25.0%.")
+
+
+@pytest.mark.parametrize(
+    ("share", "headline"), [(0.2, "All you asked for, except behind the robot"), (0.8, "The robot hides most of it")]
+)
+def test_a_region_that_the_robot_hides_leads(built, share, headline):
+    severity = "warning" if share > 0.5 else "note"
+    hidden = Finding("hidden_region", severity, "weight.0", "the robot hides most of it", share, 0.5, "1", "move it")
+    sees = cards(ANGLES, replace(built, cloud=replace(built.cloud, hidden=(hidden,))), None)[0]
+    assert sees.headline == headline
+    assert ("The robot hides most of it." in sees.text) == (share < 0.5)
+    height = replace(hidden, code="deck_height", severity="warning", message="the optical centre is high")
+    assert to_do((), (height,), None)[0].text == "The optical centre is high."
 
 
 def test_planes_are_stated_in_metres():
@@ -107,7 +119,7 @@ def test_parts_are_grouped_in_order_and_nothing_is_lost(parts, built):
     make = cards(ANGLES, built, parts)[3]
     assert (make.headline, make.text) == (
         parts.usd,
-        "1 part to print, 1 part to have machined, 6 screws. 1 tool, 15 to 60 USD of that.",
+        "1 part to print, 1 part to have machined, 6 screws.",
     )
     assert usd_range(0.2, 0.4) == "0 USD"
 

@@ -131,7 +131,7 @@ def test_errors_come_first_and_an_unknown_severity_is_one(page, tmp_path):
     text = checks_text([Finding("wall", "error", "part", "a new word", 0.99, 1.2, "mm")])
     (tmp_path / "checks.json").write_text(text.replace('"error"', '"fatal"'))
     unknown = Page(report_html(tmp_path)).text["result"]
-    assert "1 check failed" in unknown and "part: wall 0.99 mm, limit 1.2 mm" in unknown
+    assert "1 check failed" in unknown and "part: wall 0.99, limit 1.2 mm" in unknown
     (tmp_path / "checks.json").write_text(text.replace('"error"', '"warning"'))
     warned = " ".join(Page(report_html(tmp_path)).text["result"].split())
     assert "Do not make" not in warned and "No errors. 1 warning to read." in warned

@@ -221,8 +221,9 @@ def test_a_phone_needs_no_sideways_scroll(browser, folder):
     assert small == 0
 
 
-@pytest.mark.parametrize("size", [(1440, 900), (720, 450), (390, 844)])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("size", "scheme"), [((1440, 900), "light"), ((720, 450), "dark"), ((390, 844), "light"), ((390, 844), "dark")]
+)
 def test_the_page_is_open_to_everybody(browser, folder, size, scheme):
     page = browser.open((folder / "report.html").as_uri(), *size, color_scheme=scheme)
     page.evaluate("document.querySelectorAll('details').forEach((details) => (details.open = true))")

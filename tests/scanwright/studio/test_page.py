@@ -290,8 +290,7 @@ def test_on_a_phone_the_facts_can_be_read(studio, browser):
     harmless(browser)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1440, 900), (720, 450), (390, 844)])
+@pytest.mark.parametrize(("size", "scheme"), [((1440, 900), "light"), ((720, 450), "dark"), ((390, 844), "light")])
 def test_nobody_is_kept_out_of_any_tab(studio, browser, size, scheme):
     studio, gate = studio
     page = shown(browser, gate.address, *size, color_scheme=scheme)
