@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -14,6 +15,7 @@ from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
 from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.servo import Servo
 
 Process = Literal["printed", "turned", "sawn"]
 Colour = tuple[float, float, float]
@@ -35,6 +37,13 @@ ON_CASE = (
 )
 SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 TURNED_FROM = "aluminium EN AW-6082-T6"
+
+
+def to_centre(servo: Servo) -> str:
+    """Return the sentence of a step that turns the servo to the centre of its encoder."""
+    counts = 2 ** round(math.log2(servo.position_feedback_deg / servo.position_step_deg))
+    where = f"position {counts // 2} of {counts}"
+    return f"Connect the servo and turn it to its centre ({where}) with `scanwright servo-setup PORT --centre`."
 
 
 @dataclass(frozen=True, slots=True)

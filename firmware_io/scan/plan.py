@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from scanwright.design.angles import CALIBRATED, AngleSet, angles_in_use
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import RecordingError, ScanwrightError
 from scanwright.design.files.atomic_file import check_place, place_in
-from scanwright.design.motion import Motion, Spin
+from scanwright.design.motion import Motion, Spin, Sweep
 from scanwright.firmware_io.device_ports import Ports, find_ports
 from scanwright.firmware_io.lidar.lidar import Echo, StampAt
 
@@ -80,6 +82,7 @@ def plan_scan(
     out: Path,
     *,
     turns: int = 1,
+    period_s: float | None = None,
     lidar: str | None = None,
     servo: str | None = None,
     servo_id: int | None = None,
@@ -97,6 +100,7 @@ def plan_scan(
     Args:
         out: build folder; its `angles.json` is all that is needed.
         turns: full scans.
+        period_s: of one full scan; None for that of the angle set. `calibrate` needs two to find the backlash.
         lidar: address; None for the emulated or the plugged-in one, as for `servo`.
         servo: port.
         servo_id: its number on the bus; None if it is alone there.
@@ -118,9 +122,10 @@ def plan_scan(
         raise ScanwrightError(f"turns = {turns}: at least 1")
     if angles.motion is None:
         raise ScanwrightError(f"{out / 'angles.json'}: motion = null: this angle set has no motion of the servo")
-    if turns * angles.motion.duration_s > _LONGEST_S:
-        most = int(_LONGEST_S / angles.motion.duration_s)
-        raise ScanwrightError(f"turns = {turns}: of {angles.motion.duration_s:g} s each: at most {most}, a week")
+    motion = angles.motion if period_s is None else _with_period(angles.motion, period_s)
+    if turns * motion.duration_s > _LONGEST_S:
+        most = int(_LONGEST_S / motion.duration_s)
+        raise ScanwrightError(f"turns = {turns}: of {motion.duration_s:g} s each: at most {most}, a week")
     product = load_catalogue().products.get(angles.servo)
     if isinstance(angles.motion, Spin) and isinstance(product, Servo) and product.position_feedback_deg < 360:
         raise ScanwrightError(
@@ -134,7 +139,7 @@ def plan_scan(
         angles=angles,
         angles_path=in_use.path,
         frames=in_use.description,
-        motion=angles.motion,
+        motion=motion,
         turns=turns,
         intensity=intensity,
         cluster=cluster,
@@ -148,6 +153,17 @@ def plan_scan(
         attached={path.name: path.read_text(encoding="utf-8") for path in files},
         endless=endless,
     )
+
+
+def _with_period(motion: Motion, period_s: float) -> Motion:
+    if not isinstance(motion, Spin | Sweep):
+        raise ScanwrightError(f"period_s = {period_s:g}: a {motion.mode} motion has none; omit it")
+    try:
+        return type(motion).model_validate(motion.model_dump() | {"period_s": period_s})
+    except ValidationError as error:
+        raise ScanwrightError(
+            f"period_s = {period_s:g}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
+        ) from None
 
 
 def _check_name(recording: Path) -> None:

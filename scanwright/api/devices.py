@@ -130,6 +130,7 @@ def scan(
     folder: str | Path,
     *,
     turns: int = 1,
+    period_s: float | None = None,
     lidar: str | None = None,
     servo: str | None = None,
     servo_id: int | None = None,
@@ -147,6 +148,7 @@ def scan(
     Args:
         folder: build folder; only its `angles.json` is required.
         turns: number of full scans.
+        period_s: time of one full scan; None for that of the task. `calibrate` needs two to find the backlash.
         lidar: serial port or HOST:PORT; None detects the emulated or connected one, as for `servo`.
         servo: serial port.
         servo_id: id of the servo, if several share its bus.
@@ -180,6 +182,7 @@ def scan(
     plan = plan_scan(
         Path(folder),
         turns=turns,
+        period_s=period_s,
         lidar=lidar,
         servo=servo,
         servo_id=servo_id,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import AbstractContextManager, closing, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -117,6 +118,9 @@ def emulate(
 def scan(
     out: BuildFolder,
     turns: Annotated[int, Option(metavar="N", help="Number of full scans.")] = 1,
+    period_s: Annotated[
+        float | None, Option(metavar="S", help="Time of a full scan [default: as in the task].")
+    ] = None,
     lidar: Lidar = None,
     servo: ServoPort = None,
     servo_id: ServoId = None,
@@ -157,6 +161,7 @@ def scan(
     plan = plan_scan(
         out,
         turns=turns,
+        period_s=period_s,
         lidar=lidar,
         servo=servo,
         servo_id=servo_id,
@@ -339,6 +344,7 @@ def servo_setup(
     ] = None,
     from_baud: Annotated[int | None, Option(metavar="B", help="Current baud rate [default: try all].")] = None,
     undo: Annotated[Path | None, Option(metavar="FILE.json", help="Restore saved settings and exit.")] = None,
+    centre: Annotated[bool, Option("--centre", help="Turn the horn to its centre and exit.")] = False,
     dry_run: Annotated[bool, Option("--dry-run", help="Print what would be written, and exit.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -353,10 +359,15 @@ def servo_setup(
     from scanwright.firmware_io.servo.address import set_address
 
     numbers = new_id is not None or new_baud is not None
-    if sum([numbers, undo is not None, scanner is not None or dry_run]) > 1:
-        raise ScanwrightError("--id and --baud, --undo, --scanner and --dry-run: choose one of these")
+    if sum([numbers, undo is not None, centre, scanner is not None or dry_run]) > 1:
+        raise ScanwrightError("--id and --baud, --undo, --centre, --scanner and --dry-run: choose one of these")
     folder = scanner or Path()
-    if undo is not None:
+    if centre:
+        from scanwright.firmware_io.servo.centre import turn_to_centre
+
+        at_deg = math.degrees(asking_first(lambda: turn_to_centre(port, servo_id=from_id), folder, from_id))
+        show_result(lambda: [f"{at_deg:+.1f} deg from its centre, torque off"], Settings([], None, at_deg), as_json)
+    elif undo is not None:
         print_steps(port, settings.restore(undo, port), as_json)
     elif numbers:
         print_steps(port, set_address(port, new_id, new_baud, from_id, from_baud, folder), as_json)

@@ -22,7 +22,7 @@ from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, placed_axes, screws, triple, upright_axes
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO_CASE
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import PartSpec, Step
+from scanwright.cad.parts.part_spec import PartSpec, Step, to_centre
 from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.cad.screws import Thread
 from scanwright.cad.solids import building
@@ -42,10 +42,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
     if p is None or tower is None:
         return None
     stack = p.stack
-    words = (
-        "Turn the servo to its centre (position 2048 of 4096, 512 of 1024) and put the plate on its front. "
-        f"{screws(SERVO_CASE)}"
-    )
+    words = f"{to_centre(place.scanner.servo)} Put the plate on its front. {screws(SERVO_CASE)}"
     return PartSpec(
         name=DRIVE_PLATE,
         turns=False,

@@ -18,7 +18,7 @@ from scanwright.cad.layout.joints import horn_centres, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, SERVO_HORN
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import BEFORE_NUT, AlignmentLinkage
-from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, to_centre
 from scanwright.cad.parts.shafts.servo_shaft import on_horn
 from scanwright.cad.parts.tolerances import OnSheet, spigot_in_hub
 from scanwright.cad.screws import SCREWS, Trap, passing_hole
@@ -40,7 +40,7 @@ def cup_spec(place: Placement) -> PartSpec | None:
     if stack is None or stack.cup_bore == 0:
         return None
     words = (
-        "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the cup on the horn so that its index "
+        f"{to_centre(place.scanner.servo)} Put the cup on the horn so that its index "
         f"groove points to the servo's +Y face, the end of the case nearest to the horn. {screws(SERVO_HORN)}"
     )
     return PartSpec(

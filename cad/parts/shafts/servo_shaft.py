@@ -22,7 +22,7 @@ from scanwright.cad.layout.joints import Joint, horn_centres, horn_joint, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SERVO_HORN, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import CROSS_AT, CROSS_SCREW
-from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, Row, Step
+from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, Row, Step, to_centre
 from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
@@ -47,7 +47,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
     if stack.bearing is not None:
         fits = (ToleratedDiameter(stack.shaft_diameter, False, "0/-0.011", "h6, the bearing's sleeve is bonded to it"),)
     words = (
-        "Turn the servo to its centre (position 2048 of 4096, 512 of 1024). Put the flange of the shaft on the horn so "
+        f"{to_centre(scanner.servo)} Put the flange of the shaft on the horn so "
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
         f"{screws(SERVO_HORN)}"
     )

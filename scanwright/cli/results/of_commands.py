@@ -240,10 +240,12 @@ class Settings:
     Attributes:
         changes: settings that were written, or that would be with `--dry-run`, one line each.
         undo: file that restores the old ones; null if nothing was written.
+        position_deg: where `--centre` left the horn; null without it.
     """
 
     changes: list[str]
     undo: Path | None = None
+    position_deg: float | None = None
 
 
 @dataclass(slots=True)

@@ -321,7 +321,12 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     titles = re.findall(r"^## \d+\. (.*)$", text, re.M)
     assert len(titles) == 15 and not [title for title in titles if " to " in title]  # no joint was left over
     assert "{" not in text and len(re.findall(r"\*\*\d+ x ISO", text)) == len(joints)
-    assert "280 mm" in text and "2048 of 4096" in text and "groove of the hub stands over the groove" in text
+    assert (
+        "280 mm" in text
+        and "2048 of 4096" in text
+        and "servo-setup PORT --centre" in text
+        and "groove of the hub stands over the groove" in text
+    )
     masses = dict.fromkeys(assembly.made, 1.0)
     rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, "0" * 12)}
     assert (rows["bearing"].quantity, rows["bearing"].total_usd) == (2, 16.0)

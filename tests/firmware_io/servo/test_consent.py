@@ -275,7 +275,7 @@ def test_a_dry_run_lists_and_writes_nothing(spoilt, command, tmp_path):
     code, said, _ = command("servo-setup", emulator.port, "--dry-run")
     assert code == 0 and "return_delay_time (register 5) is 200" in said
     _, as_json, _ = command("servo-setup", emulator.port, "--dry-run", "--json")
-    assert json.loads(as_json) == {"changes": said.splitlines(), "undo": None}
+    assert json.loads(as_json) == {"changes": said.splitlines(), "undo": None, "position_deg": None}
     assert bytes(emulator.memory.data[:36]) == before[:36] and not list(tmp_path.glob("servo-*"))
 
 
@@ -334,3 +334,17 @@ def test_a_node_does_not_try_again_what_somebody_must_agree_to(monkeypatch):
     steered = SimpleNamespace(running=True, period_s=0.0, begin=lambda: None)
     with pytest.raises(ServoSetupError):
         ros_drive.drive(SimpleNamespace(motion=None), steered, print)
+
+
+@pytest.mark.parametrize(("model", "protocol"), MODELS)
+def test_the_horn_is_turned_to_its_centre_without_a_permanent_change(virtual_bus, command, model, protocol):
+    emulator = virtual_bus(model, protocol)
+    with open_servo(emulator.port) as servo:
+        servo.sweep_to(0.6, 1.0)
+        while abs(servo.read().position_rad - 0.6) > 0.1:
+            pass
+    before = bytes(emulator.memory.data[:20])
+    code, said, _ = command("servo-setup", emulator.port, "--centre")
+    assert code == 0 and abs(float(said.partition(" deg from its centre, torque off")[0])) < 5
+    assert abs(emulator.servo.axis.motion(emulator.now_ns).angle_rad) < 0.1
+    assert bytes(emulator.memory.data[:20]) == before and not emulator.memory[emulator.servo.table.torque.address]
