@@ -161,9 +161,8 @@ def _with_period(motion: Motion, period_s: float) -> Motion:
     try:
         return type(motion).model_validate(motion.model_dump() | {"period_s": period_s})
     except ValidationError as error:
-        raise ScanwrightError(
-            f"period_s = {period_s:g}: {error.errors()[0]['msg'].removeprefix('Value error, ')}"
-        ) from None
+        why = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise ScanwrightError(f"period_s = {period_s:g}: {why}") from None
 
 
 def _check_name(recording: Path) -> None:

@@ -229,7 +229,7 @@ class ConsoleProgress:
     def left_s(self, fraction: float) -> float | None:
         """Return the time left [s] at a fraction, from the time so far; None if that is too short."""
         now_s = self.clock()
-        # nothing is done yet, or other or repeated work
+        # nothing is done yet, or other or repeated work begins
         if self.began is None or not fraction or fraction < self._fraction - _LEAST_SHARE:
             self.began, self._fraction = (now_s, fraction), fraction
         fraction = self._fraction = max(fraction, self._fraction)
