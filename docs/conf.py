@@ -37,8 +37,8 @@ html_title = f"Scanwright {__version__}"
 html_show_sphinx = False
 default_role = "py:obj"
 ACCESS = """addEventListener("DOMContentLoaded", () => {
-  const set = (where, name, value) =>
-    document.querySelectorAll(where).forEach((each) => each.setAttribute(name, value));
+  const all = (where) => document.querySelectorAll(where);
+  const set = (where, name, value) => all(where).forEach((each) => each.setAttribute(name, value));
   set("pre", "tabindex", "0");
   set(".caption[role=heading]", "aria-level", "2");
   set(".sidebar-drawer", "aria-label", "All pages");

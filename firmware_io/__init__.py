@@ -1,1 +1,1 @@
-"""How the scanner is run: recordings, de-skew and assembly, cloud files."""
+"""Devices, recordings, assembly, calibration, registration and cloud files."""

@@ -1,4 +1,4 @@
-"""Capture of the raw bytes of devices, and replay of a capture as devices.
+"""Capture of the raw bytes of devices, and replay of a capture as emulated devices.
 
 A line of a capture is: time [ns, time.monotonic_ns], port, `<` (from the device) or `>` (to it), bytes in hex.
 """
@@ -18,10 +18,10 @@ from pathlib import Path
 
 from scanwright.design.errors import RecordingError
 
-_WAIT_S = 0.1  # until the end of a replay is noticed
+_WAIT_S = 0.1  # longest delay of the end of a replay
 _REMEDY = "`scanwright doctor --capture FILE` writes captures"
 _log = logging.getLogger("scanwright.firmware_io.bytes")
-_log.propagate = False  # only captures take its records, whatever the level of the other loggers
+_log.propagate = False  # only captures receive its records, at any level of the other loggers
 _log.setLevel(logging.CRITICAL)
 
 
@@ -53,34 +53,34 @@ def captured(port: str, direction: str, data: bytes) -> bytes:
 
 @dataclass
 class _Device:
-    """A device that repeats what a capture holds: after each request, the bytes that followed it, at their times."""
+    """A device that replays a capture: after each request, the bytes that followed it, at their times."""
 
-    unasked: list[tuple[int, bytes]] = field(default_factory=list)  # delay [ns] and bytes sent before the first request
+    unrequested: list[tuple[int, bytes]] = field(default_factory=list)  # delay [ns] and bytes before the first request
     replies: dict[bytes, deque[list[tuple[int, bytes]]]] = field(default_factory=dict)  # the same, by request
-    due: deque[tuple[int, bytes]] = field(default_factory=deque)  # time [ns] and bytes that will be sent
+    due: deque[tuple[int, bytes]] = field(default_factory=deque)  # time [ns] and bytes to send
     received: bytes = b""
-    asked: bool = False
+    requested: bool = False
 
-    def hear(self, data: bytes, now_ns: int) -> None:
-        """Take a part of a request; bytes that begin no request of the capture are dropped."""
+    def receive(self, data: bytes, now_ns: int) -> None:
+        """Add received bytes; drops those that are not a request of the capture."""
         self.received += data
         while self.received:
-            known = [one for one in self.replies if self.received.startswith(one)]
+            known = [request for request in self.replies if self.received.startswith(request)]
             if known:
                 request = max(known, key=len)
-                self.received, self.asked = self.received[len(request) :], True
+                self.received, self.requested = self.received[len(request) :], True
                 left = self.replies[request]
-                reply = left.popleft() if len(left) > 1 else left[0]  # the last one again and again
+                reply = left.popleft() if len(left) > 1 else left[0]  # repeat the last one
                 self.due = deque((now_ns + delay_ns, sent) for delay_ns, sent in reply)
-            elif any(one.startswith(self.received) for one in self.replies):
+            elif any(request.startswith(self.received) for request in self.replies):
                 return
             else:
                 self.received = self.received[1:]
 
     def send(self, now_ns: int) -> bytes:
-        """Return what is due; a device that sends without a request starts again at the end."""
-        if not (self.due or self.asked):
-            self.due = deque((now_ns + delay_ns, sent) for delay_ns, sent in self.unasked)
+        """Return the bytes that are due; a device that sends without a request restarts at the end."""
+        if not (self.due or self.requested):
+            self.due = deque((now_ns + delay_ns, sent) for delay_ns, sent in self.unrequested)
         ready = b""
         while self.due and self.due[0][0] <= now_ns:
             ready += self.due.popleft()[1]
@@ -89,7 +89,7 @@ class _Device:
 
 def _devices(path: Path) -> dict[str, _Device]:
     devices: dict[str, _Device] = {}
-    replies: dict[str, tuple[int, list[tuple[int, bytes]]]] = {}  # of the last request: its time, and what followed
+    replies: dict[str, tuple[int, list[tuple[int, bytes]]]] = {}  # of the last request: time, and bytes after it
     number = 0
     try:
         for line in path.read_text("ascii").splitlines():
@@ -98,7 +98,7 @@ def _devices(path: Path) -> dict[str, _Device]:
             time_ns, data = int(when), bytes.fromhex(text)
             if port not in devices:
                 devices[port] = _Device()
-                replies[port] = time_ns, devices[port].unasked
+                replies[port] = time_ns, devices[port].unrequested
             if direction == ">":
                 replies[port] = time_ns, []
                 devices[port].replies.setdefault(data, deque()).append(replies[port][1])
@@ -109,27 +109,23 @@ def _devices(path: Path) -> dict[str, _Device]:
                 raise ValueError(direction)
     except OSError as error:
         raise RecordingError(f"{path}: cannot read: {error.strerror}; {_REMEDY}") from error
-    except ValueError as error:  # of bytes that are no text, too
+    except ValueError as error:  # also for bytes that are not ASCII
         raise RecordingError(f"{path}: {f'line {number}: ' * bool(number)}not a capture; {_REMEDY}") from error
     return devices
 
 
 @contextmanager
 def replaying(path: Path) -> Iterator[dict[str, str]]:
-    """Emulate the devices of a capture during the body, each on a pseudo-terminal.
+    """Emulate the devices of a capture during the body; yield port in the capture -> path of the pseudo-terminal.
 
-    Yields:
-        Port in the capture -> path of the pseudo-terminal.
-
-    Raises:
-        RecordingError: the file cannot be read, or is no capture.
+    RecordingError if the file cannot be read or is not a capture.
     """
     import tty  # POSIX only, while captures are imported everywhere
 
     devices = _devices(path)
     terminals = [os.openpty() for _ in devices]
     masters = {master: device for (master, _), device in zip(terminals, devices.values(), strict=True)}
-    for master, slave in terminals:  # which stay open, so that programs can come and go
+    for master, slave in terminals:  # the open slave keeps the port without clients
         tty.setraw(slave)
         os.set_blocking(master, False)
     ended = threading.Event()
@@ -139,7 +135,7 @@ def replaying(path: Path) -> Iterator[dict[str, str]]:
             times_ns = [device.due[0][0] for device in masters.values() if device.due]
             wait_s = min((min(times_ns, default=1 << 62) - time.monotonic_ns()) / 1e9, _WAIT_S)
             for master in select.select(list(masters), [], [], max(wait_s, 0.0))[0]:
-                masters[master].hear(os.read(master, 4096), time.monotonic_ns())
+                masters[master].receive(os.read(master, 4096), time.monotonic_ns())
             for master, device in masters.items():
                 with suppress(BlockingIOError):  # the buffer is full: no program reads
                     os.write(master, device.send(time.monotonic_ns()))
@@ -151,5 +147,5 @@ def replaying(path: Path) -> Iterator[dict[str, str]]:
     finally:
         ended.set()
         thread.join()
-        for descriptor in (one for pair in terminals for one in pair):
+        for descriptor in (end for pair in terminals for end in pair):
             os.close(descriptor)

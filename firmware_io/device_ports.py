@@ -1,4 +1,4 @@
-"""Ports of the devices: of an emulated scanner, or of the hardware that is plugged in."""
+"""Ports of the devices, of an emulated scanner or of connected hardware."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ class Ports:
 
 @contextmanager
 def announced(out: Path, ports: Ports) -> Iterator[None]:
-    """Write the ports of an emulated scanner to its build folder while the body runs, so that `scan` finds them.
+    """Write the ports of an emulated scanner to its build folder during the body, for `scan`.
 
-    Raises:
-        DeviceError: the folder cannot be written, or this scanner is being emulated already.
+    DeviceError if the folder cannot be written, or this scanner is already emulated.
     """
     running = emulated(out)
     if running is not None:
@@ -49,19 +48,13 @@ def announced(out: Path, ports: Ports) -> Iterator[None]:
 
 
 def emulated(out: Path) -> Ports | None:
-    """Return the ports of the emulated scanner of this folder; None if it is not emulated now."""
+    """Return the ports of the emulated scanner of this folder; None if it is not emulated."""
     try:
         ports = Ports(**json.loads((out / _FILE).read_text(encoding="utf-8")))
         if not (isinstance(ports.lidar, str) and isinstance(ports.servo, str)):
             return None
         os.kill(ports.pid, 0)
-    except (
-        OSError,
-        ValueError,
-        TypeError,
-        OverflowError,
-        RecursionError,
-    ):  # no file, or of another program or an ended one
+    except (OSError, ValueError, TypeError, OverflowError, RecursionError):  # no file, or of another or ended program
         return None
     return ports
 
@@ -77,11 +70,7 @@ def servo_ports() -> list[str]:
 
 
 def find_ports(out: Path, lidar: str | None, servo: str | None) -> Ports:
-    """Return the ports that are given, else those of the emulated scanner, else the only ones that are plugged in.
-
-    Raises:
-        DeviceError: a port is not given, and none or several could be meant.
-    """
+    """Return the given ports, those of the emulated scanner, or the only connected ones; DeviceError if ambiguous."""
     emulators = emulated(out)
     if emulators is not None and lidar is None and servo is None:
         return emulators

@@ -1,4 +1,4 @@
-"""Which echoes of a beam are kept; apart from the arrays, so that the command line needs no numpy."""
+"""Choice of echoes of a beam, in a module without numpy for the command line."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""Readers of other people's formats, whose every failure becomes one clear line."""
+"""Conversion of all exceptions of third-party readers to RecordingError with one line."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
@@ -15,11 +16,7 @@ T = TypeVar("T")
 
 
 def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """Return `call(...)`. The parsers of other people's bytes fail with a dozen exception types: all become one line.
-
-    Raises:
-        RecordingError: the call failed; `what` says for which file.
-    """
+    """Return `call(...)`; all its exceptions become RecordingError with `what`, such as the file, before the reason."""
     try:
         return call(*args, **kwargs)
     except RecordingError:
@@ -33,11 +30,7 @@ def foreign(what: str, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) 
 
 @contextmanager
 def of_file(path: Path) -> Iterator[None]:
-    """Put the file's name before what a record says of its values, which knows of no file.
-
-    Raises:
-        RecordingError: as the body does.
-    """
+    """Prefix RecordingErrors of the body with the name of the file."""
     try:
         yield
     except RecordingError as error:
@@ -47,14 +40,8 @@ def of_file(path: Path) -> Iterator[None]:
 
 
 def foreign_items(what: str, items: Iterable[T]) -> Iterator[T]:
-    """Pass on what a foreign reader yields; only the reader's own failures become RecordingError, not the caller's."""
+    """Yield the items of a third-party reader; only its exceptions become RecordingError, not the caller's."""
     iterator = foreign(what, iter, items)
-    while item := foreign(what, _next, iterator):
+    # in a list, as StopIteration would be a failure
+    while item := foreign(what, list[T], islice(iterator, 1)):
         yield from item
-
-
-def _next(iterator: Iterator[T]) -> tuple[T] | tuple[()]:
-    """The next item in a tuple, or an empty one: StopIteration would be mistaken for a failure."""
-    for item in iterator:
-        return (item,)
-    return ()

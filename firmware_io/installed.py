@@ -1,4 +1,4 @@
-"""Families of devices and formats of clouds that installed packages add to the shipped ones, by entry points."""
+"""Families of devices and formats of clouds of installed packages, by entry points."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """Unlike any other of its kind."""
+        """Unique name."""
 
 
 F = TypeVar("F", bound=Named)
@@ -23,16 +23,15 @@ F = TypeVar("F", bound=Named)
 def with_installed(
     group: str, kind: type[F], shipped: Iterable[F], refusal: type[ScanwrightError] = DeviceError
 ) -> dict[str, F]:
-    """The shipped ones and those that the entry points of a group name, by name.
+    """Return the shipped ones and those of the entry points of a group, by name.
 
-    Raises:
-        ScanwrightError: a `refusal`: an installed package names something else, or a name that there is already.
+    Raises `refusal` if an entry point is not of this kind, or its name is already used.
     """
     known = {family.name: family for family in shipped}
     for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
         try:
             family = entry.load()
-        except Exception as error:  # of somebody else's code: whatever it raises
+        except Exception as error:  # third-party code
             raise refusal(f"entry point {entry.value} of {group}: {error}") from error
         if not isinstance(family, kind):
             raise refusal(f"entry point {entry.value} of {group}: it names no {kind.__name__}")

@@ -1,7 +1,7 @@
-"""What the two devices said: one scan of the lidar, and the log of the servo's angle.
+"""Measurements: scans of the lidar, and the log of the servo's angle.
 
-Times are integer nanoseconds of one clock; angles are radians, ranges metres. A beam keeps its index from the
-sensor to the cloud: nothing here removes one.
+Times are integer nanoseconds of one clock; angles are radians, ranges metres. A beam keeps its index from the sensor to
+the cloud.
 """
 
 from __future__ import annotations
@@ -26,44 +26,28 @@ _SCAN_BOUNDS = (
     ("range_max_m", -math.inf, math.inf),
 )
 _LONGEST_TURN_NS = 2**32 - 1
-_MOST_RAD = 1e9  # of a joint that counts turns: years of them
+_MOST_RAD = 1e9  # of a joint that counts turns, for years
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scan:
-    """One turn of the 2D lidar, as a LaserScan holds it.
+    """One turn of the 2D lidar, with the fields of a LaserScan. Invalid values raise RecordingError.
 
-    A sensor whose speed wanders has beams of its own in each turn: `beam_bearing_rad` and `beam_offset_ns`, both or
-    none. What a LaserScan would hold then is the even grid that is nearest to them.
-
-    Attributes:
-        stamp_ns: time of the first beam.
-        angle_min_rad: bearing of the first beam, counter-clockwise from the laser's x.
-        angle_increment_rad: from one beam to the next; negative for a lidar that turns clockwise.
-        time_increment_s: from one beam to the next; 0 where the sensor does not say.
-        scan_time_s: of a turn of the mirror, also if turns between two scans are skipped; 0 if unknown.
-        range_min_m: shortest range the sensor can mean.
-        range_max_m: longest range the sensor can mean.
-        range_m: shape (n,), as the sensor gave it; NaN, inf or 0 where nothing returned.
-        intensity: shape (n,), or (0,) from a sensor that measures none.
-        beam_bearing_rad: bearing of each beam, shape (n,); None on the even grid.
-        beam_offset_ns: time of each beam after the stamp, not decreasing, shape (n,); None on the even grid.
-
-    Raises:
-        RecordingError: bearings, times between beams or limits of the range are no numbers of a lidar.
+    A scan of a sensor with varying speed has `beam_bearing_rad` and `beam_offset_ns`, both or none; the fields of the
+    LaserScan are then the nearest even grid.
     """
 
-    stamp_ns: int
-    angle_min_rad: float
-    angle_increment_rad: float
-    time_increment_s: float
-    scan_time_s: float
-    range_min_m: float
-    range_max_m: float
-    range_m: Float32[ndarray, " n"]
-    intensity: Float32[ndarray, " m"]
-    beam_bearing_rad: Float64[ndarray, " k"] | None = None  # as many as ranges, or `__post_init__` says so
-    beam_offset_ns: Int64[ndarray, " t"] | None = None
+    stamp_ns: int  # time of the first beam
+    angle_min_rad: float  # bearing of the first beam, counter-clockwise from the laser's x
+    angle_increment_rad: float  # between two beams; negative for a lidar that turns clockwise
+    time_increment_s: float  # between two beams; 0 if unknown
+    scan_time_s: float  # of a turn of the mirror, also if turns between two scans are skipped; 0 if unknown
+    range_min_m: float  # shortest valid range
+    range_max_m: float  # longest valid range
+    range_m: Float32[ndarray, " n"]  # as sent by the sensor; NaN, inf or 0 without a return
+    intensity: Float32[ndarray, " m"]  # shape (n,), or (0,) from a sensor that measures none
+    beam_bearing_rad: Float64[ndarray, " k"] | None = None  # of each beam, shape (n,); None on the even grid
+    beam_offset_ns: Int64[ndarray, " t"] | None = None  # of each beam after the stamp, not decreasing, shape (n,)
 
     def __post_init__(self) -> None:
         for name, low, high in _SCAN_BOUNDS:
@@ -117,15 +101,13 @@ def chosen_echo(range_m: Float32s, intensity: Float32s, echo: str) -> Ints:
 
 
 def with_all_echoes(scan: Scan, range_m: Float32s, intensity: Float32s, echoes: int) -> Scan:
-    """Return a scan with every echo of its rays as a beam of its own.
-
-    Beams of one ray have its bearing and time, by which `echo_count` recognises them.
+    """Return a scan with all echoes of its rays as separate beams, with the bearing and time of their ray.
 
     Args:
         scan: of one echo.
         range_m: shape (rays, m).
         intensity: shape (rays, m).
-        echoes: of each ray, at least m; those that are missing are inf.
+        echoes: of each ray, at least m; missing ones are inf.
     """
     rays = len(range_m)
     missing = ((0, 0), (0, echoes - range_m.shape[1]))
@@ -143,7 +125,7 @@ def with_all_echoes(scan: Scan, range_m: Float32s, intensity: Float32s, echoes: 
 
 
 def echo_count(scan: Scan) -> int:
-    """Return how many beams in a row have one bearing and time: the echoes of a ray."""
+    """Return the number of consecutive beams with one bearing: the echoes of a ray."""
     if scan.beam_bearing_rad is None or scan.beam_offset_ns is None:
         return 1
     changes = np.flatnonzero(np.diff(scan.beam_bearing_rad) != 0) + 1
@@ -153,16 +135,16 @@ def echo_count(scan: Scan) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """Consecutive scans that differ only in time and in what they measured; rows are scans, columns beams."""
+    """Consecutive scans that differ only in time and measurement; rows are scans, columns beams."""
 
-    first: Scan  # the first of them, for what they share
+    first: Scan  # with the common fields
     stamp_ns: Int64[ndarray, " scans"]  # time of the first beam of each scan, shape (s,)
     range_m: Float32[ndarray, "scans beams"]  # shape (s, n)
-    intensity: Float32[ndarray, "scans m"]  # shape (s, n), or (s, 0) where the sensor measures none
+    intensity: Float32[ndarray, "scans m"]  # shape (s, n), or (s, 0) if the sensor measures none
 
 
 def blocks(scans: Iterable[Scan], most: int = 256) -> Iterator[Block]:
-    """Scans in their order, up to `most` of them at once; one with beams of its own is a block of its own."""
+    """Group consecutive scans to blocks of at most `most`; one with `beam_bearing_rad` is a separate block."""
     waiting: list[Scan] = []
     for scan in scans:
         if waiting and (len(waiting) == most or _shape(scan) != _shape(waiting[0])):
@@ -205,24 +187,19 @@ class JointSample:
 
 @dataclass(frozen=True, slots=True)
 class PoseSample:
-    """Where the platform was at one time: the `world` frame on the map."""
+    """Pose of the platform at one time: the `world` frame on the map."""
 
-    time_ns: int  # since 1970, or on whatever clock the scans are
+    time_ns: int  # on the clock of the scans
     position_m: tuple[float, float, float]  # x y z
     quaternion: tuple[float, float, float, float]  # x y z w
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLog:
-    """Servo angles over time.
+    """Servo angles over time."""
 
-    Attributes:
-        time_ns: shape (m,), strictly increasing.
-        position_rad: shape (m,), unwrapped (it counts turns), finite.
-    """
-
-    time_ns: Int64[ndarray, " n"]
-    position_rad: Float64[ndarray, " m"]  # as many as times, or `__post_init__` says so
+    time_ns: Int64[ndarray, " n"]  # strictly increasing
+    position_rad: Float64[ndarray, " m"]  # shape (n,), unwrapped (it counts turns), finite
 
     def __post_init__(self) -> None:
         if self.time_ns.shape != self.position_rad.shape or self.time_ns.ndim != 1 or not self.time_ns.size:
@@ -230,21 +207,18 @@ class JointLog:
         if not (np.abs(self.position_rad) <= _MOST_RAD).all():
             raise RecordingError(f"joint log: a position is not a finite number, or beyond {_MOST_RAD:g} rad")
         if np.any(np.diff(self.time_ns) <= 0):
-            where = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
-            raise RecordingError(f"joint log: sample {where} is not later than the one before it")
+            number = int(np.argmax(np.diff(self.time_ns) <= 0)) + 1
+            raise RecordingError(f"joint log: sample {number} is not later than the one before it")
 
     def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
-        """Angle [rad] at each time, straight between samples, shape (n,).
-
-        Outside the log it is NaN: where the axis was before the first and after the last sample is unknown.
-        """
+        """Return the angle [rad] at each time by linear interpolation, in its shape; NaN outside the log."""
         if not time_ns.size:
             return np.empty(0)
         first, last = np.searchsorted(self.time_ns, [time_ns.min(), time_ns.max()])
         near = slice(max(int(first) - 1, 0), int(last) + 1)
         if not self.time_ns[near].size:
             return np.full(time_ns.size, np.nan)
-        # Epoch nanoseconds do not fit a float64 (they lose 256 ns), differences do.
+        # float64 rounds nanoseconds since 1970 to 256 ns, but not differences
         origin_ns = self.time_ns[near][0]
         known_ns = (self.time_ns[near] - origin_ns).astype(float)
         since_ns = (time_ns - origin_ns).astype(float)
@@ -253,17 +227,13 @@ class JointLog:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisCurve:
-    """Servo angle as a piecewise cubic of time.
+    """Servo angle as a piecewise cubic of time."""
 
-    Attributes:
-        coefficient: shape (k, 4); in piece i the angle [rad] is sum_j coefficient[i, j] s^j, s seconds into the piece.
-    """
-
-    knot_ns: Int64[ndarray, " knots"]  # where the pieces begin, and where the last one ends, shape (k + 1,), increasing
-    coefficient: Float64[ndarray, "pieces 4"]
+    knot_ns: Int64[ndarray, " knots"]  # begin of each piece, and end of the last one, shape (k + 1,), increasing
+    coefficient: Float64[ndarray, "pieces 4"]  # angle [rad] = sum_j coefficient[i, j] s^j, s seconds into piece i
 
     def angle_at(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
-        """Angle [rad] at each time, shape (n,); NaN outside the curve."""
+        """Return the angle [rad] at each time, shape (n,); NaN outside the curve."""
         piece = np.searchsorted(self.knot_ns, time_ns, side="right") - 1
         inside = (piece >= 0) & (time_ns <= self.knot_ns[-1])
         piece = piece.clip(0, len(self.coefficient) - 1)
@@ -273,7 +243,7 @@ class AxisCurve:
 
 
 def straight(log: JointLog) -> AxisCurve:
-    """The log as a curve, straight between its samples."""
+    """Return the curve of linear interpolation of a log."""
     time_ns, position_rad = log.time_ns, log.position_rad
     if time_ns.size == 1:
         return AxisCurve(np.repeat(time_ns, 2), np.array([[position_rad[0], 0.0, 0.0, 0.0]]))

@@ -1,4 +1,4 @@
-"""A serial port, opened exclusively; its control lines stay as they are."""
+"""Serial port, opened exclusively, with unchanged control lines."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from serial.tools.list_ports import comports
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.capture import captured
 
-_WRITE_S = 10.0  # only a dead port takes longer; a busy computer can take seconds
+_WRITE_S = 10.0  # a busy computer can need seconds
 _ADAPTERS = Path("/sys/bus/usb-serial/devices")
 
 
 class _UntouchedLines(serial.Serial):  # type: ignore[misc]
-    """A port whose DTR and RTS stay as they are: pyserial always raises them, which resets boards."""
+    """A port with unchanged DTR and RTS: pyserial always raises them, which resets boards."""
 
     def read(self, size: int = 1) -> bytes:
         """Read up to so many bytes."""
@@ -28,18 +28,17 @@ class _UntouchedLines(serial.Serial):  # type: ignore[misc]
         return int(super().write(captured(str(self.port), ">", data)))
 
     def _update_dtr_state(self) -> None:
-        """Leave it."""
+        pass
 
     def _update_rts_state(self) -> None:
-        """Leave it."""
+        pass
 
 
 def open_serial_port(port: str, baud: int, read_timeout_s: float | None = None) -> serial.Serial:
-    """Open a port, exclusively; a DeviceError if it is absent, in use, or may not be opened.
+    """Open a port exclusively; DeviceError if it is absent, in use, or not permitted.
 
-    DTR and RTS are left as they are, also when the port is closed: by default the system would drop DTR then, which
-    starts the motor of an RPLIDAR A1. (Linux itself raises them when it opens a port that no program had open.)
-    A read waits `read_timeout_s`, None for ever.
+    DTR and RTS are unchanged, also when the port is closed: by default the system would drop DTR then, which starts the
+    motor of an RPLIDAR A1. (Linux itself raises them when it opens a port.) `read_timeout_s` None waits forever.
     """
     try:
         opened = _UntouchedLines(port, baud, exclusive=True, timeout=read_timeout_s, write_timeout=_WRITE_S)
@@ -56,13 +55,13 @@ def _keep_lines_on_close(fd: int) -> None:
 
 
 def latency_timer(port: str) -> Path | None:
-    """Return the file with the time [ms] for which a USB adapter gathers bytes; None for a port without one."""
+    """Return the file with the latency timer [ms] of a USB adapter; None for a port without one."""
     file = _ADAPTERS / Path(port).resolve().name / "latency_timer"
     return file if file.is_file() else None
 
 
 def latency_ms(port: str) -> int:
-    """Return for how long a USB adapter gathers bytes before it hands them over; 0 for a port without such a timer."""
+    """Return the latency of a USB adapter [ms]; 0 for a port without a latency timer."""
     timer = latency_timer(port)
     try:
         return 0 if timer is None else int(timer.read_text())

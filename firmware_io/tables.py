@@ -1,7 +1,4 @@
-"""Tables of other programs: a time and numbers in each line, by the names of their columns.
-
-Input that cannot be used raises RecordingError.
-"""
+"""CSV tables with a time and numbers in each line, by the names of their columns; errors raise RecordingError."""
 
 from __future__ import annotations
 
@@ -19,17 +16,17 @@ Row = tuple[int, Sequence[float]]
 """Time [ns], and the numbers of its line."""
 _UNITS = re.compile(r"\s*\[.*?\]\s*$")
 _EVER_NS = 2**63  # an int64 ends there, in 2262
-_TIME_DIGITS = 20  # a decimal may have a million more, and an int of it as many
+_TIME_DIGITS = 20  # bound before the conversion of a decimal to an integer
 _SECONDS = {"t", "time", "time_s", "timestamp", "timestamp_s", "stamp"}
 _NANOSECONDS = {"time_ns", "timestamp_ns", "stamp_ns"}
 
 
 def csv_rows(path: Path, columns: Mapping[str, set[str]]) -> Iterator[Row]:
-    """Times and numbers of a CSV file whose first line names its columns.
+    """Yield times and numbers of a CSV file whose first line names its columns.
 
     Args:
-        path: of the file. Its time is in seconds, or in nanoseconds if the column's name or unit is that.
-        columns: what each wanted column may be called, in the order of the numbers.
+        path: of the file. Its time is in seconds, or in nanoseconds by the column's name or unit.
+        columns: possible names of each column, in the order of the numbers.
     """
     lines = csv.reader(lines_of(path))
     header = [word.strip().lstrip("#").strip().lower() for word in next(lines, [])]
@@ -45,17 +42,9 @@ def csv_rows(path: Path, columns: Mapping[str, set[str]]) -> Iterator[Row]:
 
 
 def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -> Row:
-    """One line, its time [ns] to the last digit.
-
-    Args:
-        path: for errors.
-        number: of the line.
-        time: as written there.
-        digits: how many decimal places of the time are nanoseconds.
-        values: as written there.
-    """
+    """Convert the words of line `number`; the time is exact, with `digits` decimal places for nanoseconds."""
     try:
-        # a float64 rounds the seconds of today to 256 ns
+        # float64 rounds seconds since 1970 to 256 ns
         when = Decimal(time)
         if not when.is_finite():
             raise ValueError
@@ -69,7 +58,7 @@ def row_of(path: Path, number: int, time: str, digits: int, values: list[str]) -
 
 
 def lines_of(path: Path) -> list[str]:
-    """The lines of a text."""
+    """Return the lines of a text file."""
     return foreign(f"{path}: cannot read", read_text, path).splitlines()
 
 
@@ -77,6 +66,6 @@ def _column(path: Path, names: list[str], name: str, known: set[str]) -> int:
     columns = [column for column, heading in enumerate(names) if heading in known]
     if len(columns) != 1:
         hint = suggest(min(known), names) if len(known) == 1 else ""
-        wanted = f"the first line names {'one of ' if len(known) > 1 else ''}{', '.join(sorted(known))}{hint}"
-        raise RecordingError(f"{path}: {len(columns)} columns for {name}: {wanted}")
+        expected = f"the first line names {'one of ' if len(known) > 1 else ''}{', '.join(sorted(known))}{hint}"
+        raise RecordingError(f"{path}: {len(columns)} columns for {name}: {expected}")
     return columns[0]

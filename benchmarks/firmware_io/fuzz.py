@@ -101,7 +101,7 @@ def lidar(streams: int, seed: int, name: str) -> None:
         stream = damaged(rng, language.say(rng), language.scraps, 4, 70)
         fed_s = time.perf_counter()
         try:
-            good, bad = language.hear(stream)
+            good, bad = language.receive(stream)
         except BaseException:
             print(f"{name} stream {k} of seed {seed}: {stream!r}")
             raise

@@ -15,10 +15,12 @@ from dataclasses import dataclass, fields, replace
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
+from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
 from scanwright.cad.layout.drive import DriveLayout, products_of
 from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.tightening import hold_of
 from scanwright.cad.screws import INSERT_LENGTH, SCREWS
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
@@ -285,11 +287,21 @@ def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomIt
     yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
     sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
     yield BomItem("tool", "hexagon keys", source=JOINTS, note=f"for {sizes}", estimate="hexagon keys")
-    yield BomItem("tool", "torque screwdriver, 0.1 to 1 N m", source=STEPS, estimate="torque screwdriver")
+    yield BomItem(
+        "tool", f"torque screwdriver{_torques(assembly, joints)}", source=STEPS, estimate="torque screwdriver"
+    )
+    yield BomItem("tool", "caliper", source=STEPS, note="for the values to measure", estimate="caliper")
     yield BomItem("tool", "multimeter", source=WIRING_TEXT, estimate="multimeter")
     yield from (need for need in needs if need.kind == "tool")
     if any(joint.inserts for joint in joints):
         yield BomItem("tool", "soldering iron", source=STEPS, note="for the inserts", estimate="soldering iron")
+
+
+def _torques(assembly: Assembly, joints: Sequence[Joint]) -> str:
+    """Return the range of the torques of some joints, as the end of the name of a tool."""
+    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
+    torques_nm = [hold.torque_nm for hold in holds if hold is not None]
+    return f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
 
 
 def _ranged(item: BomItem) -> BomItem:

@@ -49,6 +49,7 @@ EACH_USD: dict[str, tuple[float, float]] = {
     "crimping pliers": (15.0, 50.0),
     "soldering iron": (20.0, 70.0),
     "multimeter": (15.0, 60.0),
+    "caliper": (10.0, 60.0),
 }
 """Least and most for one piece, by the `estimate` of a row."""
 

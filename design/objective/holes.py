@@ -39,23 +39,27 @@ class BlindSpot:
         half_angle_deg: from the centre to the outer edge.
         inner_deg: from the centre to the inner edge of a ring.
         weight: share of the weight of the task.
+        scattered: whether only a part of the cone is blind.
     """
 
     centre: tuple[float, float, float]
     half_angle_deg: float
     inner_deg: float
     weight: float
+    scattered: bool = False
 
     def words(self) -> str:
         """Return its place, width and weight as text."""
         x, y, z = self.centre
-        angle, wide = f"{self.half_angle_deg:.2f} deg", ""
-        if self.inner_deg:
+        angle, wide = f"{self.half_angle_deg:.2f} deg about", ""
+        if self.scattered:
+            angle = f"directions within {self.half_angle_deg:.2f} deg of"
+        elif self.inner_deg:
             angle = f"{self.inner_deg:.2f} to {angle}"
         elif self.half_angle_deg < 20:
             wide = f", {200 * np.tan(np.radians(self.half_angle_deg)):.2g} cm wide per metre of range"
         return (
-            f"blind {heading(np.array(self.centre))}: {angle} about ({x:z.3f}, {y:z.3f}, {z:z.3f}){wide}, "
+            f"blind {heading(np.array(self.centre))}: {angle} ({x:z.3f}, {y:z.3f}, {z:z.3f}){wide}, "
             f"{percent(self.weight)} of the weight"
         )
 
@@ -92,7 +96,7 @@ def _of_sweep(problem: Problem, angles_rad: Setting) -> list[BlindSpot]:
         return []
     off = np.arccos(np.clip(samples.directions[blind] @ middle / length, -1, 1))
     share = blind_share(samples.weights, blind)
-    return [BlindSpot(triple(middle / length), float(np.degrees(off.max())), 0.0, share)]
+    return [BlindSpot(triple(middle / length), float(np.degrees(off.max())), 0.0, share, True)]
 
 
 def heading(direction: Vector) -> str:

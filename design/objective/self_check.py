@@ -26,6 +26,7 @@ FIRST = 256  # directions of each set at first; their spread shows how many are 
 AIM = 0.8  # of NEAR, since the spread of few directions is uncertain
 MOST_WORK = 2.4e5  # directions of one set times the cost of each: 0.3 s of processor time in all
 PER_LAYER = 4.0  # cost of a direction for each region, in beams
+DOUBT = 0.5  # of the error of a count that ended before `NEAR`: a larger difference is counted again
 AGAIN = 8  # increase of directions before a difference is an error: one count in 1000 exceeds its error
 
 
@@ -58,7 +59,7 @@ def require_counted(
         if shadow is None and lever == NO_LEVER:
             _require_log(loaded, angles_rad)
         return
-    if not _agree(J, result, J_error):
+    if not _agree(J, result, J_error if J_error <= NEAR else DOUBT * J_error):
         again = counted_J(loaded, angles_rad, AGAIN * points, AGAIN * points, SETS, shadow=shadow, lever=lever)
         J, J_error = again.J, SURE * again.J_error
     if not _agree(J, result, J_error):

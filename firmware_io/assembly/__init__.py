@@ -1,1 +1,1 @@
-"""From a recording to a cloud: de-skew and its kernel, the axis angle, turns, poses."""
+"""Assembly of recordings to clouds: de-skew, axis angle, turns."""

@@ -1,7 +1,7 @@
 """`scanwright assemble`: recording and angle set become point clouds.
 
-A stream: chunks of the recording become blocks of scans, blocks become rows, rows are written. Nothing but the joint
-log, the times of the scans and the poses is held. How a beam finds its place is `deskew`.
+Chunks of the recording become blocks of scans, blocks become rows, rows are written. Only the joint log, the times of
+the scans and the poses are in memory. `deskew` describes the position of a beam.
 """
 
 from __future__ import annotations
@@ -38,29 +38,29 @@ from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import Block, Scan, straight
 
 _PER_RAD = {"turn": 2 * math.pi, "half": math.pi}
-_LONGEST_LAG_S = 3600.0  # an hour: two clocks of the same day
+_LONGEST_LAG_S = 3600.0
 _RINGS = np.iinfo(COLUMN_TYPES["ring"]).max + 1
-_LONG_GAP = 5.0  # this many usual times between two scans, and somebody lost some
-_FIRST_SCANS = 10  # of which the widest is compared with the sensor
-_STEP_ERROR = 0.02  # of a whole number of the sensor's steps: clusters are told as such, rounded
-_FLOAT32_LIMIT_M = 8192.0  # beyond, float32 steps by a millimetre
+_LONG_GAP = 5.0  # times the median time between two scans, to warn of lost ones
+_FIRST_SCANS = 10  # the widest of them is compared with the sensor
+_STEP_ERROR = 0.02  # relative rounding error of a multiple of the sensor's step, as of clusters
+_FLOAT32_LIMIT_M = 8192.0  # beyond, the resolution of float32 is 1 mm
 
 
 @dataclass(frozen=True, slots=True)
 class AssembleSummary:
-    """What became of every beam: `beams == points + sum(left_out.values())`.
+    """Result of an assembly: `beams == points + sum(left_out.values())`.
 
     Attributes:
-        out: the cloud, or the name that the clouds are numbered after.
-        clouds: the files written.
-        points: beams with a place in the world.
+        out: the cloud, or the name after which several are numbered.
+        clouds: written files.
+        points: beams with a point.
         rows: of all files; `points` in flat clouds.
-        beams: beams in the recording.
-        width: rows of a cloud per scan; 0 in a flat cloud.
+        beams: in the recording.
+        width: rows per scan of an organised cloud; 0 of a flat one.
         height: scans.
-        padding: rows that fill up scans shorter than `width`.
+        padding: rows of scans shorter than `width`.
         left_out: reason -> beams; NaN rows in an organised cloud, absent in a flat one.
-        notes: what a person should know, one sentence each.
+        notes: one sentence each.
     """
 
     out: Path
@@ -75,15 +75,15 @@ class AssembleSummary:
     notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Format the result."""
         rows = f"wrote {self.points:,} points of {self.beams:,} beams"
         if self.width:
             rows = f"wrote {self.rows:,} rows ({self.points:,} points, {self.width:,} rows a scan)"
-        where = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
+        target = f"{self.out}" if self.clouds == (self.out,) else f"{len(self.clouds)} clouds, {self.clouds[0]} and on"
         return [
             *self.notes,
             *(f"left out {count:,} beams: {reason.replace('_', ' ')}" for reason, count in self.left_out.items()),
-            f"{rows} to {where}",
+            f"{rows} to {target}",
         ]
 
 
@@ -96,20 +96,19 @@ def assemble_recording(
     platform: Trajectory | None = None,
     own_body: OwnBody | None = None,
 ) -> AssembleSummary:
-    """Write the cloud of a recording, or one for each turn of the axis, in constant memory whatever its length.
+    """Write the cloud of a recording, or one for each turn of the axis, in constant memory.
 
     Args:
         recording: MCAP recording.
-        angles: angle set of the scanner that made it.
-        out: the cloud, `.ply` (`finish` makes other formats of it): x y z [m] and columns; `out_000.ply` and so on if
-            there are several.
-        options: all but poses, imu, camera, outliers, voxel_m and normals, which others apply. A beam of time t has
-            the angle logged at t + lag_s; a scan belongs to the cloud of its first beam.
-        platform: where the platform was, for clouds on a map; without it the platform stands still.
-        own_body: beams that end on the scanner, to be dropped.
+        angles: angle set of its scanner.
+        out: the cloud, `.ply` (`finish` converts it): x y z [m] and columns; several are `out_000.ply` and so on.
+        options: poses, imu, camera, outliers, voxel_m and normals are not applied here. A beam of time t has the angle
+            logged at t + lag_s; a scan belongs to the cloud of its first beam.
+        platform: poses of the platform, for clouds on a map; None for a platform at rest.
+        own_body: self-occlusion mask.
 
     Raises:
-        RecordingError: the recording is unreadable, or no beam of it becomes a point. Nothing is written then.
+        RecordingError: the recording is unreadable, or none of its beams has a point; nothing is written.
     """
     columns, organised, lag_s, per = options.columns, options.organised, options.lag_s, options.per
     _check(out, lag_s, columns)
@@ -117,7 +116,7 @@ def assemble_recording(
     if options.smooth:
         curve, notes = axis_curve(source.joint_log, at_rest=source.at_rest)
     else:
-        curve, notes = straight(source.joint_log), "axis angle: straight between samples, as asked"
+        curve, notes = straight(source.joint_log), "axis angle: straight between samples, as set"
     cloud_from_rows = _cloud_of(source, per, round(lag_s * 1e9))
     fields = cloud_fields(source.has_intensity, columns)
     if source.beams.max() > _RINGS:
@@ -125,7 +124,7 @@ def assemble_recording(
     width = int(source.beams.max()) if organised else 0
     counts: Counter[int] = Counter()
     written = 0
-    clouds: dict[Path, int] = {}  # with their scans
+    clouds: dict[Path, int] = {}  # number of scans of each
 
     def rows_of(block: Block) -> NDArray[np.void]:
         first, with_joint = block.first, "joint_rad" in columns
@@ -138,7 +137,7 @@ def assemble_recording(
             _drop(placed, between_surfaces(block, options.edges_deg), Verdict.BETWEEN_SURFACES)
         counts.update(dict(enumerate(np.bincount(placed.verdict.ravel()).tolist())))
         rows = cloud_rows(block, placed, fields, source.start_ns, max(width, block.range_m.shape[1]))
-        # a mask would take ten times as long
+        # ten times faster than a mask
         return rows if organised else rows.ravel().take(np.flatnonzero(placed.verdict == Verdict.POINT))
 
     for which, tagged in groupby(_by_cloud(source.blocks(), cloud_from_rows), key=itemgetter(0)):
@@ -195,7 +194,7 @@ def _check(out: Path, lag_s: float, columns: Iterable[str]) -> None:
 
 
 def _cloud_of(source: Recording, per: Per, lag_ns: int) -> NDArray[np.int64]:
-    """Number of the cloud that each scan belongs to, not decreasing, shape (scans,)."""
+    """Return the number of the cloud of each scan, not decreasing, shape (scans,)."""
     if per == "recording":
         return np.zeros(source.stamp_ns.size, np.int64)
     logged_ns = source.stamp_ns + lag_ns
@@ -204,7 +203,7 @@ def _cloud_of(source: Recording, per: Per, lag_ns: int) -> NDArray[np.int64]:
 
 
 def _by_cloud(blocks: Iterable[Block], cloud_from_rows: NDArray[np.int64]) -> Iterator[tuple[int, Block]]:
-    """The blocks, none of them in two clouds, each behind the number of its cloud."""
+    """Split the blocks at the ends of clouds; yield the number of the cloud and the block."""
     at = 0
     for block in blocks:
         numbers = cloud_from_rows[at : at + len(block.stamp_ns)]
@@ -226,7 +225,7 @@ def _extent_rad(scan: Scan) -> float:
 
 
 def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
-    """Scans that the sensor of the angle set cannot have made: the cloud would be as whole, and bent."""
+    """Warn of scans that are not of the sensor of the angle set, whose cloud would be distorted."""
     named = load_catalogue().products.get(sensor)
     if not isinstance(named, Lidar):
         return
@@ -236,7 +235,7 @@ def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
     if scan_deg.size < 2:
         return
     step_deg, grid_deg = 360 / named.steps_per_turn, math.degrees(abs(scan.angle_increment_rad))
-    if own_deg.size >= named.steps_per_turn - 1:  # drivers give what turns all around any grid, but no gap
+    if own_deg.size >= named.steps_per_turn - 1:  # drivers of 360 deg sensors use any grid, but without a gap
         other = np.ptp(scan_deg) < 0.9 * 360
     else:
         steps = grid_deg / step_deg
@@ -251,7 +250,7 @@ def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
 
 
 def _about_gaps(source: Recording) -> Iterator[str]:
-    """Time that is missing; scans that were left out on the way between two stops are not."""
+    """Warn of missing time, but not of scans dropped between two stops."""
     usual_s = float(np.median(np.diff(source.stamp_ns))) / 1e9 if source.stamp_ns.size > 1 else math.inf
     known_ns = np.union1d(source.stamp_ns, source.joint_log.time_ns) if source.at_rest else source.stamp_ns
     gap_s = np.diff(known_ns) / 1e9
@@ -286,12 +285,12 @@ def _about_own_body(own_body: OwnBody | None, source: Recording) -> Iterator[str
 
 
 def _about_slivers(clouds: dict[Path, int], per: Per) -> Iterator[str]:
-    """Clouds of what was left over where the recording began or ended: no place can be told for them alone."""
+    """Warn of incomplete clouds at the ends of the recording, which are too small to register."""
     usual = median_high(clouds.values()) if clouds else 0
     of = f"the usual {usual:,} scans of {'a turn' if per == 'turn' else 'half a turn'}"
     for path, scans in clouds.items():
         if scans < usual / 2:
-            yield f"warning: {path.stem} holds {scans:,} of {of}: leave it out where clouds are registered"
+            yield f"warning: {path.stem} holds {scans:,} of {of}: leave it out if clouds are registered"
 
 
 def _comments(source: Recording, angles: AngleSet, width: int, scans: int, lag_s: float, on_map: bool) -> list[str]:

@@ -1,12 +1,12 @@
-"""The servo angle between the steps of its encoder: a smoothing spline with a known error.
+"""Servo angle between the steps of its encoder: a smoothing spline with a known error.
 
-An encoder of 4096 steps a turn reads in steps of 0.088 deg, 15 mm at 10 m; a line drawn from sample to sample keeps
-that noise and adds the corners. Servos are heavier than that: a cubic spline with one knot for several samples, fitted
-to all of them by least squares, averages the steps away. How many samples a knot gets is chosen by generalised
-cross-validation: too few keep the noise, too many miss the motion.
+An encoder of 4096 steps per turn has a resolution of 0.088 deg, 15 mm at 10 m; linear interpolation keeps that noise
+and adds corners. A servo moves more smoothly: a cubic spline with one knot for several samples, fitted by least
+squares, averages the steps. Generalised cross-validation chooses the number of samples per knot: too few keep the
+noise, too many miss the motion.
 
-What the fit cannot know: an error that every sample shares (offset, eccentric magnet; calibration sees those), and
-what the axis does between two samples without a trace in them.
+The fit does not show an error of all samples (offset, eccentric magnet; calibration does), or motion between two
+samples that does not affect them.
 """
 
 from __future__ import annotations
@@ -23,41 +23,37 @@ from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.firmware_io.recording.import_checks.angles import outliers
 from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
-_LEAST = 32  # samples; with fewer there is nothing to average
-_FINEST = 4  # samples to a knot
-_MOST_REJECTED = 0.1  # share of the samples; beyond it the right ones cannot be told apart
-_PASSES = 4  # of fits without the samples that are off; each may show smaller ones
-_BESIDE = 3  # neighbours on each side; as many wrong samples in a row can be told from a slip
-_OFF_SIGMAS = 6.0  # robust standard deviations off the curve that is no noise
-_OFF_STEPS = 1.5  # of the encoder: rounding and the curve's own error are less
+_LEAST = 32  # samples, to average
+_FINEST = 4  # samples per knot
+_MOST_REJECTED = 0.1  # fraction of the samples; beyond it wrong and right ones are indistinguishable
+_PASSES = 4  # fits without outliers; each may show smaller ones
+_NEIGHBOURS = 3  # on each side; more consecutive outliers are a slip
+_OFF_SIGMAS = 6.0  # robust standard deviations off the curve, above noise
+_OFF_STEPS = 1.5  # encoder steps, above rounding and the error of the curve
 _LISTED = 5  # times of rejected samples in a message
-_SWING = 6.0  # residuals beyond this many times their rms are jumps (a stop, a slip), not noise
-_MISSED = 2 / np.sqrt(12)  # of a step; twice what rounding to steps does is motion that the curve misses
-_REST_S = 0.1  # a staircase slower than this may as well be an axis that stops for its scans
-_STEPS_PER_KNOT = 8.0  # the axis must pass this many encoder steps between knots, or the fit follows the staircase
+_SWING = 6.0  # times the rms of the residuals; larger ones are jumps (a stop, a slip)
+_MISSED = 2 / np.sqrt(12)  # encoder steps; twice the rms of rounding is motion that the curve misses
+_REST_S = 0.1  # a slower staircase may be an axis that stops for its scans
+_STEPS_PER_KNOT = 8.0  # smallest number of encoder steps between knots, or the fit follows the staircase
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothAxis:
-    """A smoothed joint log.
+    """A smoothed joint log."""
 
-    Attributes:
-        error_rad: rms error of the curve, from its residuals and from what a curve with half the knots makes of them.
-    """
-
-    curve: AxisCurve  # the angle
-    knot_s: float  # usual time from knot to knot
-    per_knot: float  # samples to a knot
-    step_rad: float  # step of the encoder; 0 where the positions have none
-    residual_rad: float  # rms of samples against the curve
-    error_rad: float
-    rejected_ns: Times  # times of the samples that lie far off the others and were not used
+    curve: AxisCurve
+    knot_s: float  # median time between two knots
+    per_knot: float  # samples per knot
+    step_rad: float  # of the encoder; 0 if the positions have none
+    residual_rad: float  # rms of the samples
+    error_rad: float  # rms error of the curve, from its residuals and those of a curve with half the knots
+    rejected_ns: Times  # times of the outliers
 
 
 def axis_curve(log: JointLog, *, at_rest: bool) -> tuple[AxisCurve, str]:
-    """The angle to assemble with, and one line about it: smoothed where that is better than straight lines.
+    """Return the angle for assembly, smoothed if that is better than linear interpolation, and a line about it.
 
-    `at_rest`: the motor stood still during each scan; the log is exact then.
+    `at_rest`: the motor rested during each scan, so the log is exact.
     """
     if at_rest:
         return straight(log), "axis angle: held during each scan"
@@ -72,7 +68,7 @@ def axis_curve(log: JointLog, *, at_rest: bool) -> tuple[AxisCurve, str]:
 
 
 def _rejected(rejected_ns: Times, log: JointLog) -> str:
-    """Name the samples that were rejected, by their times after the first one."""
+    """Format the times of rejected samples since the first one."""
     if not rejected_ns.size:
         return ""
     seconds = [f"{(time_ns - log.time_ns[0]) / 1e9:.2f}" for time_ns in rejected_ns[:_LISTED].tolist()]
@@ -81,19 +77,19 @@ def _rejected(rejected_ns: Times, log: JointLog) -> str:
 
 
 def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float | None = None) -> SmoothAxis | str:
-    """Fit a spline to the log without the samples that lie off it alone, or say why straight lines are better.
+    """Fit a spline to the log without isolated outliers, or return why linear interpolation is better.
 
     Args:
-        log: at least 32 samples, or nothing can be averaged.
-        longest_knot_s: no knots farther apart, whatever cross-validation says.
-        per_knot: samples to a knot, where that has been chosen already; else cross-validation chooses.
+        log: at least 32 samples.
+        longest_knot_s: largest time between two knots.
+        per_knot: samples per knot; None for cross-validation.
     """
     whole, residual = _smooth(log, longest_knot_s, per_knot)
     if not residual.size:
         return whole
     wrong = _isolated(residual, _encoder_step(log.position_rad))
     if isinstance(whole, str) and (far := outliers(log.time_ns, log.position_rad)[0]).any():
-        wrong = far  # large ones may have bent all of the curve, or cost a turn
+        wrong = far  # large ones may have distorted the entire curve, or added a turn
     fitted: SmoothAxis | str = whole
     for _ in range(_PASSES):
         if not 0 < np.mean(wrong) <= _MOST_REJECTED:
@@ -107,25 +103,25 @@ def smooth(log: JointLog, *, longest_knot_s: float = math.inf, per_knot: float |
     if isinstance(fitted, str):
         return whole
     off = np.abs(np.angle(np.exp(1j * (log.position_rad - fitted.curve.angle_at(log.time_ns)))))
-    wrong &= ~(off <= max(_OFF_SIGMAS * fitted.residual_rad, _OFF_STEPS * fitted.step_rad))  # a good one among bad ones
-    in_a_row = np.lib.stride_tricks.sliding_window_view(wrong, _BESIDE + 1).all(axis=1)
-    # an axis that slips leaves that many beside each other
+    wrong &= ~(off <= max(_OFF_SIGMAS * fitted.residual_rad, _OFF_STEPS * fitted.step_rad))  # not good ones
+    in_a_row = np.lib.stride_tricks.sliding_window_view(wrong, _NEIGHBOURS + 1).all(axis=1)
+    # so many consecutive outliers are a slip
     return whole if in_a_row.any() else replace(fitted, rejected_ns=log.time_ns[wrong])
 
 
 def _isolated(residual: Float64[ndarray, " n"], step_rad: float) -> Bool[ndarray, " n"]:
-    """Return which samples lie off a curve while most of their neighbours do not; none at the ends."""
+    """Return which samples are off a curve unlike most of their neighbours; none at the ends."""
     wrong = np.zeros(residual.size, bool)
-    if residual.size > 2 * _BESIDE:
-        near = np.delete(np.lib.stride_tricks.sliding_window_view(residual, 2 * _BESIDE + 1), _BESIDE, axis=1)
-        apart = np.abs(residual[_BESIDE:-_BESIDE] - np.median(near, axis=1))
+    if residual.size > 2 * _NEIGHBOURS:
+        near = np.delete(np.lib.stride_tricks.sliding_window_view(residual, 2 * _NEIGHBOURS + 1), _NEIGHBOURS, axis=1)
+        apart = np.abs(residual[_NEIGHBOURS:-_NEIGHBOURS] - np.median(near, axis=1))
         limit = max(_OFF_SIGMAS * 1.4826 * float(np.median(apart)), _OFF_STEPS * step_rad)
-        wrong[_BESIDE:-_BESIDE] = apart > limit
+        wrong[_NEIGHBOURS:-_NEIGHBOURS] = apart > limit
     return wrong
 
 
 def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> tuple[SmoothAxis | str, Floats]:
-    """The fit to all samples or the reason for none, and how far each sample lies off it (empty before a fit)."""
+    """Return the fit to all samples or the reason for none, and its residuals (empty without a fit)."""
     count, nothing = log.time_ns.size, np.empty(0)
     if count < _LEAST:
         return f"{count} samples are too few to smooth", nothing
@@ -168,17 +164,17 @@ def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> tup
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """A least-squares spline; `score` is the mean squared error it will make on a new sample (cross-validation)."""
+    """A least-squares spline."""
 
     knots: Floats
     weight: Floats
     residual: Floats
     per_knot: float
-    score: float
+    score: float  # expected mean squared error of a new sample (cross-validation)
 
 
 def _best(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], least: float, most: float) -> _Fit:
-    """The fit of the lowest score with `least` to `most` samples to a knot."""
+    """Return the fit of the lowest score with `least` to `most` samples per knot."""
     fits: list[_Fit] = []
     per_knot = least
     while per_knot <= most and (per_knot < seconds.size / 4 or not fits):
@@ -191,10 +187,10 @@ def _best(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], lea
 
 def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_knot: float) -> _Fit:
     count = seconds.size
-    # knots at samples, evenly by number and not by time: none is left without samples in a gap
+    # knots at samples, uniform by number and not by time, so that none is in a gap
     inner = seconds[np.linspace(0, count - 1, max(round(count / per_knot), 1) + 1).round().astype(int)]
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    # normal equations of cubic B-splines: at each sample four beside each other are not 0, so the matrix is a band
+    # normal equations of cubic B-splines: at each sample four consecutive ones are not 0, so the matrix is banded
     piece = np.searchsorted(inner[1:-1], seconds, "right") + 3
     value, first = _b_splines(seconds, knots, piece, 3), piece - 3
     unknowns = knots.size - 4
@@ -210,7 +206,7 @@ def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_
 
 
 def _b_splines(at: Floats, knots: Floats, piece: Ints, degree: int) -> list[Floats]:
-    """The B-splines that are not 0 in the piece of each time, number `piece - degree` first (de Boor's recurrence)."""
+    """Return the non-zero B-splines in the piece of each time, from number `piece - degree` (de Boor's recurrence)."""
     value = [np.ones_like(at)]
     for d in range(1, degree + 1):
         carry = np.zeros_like(at)
@@ -224,20 +220,20 @@ def _b_splines(at: Floats, knots: Floats, piece: Ints, degree: int) -> list[Floa
 
 
 def _polynomials(knots: Floats, weight: Floats) -> Floats:
-    """A cubic spline from knot to knot, shape (pieces, 4): powers 0 to 3 of the time into the piece."""
+    """Return the polynomials of a cubic spline, shape (pieces, 4): powers 0 to 3 of the time since a knot."""
     first, columns = np.arange(knots.size - 7), []
     for power, degree in enumerate((3, 2, 1, 0)):
         begin = knots[first + degree]
         value = _b_splines(begin, knots, first + degree, degree)
         columns.append(sum(value[k] * weight[first + k] for k in range(degree + 1)) / math.factorial(power))
-        if degree:  # on to the derivative, a spline of one degree less
+        if degree:  # derivative, a spline of one degree less
             weight = degree * np.diff(weight) / (knots[degree + 1 : -1] - knots[1 : -degree - 1])
             knots = knots[1:-1]
     return np.stack(columns, axis=1)
 
 
 def _straight_score(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], step_rad: float) -> float:
-    """Mean squared error of straight lines on a new sample: each sample is left out in turn."""
+    """Return the mean squared error of linear interpolation by leave-one-out cross-validation."""
     part = (seconds[1:-1] - seconds[:-2]) / (seconds[2:] - seconds[:-2])
     missed = float(np.mean((position[:-2] + part * (position[2:] - position[:-2]) - position[1:-1]) ** 2))
     # samples on one step of a slow axis predict each other, but not the axis
@@ -247,10 +243,10 @@ def _straight_score(seconds: Float64[ndarray, " n"], position: Float64[ndarray, 
 def _error(
     seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], best: _Fit, rms: float, correlated: float
 ) -> float:
-    """What noise and what missing knots do to the curve, both as rms.
+    """Return the rms error of the curve by noise and missing knots.
 
-    Noise keeps `unknowns / count` of its power, more where neighbouring samples share a step of the encoder. A curve
-    with half the knots misses 16 times as much of the motion (in rms); what it differs by beyond its noise tells.
+    Noise keeps `unknowns / count` of its power, more if neighbouring samples share a step of the encoder. A curve with
+    half the knots misses 16 times as much of the motion (rms), which shows in the difference beyond noise.
     """
     count = seconds.size
     noise = rms**2 * best.weight.size / count * max(correlated, 1.0)
@@ -261,7 +257,7 @@ def _error(
 
 
 def _encoder_step(position: Float64[ndarray, " n"]) -> float:
-    """The step of which all positions within a turn are multiples, up to a common offset; 0 where there is none."""
+    """Return the step of which all positions modulo a turn are multiples, except for an offset; 0 without one."""
     apart = np.diff(np.sort(position % (2 * np.pi)))
     apart = apart[apart > 1e-9]
     if not apart.size:
@@ -271,7 +267,7 @@ def _encoder_step(position: Float64[ndarray, " n"]) -> float:
 
 
 def _samples_per_step(position: Float64[ndarray, " n"], step_rad: float) -> float:
-    """How many samples the axis usually stays on one step of the encoder."""
+    """Return the mean number of samples per step of the encoder."""
     if not step_rad:
         return 0.0
     return float((position.size - 1) * step_rad / np.abs(np.diff(position)).sum())

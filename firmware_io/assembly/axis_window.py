@@ -1,9 +1,8 @@
-"""The axis angle while it comes: the newest samples of the servo, and the curve through them.
+"""Axis angle of a stream: the newest samples of the servo, and the curve through them.
 
-The curve is that of `axis_curve`, fitted to a few seconds instead of to all of a recording. The end of a spline is
-known worse than its middle, so a beam waits until the servo has been heard for a while after it: the look-ahead. Knots
-are no farther apart than that allows, which is its price: where the axis turns so evenly that a knot every second would
-do, a shorter look-ahead averages fewer samples, and the curve is noisier than the one of the whole recording.
+The curve is that of `axis_curve`, fitted to a few seconds. The end of a spline is less accurate than its middle, so a
+beam waits for samples after it: the look-ahead, which limits the distance of knots. If the axis turns so uniformly that
+a knot every second would suffice, the curve averages fewer samples and is noisier than that of an entire recording.
 """
 
 from __future__ import annotations
@@ -16,18 +15,18 @@ import numpy as np
 from scanwright.firmware_io.assembly.axis_curve import smooth
 from scanwright.firmware_io.samples import AxisCurve, JointLog, JointSample, straight
 
-HISTORY_NS = 4_000_000_000  # of samples are fitted: a dozen knots, so that cross-validation has something to judge
-_MOST_SAMPLES = 20_000  # 5 kHz for that long
-_AT_LEAST = 0.75  # of the look-ahead lies behind every beam; the rest is how long a curve serves
-_CHOOSE_NS = 1_000_000_000  # how often the distance of the knots is chosen anew
-_NO_CURVE = AxisCurve(np.array([-(2**62), -(2**62) + 1]), np.zeros((1, 4)))  # longer ago than anything
+HISTORY_NS = 4_000_000_000  # duration of the fitted samples: a dozen knots for cross-validation
+_MOST_SAMPLES = 20_000  # 5 kHz for that time
+_AT_LEAST = 0.75  # smallest part of the look-ahead after a beam; the rest is the validity of a curve
+_CHOOSE_NS = 1_000_000_000  # between two choices of the distance of knots
+_NO_CURVE = AxisCurve(np.array([-(2**62), -(2**62) + 1]), np.zeros((1, 4)))  # before all times
 
 
 class AxisWindow:
-    """The newest samples of one joint, at most `HISTORY_NS` of them and what `forget` was told to keep."""
+    """The newest samples of one joint."""
 
     def __init__(self, look_ahead_s: float) -> None:
-        """`look_ahead_s`: 0 to go straight from sample to sample."""
+        """`look_ahead_s`: 0 for linear interpolation."""
         self._look_ahead_s = look_ahead_s
         self._time_ns: list[int] = []
         self._position_rad: list[float] = []
@@ -38,24 +37,24 @@ class AxisWindow:
 
     @property
     def last_ns(self) -> int:
-        """Time of the newest sample; long ago if there is none."""
+        """Time of the newest sample; before all times if there is none."""
         return self._time_ns[-1] if self._time_ns else -(2**62)
 
     def add(self, sample: JointSample) -> None:
-        """A sample that is later than all before it."""
+        """Add a sample, which must be later than the last one."""
         self._time_ns.append(sample.time_ns)
         self._position_rad.append(sample.position_rad)
 
     def forget(self, before_ns: int) -> None:
-        """Drop what is older, but for the one sample from which the axis goes on to that time."""
+        """Drop the samples before a time, except for the last of them."""
         first = max(bisect_right(self._time_ns, before_ns) - 1, len(self._time_ns) - _MOST_SAMPLES)
         if first > 0:
             del self._time_ns[:first], self._position_rad[:first]
 
     def curve(self, first_ns: int, last_ns: int) -> tuple[AxisCurve, float]:
-        """The angle from one time to another, and its rms error [rad], NaN where it goes straight between samples.
+        """Return the angle between two times, and its rms error [rad], NaN for linear interpolation.
 
-        It is NaN where no sample was, and good to the error that is stated where samples of the look-ahead follow.
+        The angle is NaN without samples; the error is valid for times followed by the look-ahead.
         """
         if not self._time_ns:
             return _NO_CURVE, math.nan

@@ -1,4 +1,4 @@
-"""What becomes of a beam: a point, or the reason why not."""
+"""Classification of beams: a point, or the reason why not."""
 
 from __future__ import annotations
 
@@ -15,26 +15,25 @@ from scanwright.firmware_io.samples import Block, Scan, chosen_echo, echo_count
 
 
 class Verdict(IntEnum):
-    """Why a beam became no point, or that it did. A beam has the first that applies, from top to bottom."""
+    """POINT, or the reason why a beam has none: the first that applies, from top to bottom."""
 
     POINT = 0
-    NO_RETURN = 1  # NaN, +inf (REP 117), or the 0 of drivers that know neither
+    NO_RETURN = 1  # NaN, +inf (REP 117), or 0 of some drivers
     TOO_NEAR = 2  # below range_min, or -inf (REP 117)
     TOO_FAR = 3  # above range_max
     OUTSIDE_JOINT_LOG = 4
     OWN_BODY = 5
     OUTSIDE_POSES = 6
-    BETWEEN_SURFACES = 7  # half on a near surface, half on a far one; only where it is asked for
-    OTHER_ECHO = 8  # of a ray whose echo another one is; only where one is asked for
+    BETWEEN_SURFACES = 7  # half on a near surface, half on a far one; only on request
+    OTHER_ECHO = 8  # not the chosen echo of its ray; only on request
 
 
 def beam_verdicts(
     scan: Scan, joint_rad: Float64[ndarray, " n"], own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0
 ) -> UInt8[ndarray, " n"]:
-    """A `Verdict` for each beam from its range and axis angle, shape (n,).
+    """Return a `Verdict` for each beam from its range and axis angle, shape (n,).
 
-    `joint_rad` is NaN if unknown; `gamma_rot_rad` is the axis angle at joint position 0, from where the
-    mask of the own body counts.
+    `joint_rad` is NaN if unknown; `gamma_rot_rad` is the axis angle at joint position 0, for the self-occlusion mask.
     """
     range_m = scan.range_m
     verdict = np.select(
@@ -54,7 +53,7 @@ def beam_verdicts(
 
 
 def other_echoes(block: Block, echo: Echo) -> Bool[ndarray, "scans beams"]:
-    """Beams that are not the chosen echo of their ray; none if rays have one echo, or all are wanted."""
+    """Return which beams are not the chosen echo of their ray; none for `all` or rays with one echo."""
     echoes = echo_count(block.first)
     other = np.zeros(block.range_m.shape, bool)
     if echo != "all" and echoes > 1:
@@ -66,10 +65,10 @@ def other_echoes(block: Block, echo: Echo) -> Bool[ndarray, "scans beams"]:
 
 
 def between_surfaces(block: Block, grazing_deg: float) -> Bool[ndarray, "scans beams"]:
-    """Beams whose spot lay on the edge of a near surface and on a far one behind it: their range is of neither.
+    """Return mixed pixels: beams whose spot was partly on a near surface and partly on a far one.
 
-    Such a beam has a nearer neighbour on one side and a farther one on the other, and the lines to both lie within
-    `grazing_deg` of the beam itself. So does a surface that is seen that grazing: it goes, too.
+    Such a beam has a nearer neighbour on one side and a farther one on the other, and the lines to both are within
+    `grazing_deg` of the beam itself. This also drops surfaces at such a grazing angle.
     """
     echoes, bearing_rad = echo_count(block.first), block.first.bearing_rad  # neighbours are the same echoes
     step_rad = abs(bearing_rad[echoes] - bearing_rad[0]) if echoes > 1 else abs(block.first.angle_increment_rad)

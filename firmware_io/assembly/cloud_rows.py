@@ -1,4 +1,4 @@
-"""The rows of our clouds: x y z of each beam, and what else is known of it."""
+"""Rows of assembled clouds: x y z of each beam, and further columns."""
 
 from __future__ import annotations
 
@@ -12,31 +12,29 @@ from scanwright.firmware_io.assembly.options import COLUMNS
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES
 from scanwright.firmware_io.samples import Block
 
-"""What a cloud can tell of each point beside x y z."""
-
 
 def cloud_fields(has_intensity: bool, columns: Iterable[str] = COLUMNS) -> np.dtype[np.void]:
-    """Columns of our clouds. A recording without intensities has no such column."""
-    # joint_rad counts turns: after ten minutes float32 would be a hundredth of a degree coarse
-    wanted = [name for name in COLUMNS if name in columns and (has_intensity or name != "intensity")]
-    return np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), *((name, COLUMN_TYPES[name]) for name in wanted)])
+    """Return the fields of a row, without intensity if the recording has none."""
+    # joint_rad counts turns: after ten minutes the resolution of float32 would be 0.01 deg
+    names = [name for name in COLUMNS if name in columns and (has_intensity or name != "intensity")]
+    return np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), *((name, COLUMN_TYPES[name]) for name in names)])
 
 
 def cloud_rows(
     block: Block, placed: PlacedBlock, fields: np.dtype[np.void], start_ns: int, width: int
 ) -> NDArray[np.void]:
-    """Rows of a cloud, shape (scans, width); those behind the last beam are NaN.
+    """Return rows of a cloud, shape (scans, width); those after the last beam are NaN.
 
     Args:
-        block: scans with as many beams each.
+        block: scans.
         placed: their beams in the world.
-        fields: as `cloud_fields` has them.
-        start_ns: from which time_s counts.
+        fields: of `cloud_fields`.
+        start_ns: origin of time_s.
         width: at least the beams of a scan.
     """
     scans, beams = block.range_m.shape
     rows = np.empty((scans, width), fields)
-    point = rows.getfield("V12")  # x y z as one: three columns would take three passes
+    point = rows.getfield("V12")  # x y z together, three times faster than three columns
     point[:, :beams] = placed.points_m.view("V12")[:, :, 0]
     point[:, beams:] = np.full(3, np.nan, np.float32).view("V12")
     names = fields.names or ()

@@ -1,11 +1,11 @@
-"""De-skew: each beam goes through the frames as they stood when it was fired.
+"""De-skew: transformation of each beam with the frames at its time.
 
-A beam of time t, range r and bearing b lies at
+A beam of time t, range r and bearing b is at
 
     p_map = T_map_world(t) @ T_world_laser(joint(t + lag)) @ [r cos b, r sin b, 0, 1]
 
-`place` is this line in NumPy, in float64, a scan at a time: the description, and what others compute with.
-`deskew_kernel` is the same for clouds, compiled, many scans at a time.
+`place` computes this in NumPy, in float64, one scan at a time; `deskew_kernel` is the same for clouds, compiled, many
+scans at a time.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from scanwright.firmware_io.samples import AxisCurve, JointLog, Scan
 class PlacedScan:
     """One scan in the world; row i is beam i."""
 
-    scan: Scan  # what was measured
+    scan: Scan
     time_ns: Int64[ndarray, " n"]  # shape (n,)
     joint_rad: Float64[ndarray, " n"]  # servo angle of each beam, shape (n,), NaN outside the joint log
     verdict: UInt8[ndarray, " n"]  # a `Verdict` for each beam, shape (n,)
-    points_m: Float64[ndarray, "n 3"]  # shape (n, 3), NaN where the verdict is not POINT
+    points_m: Float64[ndarray, "n 3"]  # shape (n, 3), NaN if the verdict is not POINT
 
 
 def deskew(scan: Scan, joint: JointLog | AxisCurve, angles: AngleSet, lag_s: float = 0.0) -> Float64[ndarray, "n 3"]:
-    """Points of one scan in the world [m], shape (n, 3), NaN where a beam has no place.
+    """Return the points of one scan in the world [m], shape (n, 3), NaN without a point.
 
-    `lag_s` is how late the joint log's stamps are: the beam of time t has the angle logged at t + lag_s.
+    `lag_s` is the delay of the joint log's stamps: the beam of time t has the angle logged at t + lag_s.
     """
     return next(place([scan], joint, angles, lag_s)).points_m
 
@@ -54,10 +54,7 @@ def place(
     poses: Trajectory | None = None,
     own_body: OwnBody | None = None,
 ) -> Iterator[PlacedScan]:
-    """Place scans in the world one by one, or on the map of `poses`; nothing of an earlier scan is kept.
-
-    `lag_s` as in `deskew`.
-    """
+    """Place scans in the world one by one, or on the map of `poses`; `lag_s` as in `deskew`."""
     T_world_rot, T_rot_laser = angles.T_world_rot(0.0), angles.T_rot_laser()
     lag_ns = round(lag_s * 1e9)
     for scan in scans:

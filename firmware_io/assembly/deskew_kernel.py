@@ -1,12 +1,12 @@
-"""De-skew as `deskew` describes it, compiled: many scans at a time, on all cores.
+"""Compiled de-skew of `deskew` for many scans at a time, on all cores.
 
-It takes the chain apart so that a beam costs no matrix: the joint turns about the z of the rotation frame, and the
-platform, between two of its poses, about one axis that a constant rotation lays on z. What is left is a range times a
-direction (a table, constant in the rotation frame), a turn about z and a constant transform, and where the platform
-moves a second such pair. The arithmetic is float64 in vector registers, the ranges in and the points out are float32.
+The chain needs no matrix for each beam: the joint turns about the z of the rotation frame, and the platform, between
+two of its poses, about one axis that a constant rotation turns to z. The rest is a range times a direction (a table,
+constant in the rotation frame), a turn about z and a constant transform, and a second such pair if the platform moves.
+The arithmetic is float64 in vector registers; ranges and points are float32.
 
-What is compiled is kept on disk by file and line, with the places of the classes that it takes (`PosePieces`): whoever
-moves one of them must shift a line here, or an old cache asks for a module that is gone.
+The compiler's cache is keyed by file and line, and names the modules of the argument classes (`PosePieces`): to move
+one of these, shift a line here, or an old cache imports a module that no longer exists.
 """
 
 from __future__ import annotations
@@ -31,13 +31,9 @@ from scanwright.firmware_io.samples import AxisCurve, Block, JointLog, Scan, str
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedBlock:
-    """Scans in the world; rows are scans, columns beams.
+    """Scans in the world; rows are scans, columns beams."""
 
-    Attributes:
-        joint_rad: shape (s, n), NaN outside the joint log; (0, n) where it was not asked for.
-    """
-
-    joint_rad: Float64[ndarray, "rows beams"]
+    joint_rad: Float64[ndarray, "rows beams"]  # NaN outside the joint log; (0, n) if it was not requested
     verdict: UInt8[ndarray, "scans beams"]  # shape (s, n)
     points_m: Float32[ndarray, "scans beams 3"]  # shape (s, n, 3), NaN where the verdict is not POINT
 
@@ -222,8 +218,8 @@ def _judge(range_m: Float32s, angle_rad: Floats, fan: _Fan, verdict: Bytes) -> N
                 verdict[k] = _OWN_BODY if fan.stator[k, step] else _POINT
 
 
-# Each loop below writes one array and has its constants in names: with more arrays to tell apart, or one that is
-# written to among the constants, the compiler gives up vectors.
+# Each loop below writes one array and has its constants in names: with more arrays, or constants in an array that is
+# written, the compiler does not vectorise.
 
 
 @njit(cache=True, nogil=True, fastmath=_CONTRACT)
@@ -252,7 +248,7 @@ def _spin(
 def _ride(
     p_m: Floats, offset_ns: Floats, begin_ns: float, rate: float, poses: PosePieces, i: int, out_m: Float32s
 ) -> None:
-    """Points `R Rz(u turn) p + t + u shift` in piece i, beams being u = (begin + offset) rate on its way."""
+    """Set points to `R Rz(u turn) p + t + u shift` in piece i, with u = (begin + offset) rate of each beam."""
     turn_rad = poses.turn_rad[i]
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = poses.R_then[i].flat
     t0, t1, t2 = poses.t_then[i]

@@ -1,7 +1,4 @@
-"""What comes after assembly: strays out, one point to a voxel, normals, and the format that was asked for.
-
-Unlike assembly this holds a cloud in memory, one at a time.
-"""
+"""Filters, normals and output format of assembled clouds, one cloud in memory at a time."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ SeenFrom = Callable[[Cloud], Float64[ndarray, "n 3"]]
 
 
 def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
-    """Where the scanner was when it saw each point of a cloud of ours, shape (n, 3)."""
+    """Return a function for the position of the scanner at the time of each point of a cloud, shape (n, 3)."""
     origin_m = angles.T_world_rot(0.0)[:3, 3]
 
     def of(cloud: Cloud) -> Floats:
@@ -37,25 +34,27 @@ def seen_from(angles: AngleSet, poses: Trajectory | None) -> SeenFrom:
         if cloud.start_ns is None or "time_s" not in cloud.columns:
             raise RecordingError("normals of a map need the times of its points: include time_s in columns")
         time_ns = cloud.start_ns + np.rint(cloud.columns["time_s"] * 1e9).astype(np.int64)
-        # a time in the file is rounded: the first and the last point may come to lie just outside
+        # times in the file are rounded: those of the first and the last point may be just outside
         T = poses.T_map_world(np.clip(time_ns, poses.time_ns[0], poses.time_ns[-1]))
         return T[:, :3, :3] @ origin_m + T[:, :3, 3]
 
     return of
 
 
-def finish_clouds(summary: AssembleSummary, out: Path, options: AssembleOptions, where: SeenFrom) -> AssembleSummary:
-    """Write the clouds of a summary again, finished, in the format and under the names that `out` asks for.
+def finish_clouds(
+    summary: AssembleSummary, out: Path, options: AssembleOptions, seen_from: SeenFrom
+) -> AssembleSummary:
+    """Filter the clouds of a summary and write them in the format and with the name of `out`.
 
     Raises:
-        RecordingError: the format cannot hold them, or points are to go from an organised cloud.
-        InstallError: the format needs the extra `clouds`.
+        RecordingError: the format cannot store them, or points of an organised cloud would be dropped.
+        InstallError: the format requires the extra `clouds`.
     """
     left_out, notes, rows = Counter(summary.left_out), list(summary.notes), 0
     written: list[Path] = []
     for path in summary.clouds:
         (cloud, *_), _ = read_clouds(path)
-        cloud, dropped = _finished(cloud, options, where)
+        cloud, dropped = _finished(cloud, options, seen_from)
         left_out.update(dropped)
         target = out.with_name(f"{path.stem}{out.suffix}")
         wrote = write_clouds(target, [cloud], organised=options.organised)
@@ -73,7 +72,7 @@ def finish_clouds(summary: AssembleSummary, out: Path, options: AssembleOptions,
     )
 
 
-def _finished(cloud: Cloud, options: AssembleOptions, where: SeenFrom) -> tuple[Cloud, dict[str, int]]:
+def _finished(cloud: Cloud, options: AssembleOptions, seen_from: SeenFrom) -> tuple[Cloud, dict[str, int]]:
     dropped: dict[str, int] = {}
     if options.outliers is not None:
         stray = filters.outliers(cloud.points_m, options.outliers)
@@ -86,6 +85,6 @@ def _finished(cloud: Cloud, options: AssembleOptions, where: SeenFrom) -> tuple[
     if options.normals:
         there = cloud.valid
         normal = np.full(cloud.points_m.shape, np.nan, np.float32)
-        normal[there] = filters.normals(cloud.points_m[there], where(cloud)[there])
+        normal[there] = filters.normals(cloud.points_m[there], seen_from(cloud)[there])
         cloud = replace(cloud, columns={**cloud.columns, **dict(zip(("nx", "ny", "nz"), normal.T.copy(), strict=True))})
     return cloud, {reason: count for reason, count in dropped.items() if count}

@@ -1,4 +1,4 @@
-"""The options of `assemble`, shared by the command, the Python interface and the assembly itself."""
+"""Options of `assemble`, for the command, the Python interface and the assembly."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from scanwright.design.task.task import LoadedTask
 
 Per = Literal["recording", "turn", "half"]
-COLUMNS = ("intensity", "time_s", "joint_rad", "ring")  # that a cloud can have besides x y z
+COLUMNS = ("intensity", "time_s", "joint_rad", "ring")  # columns of a cloud in addition to x y z
 
 
 @dataclass(frozen=True, slots=True)
 class AssembleOptions:
-    """How a recording becomes clouds.
+    """Options of an assembly.
 
     Attributes:
         organised: keep one row per beam; NaN if there is no point.
@@ -72,7 +72,7 @@ class AssembleOptions:
 
     @property
     def thins(self) -> bool:
-        """Whether points may go once the cloud is assembled."""
+        """Whether points can be dropped after the assembly."""
         return self.outliers is not None or self.voxel_m is not None
 
 

@@ -1,4 +1,4 @@
-"""What the scanner's own parts hide: `own_body.npz` beside the angle set, as `scanwright build` writes it."""
+"""Self-occlusion mask of the scanner: `own_body.npz` next to the angle set, written by `scanwright build`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,11 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnBody:
-    """Which beams end on the scanner itself.
+    """Mask of the beams that end on the scanner."""
 
-    Attributes:
-        bearing_rad: of the beams that were looked at, shape (n,), increasing.
-        beams: hidden at every axis angle by what turns with the laser, shape (n,).
-        stator: hidden by what stands still, at the axis angles 2 pi j / g, shape (n, g); (n, 0) where nothing does.
-    """
-
-    bearing_rad: Float64[ndarray, " n"]
-    beams: Bool[ndarray, " n"]
-    stator: Bool[ndarray, "n angles"]
+    bearing_rad: Float64[ndarray, " n"]  # increasing
+    beams: Bool[ndarray, " n"]  # hidden by the rotor, at all axis angles
+    stator: Bool[ndarray, "n angles"]  # hidden by the stator at the axis angles 2 pi j / g; shape (n, 0) if none is
 
     def hides(self, bearing_rad: Float64[ndarray, " n"], gamma_rad: Float64[ndarray, " n"]) -> Bool[ndarray, " n"]:
         """Whether the beam of each bearing at each axis angle ends on the scanner, shape (n,)."""
@@ -39,20 +33,17 @@ class OwnBody:
         return beams | (known & stator[np.arange(bearing_rad.size), step])
 
     def tables(self, bearing_rad: Float64[ndarray, " n"]) -> tuple[Bool[ndarray, " n"], Bool[ndarray, "n angles"]]:
-        """`beams` and `stator` for other bearings, shapes (n,) and (n, g).
-
-        A beam is what the nearest known one is; one that is farther from all of them than they are apart is not hidden.
-        """
+        """Return `beams` and `stator` of the nearest known bearings, shapes (n,) and (n, g); False if too far."""
         nearest, known = self._match(bearing_rad)
         return self.beams[nearest] & known, self.stator[nearest] & known[:, None]
 
     def unknown(self, bearing_rad: Float64[ndarray, " n"]) -> int:
-        """How many of these bearings were not looked at."""
+        """Return the number of bearings that are not in the mask."""
         return int(np.sum(~self._match(bearing_rad)[1]))
 
     def _match(self, bearing_rad: Float64[ndarray, " n"]) -> tuple[Int64[ndarray, " n"], Bool[ndarray, " n"]]:
-        """The nearest known beam of each bearing, and whether it is near enough."""
-        # a bearing is compared within the turn that begins opposite the middle of the known ones
+        """Return the nearest known beam of each bearing, and whether it is within one step."""
+        # bearings are compared modulo the turn that begins opposite the middle of the known ones
         begin = (self.bearing_rad[0] + self.bearing_rad[-1]) / 2 - np.pi
         folded = (bearing_rad - begin) % _TURN + begin
         right = np.searchsorted(self.bearing_rad, folded).clip(1, self.bearing_rad.size - 1)
@@ -64,11 +55,7 @@ class OwnBody:
 
 
 def own_body_of(angles: Path) -> OwnBody | None:
-    """The mask in the folder of an angle set; None where there is none.
-
-    Raises:
-        BuildError: it is not as a build writes it.
-    """
+    """Return the mask in the folder of an angle set, None without one; BuildError if it is invalid."""
     path = angles.parent / FILE_NAME
     if not path.is_file():
         return None

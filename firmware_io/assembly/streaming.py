@@ -1,15 +1,14 @@
-"""Points while the scanner turns: scans, angles and poses go in as they come, placed scans come out.
+"""Assembly of a stream of scans, angles and poses.
 
     assembler = Assembler(load_angles(Path("angles.json")))
     for message in robot:
         for line in assembler.push(message):
             show(line.points_m)
 
-The kernel is that of `assemble`. A scan waits until the servo has been heard `latency_s` after its last beam, and where
-the platform moves until its pose is known. Where the servo is not smoothed (`smooth=False`, as for an axis that stands
-during each scan) the points are those of `assemble` to the last bit; where it is, the angles are noisier than those of
-the whole recording. The error that is stated of them is rms and, near the end of a spline, low by up to a fifth:
-`python -m benchmarks.firmware_io.streaming` prints both.
+The kernel is that of `assemble`. A scan waits for an angle `latency_s` after its last beam, and for its pose if the
+platform moves. Without smoothing (`smooth=False`, as for an axis at rest during each scan) the points are identical to
+those of `assemble`; with smoothing, the angles are noisier than those of an entire recording. Their stated rms error is
+up to a fifth too small near the end of a spline: `python -m benchmarks.firmware_io.streaming` prints both.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ from scanwright.firmware_io.poses.trajectory import Trajectory, trajectory_of
 from scanwright.firmware_io.samples import JointSample, PoseSample, Scan, blocks
 
 LOOK_AHEAD_S = 0.35
-MOST_WAITING = 400  # scans; ten seconds of the fastest sensors
+MOST_WAITING = 400  # scans, ten seconds of the fastest sensors
 _MOST_POSES = 20_000  # 100 Hz for 200 s
-_LONGEST_S = 10.0  # of delays and look-ahead: what waits is held in memory
+_LONGEST_S = 10.0  # delay and look-ahead, to bound the memory
 _MOST_RAD = 1e9  # years of turns
 _NORM_ERROR = 1e-2  # a quaternion printed with three digits is as well normalised
 _NO_POSES = Trajectory(np.array([-(2**62), -(2**62) + 1]), np.zeros((2, 3)), np.array([[0.0, 0.0, 0.0, 1.0]] * 2))
@@ -42,32 +41,24 @@ _NO_POSES = Trajectory(np.array([-(2**62), -(2**62) + 1]), np.zeros((2, 3)), np.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanPoints:
-    """One scan in the world, or on the map of the poses; row i is beam i.
-
-    Attributes:
-        scan: what was measured.
-        points_m: shape (n, 3), NaN where the verdict is not POINT.
-        joint_rad: servo angle of each beam, shape (n,), NaN if unknown.
-        verdict: a `Verdict` for each beam, shape (n,).
-        axis_error_rad: rms error of the angles; NaN where the axis goes straight between its samples.
-    """
+    """One scan in the world, or on the map of the poses; row i is beam i."""
 
     scan: Scan
-    points_m: Float32[ndarray, "n 3"]
-    joint_rad: Float64[ndarray, " n"]
-    verdict: UInt8[ndarray, " n"]
-    axis_error_rad: float
+    points_m: Float32[ndarray, "n 3"]  # NaN if the verdict is not POINT
+    joint_rad: Float64[ndarray, " n"]  # servo angle of each beam, NaN if unknown
+    verdict: UInt8[ndarray, " n"]  # a `Verdict` for each beam
+    axis_error_rad: float  # rms error of the angles; NaN with linear interpolation
 
 
 class Assembler:
     """Places scans one by one, in constant memory.
 
-    Samples and poses must come in the order of their times; scans come out in the order in which they came in, each
-    once. One that waits for longer than `MOST_WAITING` others is given out with what is known: NaN where nothing is.
+    Samples and poses must be in the order of their times; each scan is returned once, in the order of input. If more
+    than `MOST_WAITING` scans wait, the first one is returned with NaN for unknown points.
 
     Attributes:
-        latency_s: how long after the last beam of a scan the servo must have been heard.
-        left_out: samples and poses that were not taken, reason -> count.
+        latency_s: time after the last beam of a scan until which angles are required.
+        left_out: rejected samples and poses, reason -> count.
     """
 
     def __init__(
@@ -80,16 +71,15 @@ class Assembler:
         look_ahead_s: float = LOOK_AHEAD_S,
         with_poses: bool = False,
     ) -> None:
-        """Set out to place scans.
+        """Start without scans.
 
         Args:
             angles: angle set of the scanner.
-            lag_s: how late the servo's stamps are: the beam of time t has the angle of t + lag_s.
-            own_body: beams that end on the scanner, to be left out.
-            smooth: smooth the steps of the encoder where that helps; else go straight from sample to sample. Not for a
-                servo that stands still during each scan.
-            look_ahead_s: how long after a beam the smoothing looks; longer is more exact, and later.
-            with_poses: the platform moves, and its poses are pushed too.
+            lag_s: delay of the servo's stamps: the beam of time t has the angle of t + lag_s.
+            own_body: self-occlusion mask.
+            smooth: smooth the steps of the encoder if that helps; False for a servo at rest during each scan.
+            look_ahead_s: duration of the samples after a beam; longer is more accurate, and later.
+            with_poses: whether the platform moves, and its poses are pushed too.
 
         Raises:
             RecordingError: a time is longer than ten seconds.
@@ -107,7 +97,7 @@ class Assembler:
         self._waiting: deque[Scan] = deque()
 
     def push(self, what: Scan | JointSample | PoseSample) -> list[ScanPoints]:
-        """Take one thing in, and give out the scans that can be placed now."""
+        """Add one message, and return the scans that can be placed now."""
         if isinstance(what, Scan):
             self._waiting.append(what)
         elif isinstance(what, JointSample):
@@ -120,7 +110,7 @@ class Assembler:
         return placed
 
     def finish(self) -> list[ScanPoints]:
-        """The scans that still wait, with what is known of their angles."""
+        """Return the waiting scans, with NaN for unknown points."""
         ready = list(self._waiting)
         self._waiting.clear()
         return self._placed(ready)
@@ -145,7 +135,7 @@ class Assembler:
             self._poses.add(sample.time_ns, numbers)
 
     def _ready(self) -> int:
-        """How many of those that wait need not wait any more."""
+        """Return the number of waiting scans that can be placed."""
         late = max(len(self._waiting) - MOST_WAITING, 0)
         for count, scan in enumerate(self._waiting):
             end_ns = _end_ns(scan)
@@ -174,7 +164,7 @@ class Assembler:
         return out
 
     def _forget(self) -> None:
-        """What no scan will ask for: what is older than those that wait, and than any that is to come."""
+        """Drop the samples and poses before all waiting and future scans."""
         oldest_ns = min((scan.stamp_ns for scan in self._waiting), default=2**62)
         behind_ns = min(self._axis.last_ns - HISTORY_NS, oldest_ns)
         self._axis.forget(behind_ns + min(self._lag_ns, 0))
@@ -183,7 +173,7 @@ class Assembler:
 
 
 def _end_ns(scan: Scan) -> int:
-    """Time of the last beam, as `Scan.time_ns` has it."""
+    """Return the time of the last beam, as in `Scan.time_ns`."""
     if scan.beam_offset_ns is not None:
         return scan.stamp_ns + (int(scan.beam_offset_ns[-1]) if scan.beam_offset_ns.size else 0)
     return scan.stamp_ns + round(max(scan.range_m.size - 1, 0) * (scan.time_increment_s * 1e9))
@@ -210,7 +200,7 @@ class _PoseWindow:
             del self._time_ns[:first], self._numbers[:first]
 
     def trajectory(self, first_ns: int, last_ns: int) -> Trajectory:
-        """The poses about these times; long ago where there are fewer than two."""
+        """Return the poses around these times; `_NO_POSES` if there are fewer than two."""
         near = slice(max(bisect_left(self._time_ns, first_ns) - 1, 0), bisect_right(self._time_ns, last_ns) + 1)
         if len(self._time_ns[near]) < 2:
             return _NO_POSES

@@ -1,4 +1,4 @@
-"""Where one turn of the axis ends and the next begins."""
+"""Times of the turns of the axis."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash
 
 
 def turn_starts(log: JointLog, begin_ns: int, turn_rad: float) -> Int64[ndarray, " turns"]:
-    """Times at which the axis has turned by a further `turn_rad`, or turns back, increasing.
+    """Return the times at which the axis has turned by a further `turn_rad`, or reverses, increasing.
 
-    The first turn begins at `begin_ns`, and each way anew at its turning point: a full scan of a sweep, there and back,
-    is two of them, as its ways see the same directions twice.
+    The first turn begins at `begin_ns`, and each direction of a sweep at its turning point: a full scan of a sweep has
+    two turns, which see the same directions.
     """
     begin_ns = int(np.clip(begin_ns, log.time_ns[0], log.time_ns[-1]))
     later = log.time_ns > begin_ns
@@ -34,7 +34,7 @@ def turn_starts(log: JointLog, begin_ns: int, turn_rad: float) -> Int64[ndarray,
 
 
 def _turning_points(position: list[float]) -> list[int]:
-    """Indices of the extremes from which the axis goes back by more than noise."""
+    """Return the indices of the extremes from which the axis reverses by more than noise."""
     turning = []
     sense, extreme = 0, 0
     for i, here in enumerate(position):

@@ -28,13 +28,13 @@ from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A result.
+    """Result of a calibration.
 
     Attributes:
-        angles: the calibrated angle set.
-        record: errors with their sigmas, residuals before and after, as in the report file.
+        angles: calibrated.
+        record: content of the report file.
         out: file of the angle set, written if the result is not `faulty`.
-        frames: the effect on a robot's frames, one sentence each.
+        frames: effect on a robot's frames, one sentence each.
     """
 
     angles: AngleSet
@@ -48,7 +48,7 @@ class Calibration:
         return bool(self.record["faults"])
 
     def lines(self, in_full: bool = False) -> list[str]:
-        """Return the same as lines; the commands that publish the frames only `in_full`."""
+        """Format the result; the commands that publish the frames only `in_full`."""
         if self.faulty:
             wrote = [f"did not write {self.out}, as the result is wrong; wrote {report_path(self.out)}"]
         else:
@@ -69,15 +69,15 @@ def calibrate_recordings(
     """Write the calibrated angle set to `out`, unless the result is faulty, and the record to `report_path(out)`.
 
     Args:
-        recordings: of static scenes; each may be of another place.
-        angles: of the scanner that made them; the search starts at its delta and lever arm.
+        recordings: of static scenes, possibly of several places.
+        angles: of their scanner; the search starts at its delta and lever arm.
         out: the calibrated angle set, `.json`.
-        one_place: the scanner stood still from the first recording to the last.
-        own_body: beams that end on the scanner itself, to be left out.
+        one_place: the scanner did not move between the recordings.
+        own_body: self-occlusion mask.
         progress: callback.
 
     Raises:
-        RecordingError: a recording is unreadable, or they do not show the mounting errors. Nothing is written then.
+        RecordingError: a recording is unreadable, or they do not show the mounting errors; nothing is written.
     """
     check_place(out, RecordingError)
     if out.suffix != ".json":
@@ -114,7 +114,7 @@ def calibrate_recordings(
 
 
 def _late(opened: Sequence[Recording]) -> str:
-    """The time errors of recordings whose mounting errors cannot be found; "" if those cannot be found either."""
+    """Return the time offset of recordings that do not show the mounting errors; "" if they do not show it either."""
     for recording in opened:
         with suppress(RecordingError):
             lag = find_lag(recording)
@@ -128,12 +128,12 @@ def _late(opened: Sequence[Recording]) -> str:
 
 
 def report_path(out: Path) -> Path:
-    """Where the report of a calibrated angle set lies: angles.calibrated.json, angles.calibrated.report.json."""
+    """Return the path of the report of an angle set: angles.calibrated.report.json of angles.calibrated.json."""
     return out.with_suffix(".report.json")
 
 
 def calibrated(angles: AngleSet, result: Estimate) -> AngleSet:
-    """The angle set with the mounting errors that were found, and their covariance (rad and m)."""
+    """Return the angle set with the estimated mounting errors and their covariance (rad and m)."""
     x = result.x
     offset_mm = np.round(x[2:4] * 1e3, 5)
     return angles.model_copy(

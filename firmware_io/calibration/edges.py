@@ -1,9 +1,8 @@
-"""Beams near edges: where two surfaces meet, the surface that a beam met is unknown.
+"""Beams near edges, whose surface is ambiguous.
 
-A tile that reaches over an edge by a little is as flat as its neighbours, and what its last beams see on the other
-side pulls at its plane, the same way however many beams there are: with more beams the noise shrinks and this pull
-does not. So beams are left out by geometry alone, which no noise moves: those for which another surface lies within
-`_APART` standard deviations of their own. Those further over the edge are then outliers, and are left out by `_OUT`.
+A tile that extends slightly over an edge is as flat as its neighbours, and its beams on the other side bias its plane;
+more beams reduce the noise, but not this bias. So beams are dropped by geometry, independent of noise, if another
+surface is within `_APART` standard deviations of theirs. Beams further over the edge are outliers, dropped by `_OUT`.
 """
 
 from __future__ import annotations
@@ -18,16 +17,16 @@ from scanwright.firmware_io.calibration.model import Mount, beam_rays
 from scanwright.firmware_io.calibration.solve import Grouping
 from scanwright.firmware_io.calibration.tiles import FlatTiles
 
-_APART = 6.0  # standard deviations of a plane: noise does not look like an edge
-_OUT = 4.0  # 2 % of the beams that are 6 off come this near, and 1 of 16,000 that belong go with them
-_ACROSS = np.cos(np.radians(10.0))  # surfaces more alike than that are pieces of one
+_APART = 6.0  # standard deviations of a plane, above noise
+_OUT = 4.0  # includes 2 % of the beams that are 6 off, and drops 1 of 16,000 correct ones
+_ACROSS = np.cos(np.radians(10.0))  # surfaces with a smaller angle are parts of one
 _REACH_M = 1.0  # from a tile's middle to the edge of its surface
 
 
 def clear_of_edges(
     mount: Mount, x: Float64[ndarray, " parameters"], tiles: FlatTiles, grouping: Grouping, bulge_m: float
 ) -> Bool[ndarray, " beams"]:
-    """Whether each beam of the tiles surely met the surface of its tile, shape (n,); `False` where that has none."""
+    """Return which beams are certainly on the surface of their tile, shape (n,); False without a surface."""
     tile = tiles.tile
     surface = grouping.surface[tile]
     on = np.flatnonzero(surface >= 0)
@@ -50,7 +49,7 @@ def clear_of_edges(
 def _boxes(
     mount: Mount, x: Float64[ndarray, " parameters"], tiles: FlatTiles, grouping: Grouping
 ) -> tuple[Floats, Floats, Ints]:
-    """Where each surface has been seen, shapes (s, 3) and (s, 3), and from which place, shape (s,)."""
+    """Return the bounding box of each surface, shapes (s, 3) and (s, 3), and the place of its scanner, shape (s,)."""
     used = grouping.used
     middle = tiles.middle.select(used).under(x)
     origin, direction = beam_rays(mount, x, middle)
@@ -80,7 +79,7 @@ def _crossed(origin, direction, met_m, surface, q, normal, place, low_m, high_m,
             ):
                 continue
             a, b, c = q[t]
-            # |r_t - r_s| < close, without the division: beams may run along the other plane
+            # |r_t - r_s| < close, without a division, as beams may be parallel to the other plane
             slant = a * u + b * v + c * w
             if abs(1.0 - (a * px + b * py + c * pz)) >= close_m[i] * abs(slant):
                 continue

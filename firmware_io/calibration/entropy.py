@@ -1,16 +1,14 @@
-"""An independent witness: how crisp the cloud is, by its Renyi quadratic entropy between the two sides of the fan.
+"""Independent check of a calibration: map sharpness by the Renyi quadratic entropy between the sides of the scan plane.
 
     H = -ln mean_ij exp(-|p_i - p_j|^2 / 4 s^2),    i seen by one side, j by the other
 
-No tiles, no planes, no rejection: a cloud whose two halves fall on each other is crisp, whatever its surfaces are.
-The weight of a point is the area that it covers, so that near surfaces do not drown far ones, nor those about the axis,
-where beams crowd, the rest: r^2 dOmega is r^2 times the beam's change along the fan towards the axis, db, and
-dpsi (for a fan that holds the axis: times the sine of the angle to it). The kernel is at least as wide as half the
-spacing of the points: a narrower one sees their grid, and takes a mount that lays the grids of both sides on each other
-for the crisper one.
-
-A sum over pairs of a sample is known as well as the sample is large: what each point adds to the change of the entropy
-says how well (W. Hoeffding, "A Class of Statistics with Asymptotically Normal Distribution", 1948).
+It needs no tiles, planes or rejection: a cloud is sharp if its two halves coincide, for any surfaces.
+The weight of a point is the area that it covers, so that neither near surfaces nor those about the axis dominate:
+r^2 dOmega is r^2 times the beam's change along the scan plane towards the axis, db, and dpsi (for a scan plane that
+contains the axis: times the sine of the angle to it). The kernel is at least as wide as half the spacing of the points:
+a narrower one would prefer a mount that aligns the grids of both sides.
+The sampling error of a sum over pairs follows from the contribution of each point (W. Hoeffding, "A Class of Statistics
+with Asymptotically Normal Distribution", 1948).
 """
 
 from __future__ import annotations
@@ -29,31 +27,26 @@ from scanwright.firmware_io.calibration.observable import stood_still
 from scanwright.firmware_io.calibration.scans import Scans
 
 _SAMPLE = 15_000  # points of each side
-_REACH = 4.0  # widths: pairs farther apart add nothing
-_SPACINGS = 0.5  # of the points, in a scan or from scan to scan, in a kernel: of their grid exp(-10) is left
-_SURE = 3.0  # sampling errors: less is no change
-_LEAST = 0.01  # nats: walls thicker by 1 %, which no one can see
-_PROBE = 3.0  # how far to either side of the result to look, in limits of each parameter
+_REACH = 4.0  # widths, beyond which pairs add nothing
+_SPACINGS = 0.5  # kernel width in spacings of points, in a scan or between scans: exp(-10) of their grid remains
+_SURE = 3.0  # sampling errors of a significant change
+_LEAST = 0.01  # nats: walls thicker by 1 %, which is invisible
+_PROBE = 3.0  # distance of the probes from the result, in limits of each parameter
 
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """The entropy of a calibration; lower is crisper.
-
-    Attributes:
-        minima: where the entropy's own minimum lies from the result, for each mounting error [SI]; None where the two
-            sides see too little in common for it to have one.
-    """
+    """Entropy of a calibration; lower is sharper."""
 
     width_m: float  # of the kernel
-    before: float  # entropy with the parameters it began with
-    after: float  # with those that were found
+    before: float  # entropy with the initial parameters
+    after: float  # with the estimated ones
     change_sd: float  # sampling error of `after - before`
-    minima: dict[str, float | None]
+    minima: dict[str, float | None]  # minimum relative to the result for each mounting error [SI]; None without one
 
     @property
     def less_crisp(self) -> bool:
-        """Whether the cloud has become visibly less crisp, and by more than another sample of its points would."""
+        """Whether the cloud is visibly and significantly less sharp."""
         return self.after - self.before > max(_LEAST, _SURE * self.change_sd)
 
 
@@ -65,13 +58,13 @@ def witness(
     estimated: Float64[ndarray, " parameters"],
     noise_m: float,
 ) -> Witness:
-    """Ask the entropy before, after, and around the result."""
+    """Compute the entropy before, after, and around the result."""
     rng = np.random.default_rng(0)
     halves = [np.flatnonzero(side == k) for k in (0, 1)]
     sample = np.concatenate([rng.choice(half, min(half.size, _SAMPLE), replace=False) for half in halves])
-    few, one = beams.select(sample), side[sample] == 0
+    few, first = beams.select(sample), side[sample] == 0
 
-    # The same weights for all, or their own change would pass for one of the cloud
+    # The same weights for all parameters, so that only the cloud changes
     weight = _areas(mount, estimated, few)
     range_m, scans = float(np.average(few.range_m, weights=weight)), Scans.of(beams)
     width_m = max(3 * noise_m, 0.03, _SPACINGS * range_m * max(scans.gap_rad, scans.step_rad))
@@ -79,7 +72,7 @@ def witness(
     def crispness(x: Floats) -> _Crispness:
         late = few.under(x)
         origin, direction = beam_rays(mount, x, late)
-        return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, one, width_m)
+        return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, first, width_m)
 
     before, after = crispness(start), crispness(estimated)
     around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, estimated, k, after.entropy) for k in MOUNT}
@@ -88,14 +81,14 @@ def witness(
 
 
 def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:
-    """The area across each beam that it covers, up to a common factor, shape (n,)."""
+    """Return the area that each beam covers, except for a common factor, shape (n,)."""
     forward, left = mount.plane(x)[0][2]
     climb = np.abs(left * np.cos(beams.bearing_rad) - forward * np.sin(beams.bearing_rad))
     return beams.range_m**2 * climb * (np.ones(climb.size) if stood_still(beams) else np.abs(beams.speed_rad_s))
 
 
 def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float) -> float | None:
-    """Vertex of the parabola through three entropies, None if the middle one is not the lowest."""
+    """Return the vertex of the parabola through three entropies, None if the middle one is not the lowest."""
     step = _PROBE * PARAMETERS[k].limit
     shift = np.zeros(x.size)
     shift[k] = step
@@ -106,24 +99,23 @@ def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Crispness:
-    """Entropy; of each point its weight among those of its side, and its share: 1 if all were alike, shape (n,)."""
+    """Entropy, with the contribution of each point, shape (n,)."""
 
     entropy: float
-    weight: Floats
-    share: Floats
+    weight: Floats  # among the points of its side
+    share: Floats  # of the sum; 1 if all were equal
 
 
 def _between(
-    point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], one: Bool[ndarray, " n"], width_m: float
+    point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], first: Bool[ndarray, " n"], width_m: float
 ) -> _Crispness:
-    """Entropy of the pairs across."""
-    weight = weight / np.where(one, weight[one].sum(), weight[~one].sum())
-    trees = [cKDTree(point[half]) for half in (one, ~one)]
+    weight = weight / np.where(first, weight[first].sum(), weight[~first].sum())
+    trees = [cKDTree(point[half]) for half in (first, ~first)]
     pairs = trees[0].sparse_distance_matrix(trees[1], _REACH * width_m, output_type="ndarray")
     i, j = pairs["i"], pairs["j"]
     near = np.exp(-(pairs["v"] ** 2) / (4 * width_m**2))
-    share = np.empty(len(one))
-    share[one] = np.bincount(i, near * weight[~one][j], trees[0].n)
-    share[~one] = np.bincount(j, near * weight[one][i], trees[1].n)
-    total = max(float(share[one] @ weight[one]), 1e-300)
+    share = np.empty(len(first))
+    share[first] = np.bincount(i, near * weight[~first][j], trees[0].n)
+    share[~first] = np.bincount(j, near * weight[first][i], trees[1].n)
+    total = max(float(share[first] @ weight[first]), 1e-300)
     return _Crispness(-float(np.log(total)), weight, share / total)

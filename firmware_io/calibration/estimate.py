@@ -1,4 +1,4 @@
-"""From beams to errors: coarse to fine, first with one beam per tile, then with all of them."""
+"""Estimation of the errors, coarse to fine, first with one beam per tile, then with all beams."""
 
 from __future__ import annotations
 
@@ -35,46 +35,38 @@ from scanwright.firmware_io.calibration.solve import (
 from scanwright.firmware_io.calibration.surfaces import group, without_misfits
 from scanwright.firmware_io.calibration.tiles import FlatTiles, flat_tiles
 
-# (how near [m], how parallel [deg]) tiles must be to share a surface. The first holds an error of 5 deg at 7 m.
+# largest distance [m] and angle [deg] of tiles of one surface; the first pair allows an error of 5 deg at 7 m
 _WIDE = ((0.6, 12.0), (0.4, 8.0), (0.25, 5.0), (0.12, 3.0))
 _NARROW = ((0.12, 3.0), (0.06, 2.0), (0.03, 1.0), (0.03, 1.0))
 _STEPS = 4  # of Gauss-Newton
-_LAST_STEPS = 2  # with all beams, and again with those clear of edges
-_TRUST = 0.1  # times `near`: the standard deviation of tiles about planes that are wrong by up to `near`
+_LAST_STEPS = 2  # with all beams, and again without those near edges
+_TRUST = 0.1  # times `near`: standard deviation of tiles about planes that are wrong by up to `near`
 _ROUNDS = 2  # of grouping, with all beams
-_VAGUE_DEG, _LAST_VAGUE_DEG = 15.0, 45.0  # in the end misfits are found beam by beam
-_LAST_NOISES, _LAST_M, _LAST_DEG = 2.5, 0.02, 1.0  # in the end: near as noise allows, near as walls are
+_VAGUE_DEG, _LAST_VAGUE_DEG = 15.0, 45.0  # the last one is wide, as misfits are then rejected by beams
+_LAST_NOISES, _LAST_M, _LAST_DEG = 2.5, 0.02, 1.0  # last grouping: noise, unevenness of walls
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """What was found.
+    """Result of an estimation."""
 
-    Attributes:
-        covariance: of the found ones, shape (k, k): what the noise brings, and a backlash that had to be held.
-    """
-
-    x: Float64[ndarray, " parameters"]  # parameters, held ones as they were, shape (COUNT,)
-    choice: Choice  # which of them were found, and why the others were not
-    covariance: Float64[ndarray, "free free"]
+    x: Float64[ndarray, " parameters"]  # parameters, fixed ones unchanged, shape (COUNT,)
+    choice: Choice  # free and fixed parameters
+    covariance: Float64[ndarray, "free free"]  # of the free ones, by noise and a fixed backlash, shape (k, k)
     spectrum: Float64[ndarray, " free"]  # singular values of their information, in units of their limits, shape (k,)
-    tiles: FlatTiles  # what it was found from
-    grouping: Grouping  # their surfaces
-    clear: Bool[ndarray, " beams"]  # which of their beams surely met these, and were used, shape (n,)
-    noise_m: float  # standard deviation of a range, after all
-    bulge_m: float  # standard deviation of the walls from planes; 0 if the noise hides it
-    drifts: tuple[Drift, ...]  # how the platform seems to have moved, recording by recording
+    tiles: FlatTiles
+    grouping: Grouping  # surfaces of the tiles
+    clear: Bool[ndarray, " beams"]  # which beams of the tiles were used, shape (n,)
+    noise_m: float  # standard deviation of a range
+    bulge_m: float  # standard deviation of the walls from planes; 0 if below the noise
+    drifts: tuple[Drift, ...]  # apparent motion of the platform in each recording
 
 
 def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " parameters"]) -> Estimate:
-    """Find the scanner's errors.
-
-    Raises:
-        RecordingError: the recordings do not show the mounting errors.
-    """
+    """Estimate the scanner's errors; RecordingError if the recordings do not show the mounting errors."""
     check_fan(mount)
     tiles = flat_tiles(beams, mount, start)
-    # Wide planes cannot see offsets of centimetres: they would bend them to what is wrong elsewhere.
+    # Offsets of centimetres are not observable with wide groups, and would absorb other errors.
     free = np.array(MOUNT[:2] + (LAG if several_speeds(beams) else ()))
     x = start
     for near_m, turn_deg in _WIDE:
@@ -111,7 +103,7 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
 
 
 def _of_fixed_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: float, backlash_rad: float) -> Floats:
-    """Covariance that a backlash brings which is held at 0 and may be as wide as the gear's play, shape (k, k)."""
+    """Return the covariance by a backlash fixed at 0 that may be up to that of the gear, shape (k, k)."""
     if BACKLASH[0] in free:
         return np.zeros((free.size, free.size))
     moved = moved_by_last(reduced(normal, grouping, np.append(free, BACKLASH), bulge)) * backlash_rad
@@ -120,19 +112,19 @@ def _of_fixed_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: fl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Refined:
-    """What some of the beams say: `count` of them in each tile."""
+    """Solution with some of the beams."""
 
     x: Float64[ndarray, " parameters"]
     grouping: Grouping
     normal: Floats
-    count: Ints
+    count: Ints  # beams of each tile
     bulge_m: float
 
 
 def _refined(
     tiles: FlatTiles, mount: Mount, x: Floats, free: Ints, grouping: Grouping, which: NDArray[np.bool_]
 ) -> _Refined:
-    """Solve with some beams of the tiles, one by one; tiles that none is left of, or that do not fit, drop out."""
+    """Solve with some beams of the tiles; drop tiles without beams, and those that do not fit."""
     own, tile = tiles.beams.select(which), tiles.tile[which]
     weight = 1 / tiles.variance_m2[tile]
     count = np.bincount(tile, minlength=tiles.count.size)
@@ -148,7 +140,7 @@ def _refined(
 def _coarse(
     tiles: FlatTiles, mount: Mount, x: Floats, free: Ints, near_m: float, turn_deg: float
 ) -> tuple[Floats, Grouping, Floats]:
-    """Group, then solve with one beam per tile; the sums that come back are those of all beams, nearly."""
+    """Group, then solve with one beam per tile; the returned sums approximate those of all beams."""
     grouping = group(tiles, mount, x, near_m, *np.radians([turn_deg, _VAGUE_DEG]))
     on = grouping.surface >= 0
     variance = tiles.variance_m2 / tiles.count
@@ -172,7 +164,7 @@ def _iterated(
     weight: Floats,
     bulge: float,
 ) -> tuple[Floats, Grouping, Floats]:
-    """One Gauss-Newton step; the sums that come back are those it was made from."""
+    """Do one Gauss-Newton step; return its sums."""
     normal = sums(mount, x, beams.under(x), tile, weight, _planes(grouping))
     dx, dq = step(reduced(normal, grouping, free, bulge))
     x = x.copy()
@@ -181,5 +173,5 @@ def _iterated(
 
 
 def _planes(grouping: Grouping) -> Floats:
-    """The plane of each tile, shape (m, 3); of the first surface if it has none."""
+    """Return the plane of each tile, shape (m, 3); of the first surface if it has none."""
     return grouping.q[np.maximum(grouping.surface, 0)]

@@ -1,18 +1,13 @@
-"""How late the angles are against the scans, from one sweep there and back.
+"""Time offset of the angles relative to the scans, from one sweep in both directions.
 
-In a static scene, one beam at one axis angle sees one range, on the way there and on the way back. If the
-joint log is late by some time, both ways are shifted against each other by twice the way the axis turns in it. The
-cost of an assumed lag is the mean difference of the two range images, each difference capped: at an edge of the scene
-ranges jump, and beyond the cap a difference says nothing about time.
-
-How good it is: about a seventh of the step between the assumed lags; what leaving out one part of the fan after the
-other changes (the jackknife's standard deviation); and, where the motor stops during each scan, half the time between
-two scans, over which the cost hardly changes.
-
-What it cannot see: mounting angles, lever arm and sign of the axis (they move both ways alike, and enter nowhere
-here); backlash (the two ways differ by a constant angle, which at one speed looks the same as a lag: half the
-backlash divided by the speed is added to it); the stamps' offset against any other clock; and, where the axis turns
-one way only, anything at all.
+In a static scene, a beam at one axis angle has one range, in both directions. A delay of the joint log shifts both
+directions against each other by twice the rotation in that time. The cost of an assumed offset is the mean difference
+of the two range images, each difference capped, since ranges jump at edges of the scene.
+Uncertainty: about a seventh of the step between assumed offsets; the jackknife's standard deviation over parts of the
+scan plane; and, if the motor stops during each scan, half the time between two scans.
+Not observable: mounting angles, lever arm and sign of the axis (the same in both directions); backlash (a constant
+angle between both directions, at one speed equivalent to an offset of half the backlash divided by the speed); the
+offset of the stamps from any other clock; and anything at all with a single direction.
 """
 
 from __future__ import annotations
@@ -30,43 +25,43 @@ from scanwright.firmware_io.recording.recording import Recording
 from scanwright.firmware_io.samples import JointLog, Scan
 
 _CAP_M = 0.05  # a few times the noise of 2D lidars (10 to 30 mm), far below the depth of edges
-_NOISE_RAD = np.radians(1.0)  # turning back by less is noise or backlash, not the way back
+_NOISE_RAD = np.radians(1.0)  # smaller reversals are noise or backlash
 _LAGS_S = np.linspace(-1.0, 1.0, 41)  # delays of drivers and networks, in steps of 50 ms; the minimum is refined
-_VAGUE_S = 0.25  # a delay known worse than this is not used
-_BLOCKS = 8  # of the fan: neighbouring beams see the same things
-_CELLS = 600  # over the common angles; on 60 degrees a tenth of a degree, about one step between scans
+_VAGUE_S = 0.25  # largest standard deviation of a usable offset
+_BLOCKS = 8  # of the scan plane, as neighbouring beams are correlated
+_CELLS = 600  # over the common angles: 0.1 deg of 60 deg, about one step between scans
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LagCurve:
     """Cost of each assumed lag."""
 
-    lag_s: Float64[ndarray, " lags"]  # assumed lags, shape (k,); positive where the joint log's stamps are late
-    cost_m: Float64[ndarray, " lags"]  # mean capped difference of the ranges seen on both ways, shape (k,)
-    best_s: float  # the minimum, refined from its two neighbours
+    lag_s: Float64[ndarray, " lags"]  # assumed lags, shape (k,); positive if the joint log's stamps are late
+    cost_m: Float64[ndarray, " lags"]  # mean capped difference of the ranges of both directions, shape (k,)
+    best_s: float  # minimum, refined by its two neighbours
     sd_s: float  # its standard deviation; infinite for a single beam
 
 
 @dataclass(frozen=True, slots=True)
 class Lag:
-    """How late the angles of a recording are."""
+    """Time offset of the angles of a recording."""
 
-    late_s: float  # positive where the joint log's stamps are late
-    sd_s: float  # its standard deviation, of which backlash is no part
-    speed_rad_s: float  # mean speed of the axis; half of any backlash, divided by it, is inside `late_s`
+    late_s: float  # positive if the joint log's stamps are late
+    sd_s: float  # its standard deviation, without backlash
+    speed_rad_s: float  # mean speed of the axis; `late_s` includes half of any backlash divided by it
 
 
 def find_lag(recording: Recording) -> Lag:
-    """How late the angles of a recording are, by up to a second.
+    """Estimate the time offset of the angles, up to a second.
 
     Raises:
-        RecordingError: its axis does not turn there and back, or its scene shows less than a quarter of a second.
+        RecordingError: the axis does not turn in both directions, or the standard deviation exceeds 0.25 s.
     """
     curve = lag_curve(recording.scans(), recording.joint_log, _LAGS_S)
     still_s = float(np.median(np.diff(recording.stamp_ns))) / 2e9 if recording.at_rest else 0.0
     sd_s = float(np.hypot(curve.sd_s, still_s))
     if sd_s > _VAGUE_S or curve.best_s in (_LAGS_S[0], _LAGS_S[-1]):
-        raise RecordingError(f"{recording.path}: the scene does not tell how late the angles are")
+        raise RecordingError(f"{recording.path}: the lag of the angles cannot be measured in this scene")
     log = recording.joint_log
     first_ns, _, last_ns = _there_and_back(log)
     positions = log.position_rad[(log.time_ns >= first_ns) & (log.time_ns <= last_ns)]
@@ -74,17 +69,15 @@ def find_lag(recording: Recording) -> Lag:
 
 
 def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Float64[ndarray, " lags"]) -> LagCurve:
-    """Compare the way there and the way back under each assumed lag.
-
-    The scans of the sweep are held in memory (it needs both ways at once).
+    """Compare both directions with each assumed lag; all scans of the sweep are in memory.
 
     Args:
-        scans: scans with one number of beams.
+        scans: scans with a constant number of beams.
         joint_log: servo angles.
         lag_s: assumed lags, increasing and evenly spaced, shape (k,), k >= 3.
 
     Raises:
-        RecordingError: the axis does not turn there and back, or both ways have no angle in common.
+        RecordingError: the axis does not turn in both directions, or these have no angle in common.
     """
     listed = [scan for scan in scans if scan.range_m.size]
     if len({scan.range_m.size for scan in listed}) != 1:
@@ -100,19 +93,16 @@ def lag_curve(scans: Iterable[Scan], joint_log: JointLog, lag_s: Float64[ndarray
         back = (logged_ns > turn_ns) & (logged_ns <= last_ns)
         capped_m[k], compared[k] = _differences(joint_rad, range_m.astype(float), there, back)
     if not compared.any(axis=1).all():
-        raise RecordingError("the way there and the way back see no angle in common, so the lag cannot be measured")
+        raise RecordingError("the turns there and back have no angle in common, so the lag cannot be measured")
     cost_m = capped_m.sum(axis=1) / compared.sum(axis=1)
     sd_s = float(np.hypot(_jackknife(lag_s, capped_m, compared), (lag_s[1] - lag_s[0]) / 7))
     return LagCurve(np.asarray(lag_s, float), cost_m, _minimum(lag_s, cost_m), sd_s)
 
 
 def _jackknife(lag_s: Floats, capped_m: Floats, compared: Floats) -> float:
-    """Standard deviation of the best lag, from leaving out one block of neighbouring beams after the other.
+    """Return the standard deviation of the best lag, by the jackknife over blocks of neighbouring beams.
 
-    Args:
-        lag_s: shape (k,).
-        capped_m: sum of each beam's capped differences under each lag, shape (k, beams).
-        compared: how many they are, shape (k, beams).
+    `capped_m`, `compared`: sum and number of each beam's capped differences, shape (k, beams).
     """
     blocks = [block for block in np.array_split(np.flatnonzero(compared.any(axis=0)), _BLOCKS) if block.size]
     if len(blocks) < 2:
@@ -125,7 +115,7 @@ def _jackknife(lag_s: Floats, capped_m: Floats, compared: Floats) -> float:
 
 
 def _there_and_back(log: JointLog) -> tuple[int, int, int]:
-    """Begin, turning point and end [ns] of the sweep around the angle furthest from the first one."""
+    """Return begin, turning point and end [ns] of the sweep around the angle furthest from the first one."""
     position = np.abs(log.position_rad - log.position_rad[0])
     turn = int(np.argmax(position))
     before, after = position[turn::-1], position[turn:]
@@ -136,7 +126,7 @@ def _there_and_back(log: JointLog) -> tuple[int, int, int]:
 
 
 def _monotone(falling: Floats) -> int:
-    """Index of the lowest value before the series climbs again by more than noise."""
+    """Return the index of the lowest value before the series increases by more than noise."""
     climbs = falling - np.minimum.accumulate(falling) > _NOISE_RAD
     end = int(np.argmax(climbs)) if climbs.any() else falling.size
     return int(np.argmin(falling[:end]))
@@ -148,7 +138,7 @@ def _differences(
     there: Bool[ndarray, "scans beams"],
     back: Bool[ndarray, "scans beams"],
 ) -> tuple[Floats, Floats]:
-    """Sum and number of each beam's capped differences between two range images (beams x angle cells)."""
+    """Return sum and number of each beam's capped differences between two range images (beams x angle cells)."""
     if not (there.any() and back.any()):
         return np.zeros(range_m.shape[1]), np.zeros(range_m.shape[1])
     low = max(np.nanmin(joint_rad[there]), np.nanmin(joint_rad[back]))
@@ -160,7 +150,7 @@ def _differences(
 
 
 def _range_image(joint_rad: Floats, range_m: Floats, direction: Mask, cells: Floats) -> Floats:
-    """Range of each beam at each angle cell, straight between neighbouring scans, shape (beams, cells)."""
+    """Return the range of each beam at each angle cell by linear interpolation, shape (beams, cells)."""
     image = np.full((range_m.shape[1], cells.size), np.nan)
     for beam in range(range_m.shape[1]):
         use = direction[:, beam]
@@ -176,7 +166,7 @@ def _minimum(lag_s: Float64[ndarray, " lags"], cost: Float64[ndarray, " lags"]) 
     if k in (0, cost.size - 1):
         return float(lag_s[k])
     left, middle, right = cost[k - 1 : k + 2]
-    # Mean absolute differences make a V, not a parabola: two lines of one steepness through the three points.
+    # Mean absolute differences form a V, not a parabola: two lines of equal steepness through the three points.
     steepness = max(left, right) - middle
     shift = 0.5 * (left - right) / steepness if steepness > 0 else 0.0
     return float(lag_s[k] + shift * (lag_s[k + 1] - lag_s[k]))

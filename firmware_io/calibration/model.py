@@ -1,12 +1,12 @@
-"""The scanner with its errors: the origin and direction of each beam, and the effect of each error.
+"""Model of the scanner with its errors: origin and direction of each beam.
 
 In the fixed frame of the axis (`rot` at joint 0), a beam of joint angle j, bearing b and range r ends at
 
     p   = o + (r + bias) d,     o = Rz(psi) t,     d = Rz(psi) exp(delta) R_designed [cos b, sin b, 0]
     psi = j(t + lag) + cos1 cos j + sin1 sin j + cos2 cos 2j + sin2 sin 2j - way backlash / 2
 
-`direction` is the sign of the turning. Rotation about the axis, translation along it, and the zero of the bearing are
-gauges: no static scene shows them, so they are no parameters.
+The sign of the rotation is `direction`. Rotation about the axis, translation along it, and the zero of the bearing are
+not observable in a static scene, so they are not parameters.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.recording.recording import Recording
 from scanwright.firmware_io.samples import AxisCurve
 
-_SPEED_OVER_NS = 20_000_000  # longer than the steps between two reads of a servo, shorter than a change of speed
-AT_REST_RAD_S = np.radians(0.2)  # slower than any sweep, faster than an encoder that flickers by one step
+_SPEED_OVER_NS = 20_000_000  # longer than the time between two reads of a servo, shorter than a change of speed
+AT_REST_RAD_S = np.radians(0.2)  # slower than any sweep, faster than noise of one encoder step
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number that a calibration may find."""
+    """One parameter of a calibration."""
 
     name: str  # key in reports; ends in its unit
-    words: str  # for people
-    shown: float  # factor from SI to the unit people read
-    unit: str  # that unit
-    limit: float  # standard deviation [SI] above which the scene is taken as not showing it
+    words: str  # for messages
+    shown: float  # factor from SI to `unit`
+    unit: str  # in messages
+    limit: float  # standard deviation [SI] above which it is not observable
 
 
 _DEG, _MM, _MS = float(np.degrees(1.0)), 1e3, 1e3
@@ -68,29 +68,24 @@ BIAS, HARMONIC_1, HARMONIC_2, LAG, BACKLASH = (4,), (5, 6), (7, 8), (9,), (10,)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReturnedBeams:
-    """Every beam that returned, of all recordings, in the order they were fired.
+    """All beams with a return of all recordings, in the order of time; shapes (n,)."""
 
-    Attributes:
-        joint_rad: logged joint angle at the beam's time plus the lag that was asked for, shape (n,).
-        curves: the joint's angle over time in each recording, as `assemble` takes it: the encoder's steps smoothed.
-    """
-
-    range_m: Float64[ndarray, " n"]  # shape (n,)
-    bearing_rad: Float64[ndarray, " n"]  # shape (n,)
-    joint_rad: Float64[ndarray, " n"]
-    speed_rad_s: Float64[ndarray, " n"]  # of the joint, shape (n,)
-    recording: Int64[ndarray, " n"]  # number of the beam's recording, shape (n,)
-    place: Int64[ndarray, " n"]  # number of the scanner's place, shape (n,)
-    time_ns: Int64[ndarray, " n"]  # shape (n,)
-    curves: tuple[AxisCurve, ...]
+    range_m: Float64[ndarray, " n"]
+    bearing_rad: Float64[ndarray, " n"]
+    joint_rad: Float64[ndarray, " n"]  # logged joint angle at the beam's time plus lag
+    speed_rad_s: Float64[ndarray, " n"]  # of the joint
+    recording: Int64[ndarray, " n"]  # number of the beam's recording
+    place: Int64[ndarray, " n"]  # number of the scanner's place
+    time_ns: Int64[ndarray, " n"]
+    curves: tuple[AxisCurve, ...]  # joint angle of each recording, smoothed as in `assemble`
 
     def select(self, which: NDArray[np.generic]) -> ReturnedBeams:
-        """Some of the beams: a mask or indices."""
+        """Return some of the beams by a mask or indices."""
         columns = {name: getattr(self, name)[which] for name in _COLUMNS}
         return ReturnedBeams(**columns, curves=self.curves)
 
     def late_by(self, lag_s: float) -> ReturnedBeams:
-        """The same beams with the angles logged `lag_s` after them; beyond its ends a curve goes on at its speed."""
+        """Return the beams with the angles logged `lag_s` later; curves are extrapolated at constant speed."""
         joint_rad, speed_rad_s = np.empty(self.range_m.size), np.empty(self.range_m.size)
         for k, curve in enumerate(self.curves):
             mine = self.recording == k
@@ -98,12 +93,12 @@ class ReturnedBeams:
         return replace(self, joint_rad=joint_rad, speed_rad_s=speed_rad_s)
 
     def under(self, x: Float64[ndarray, " parameters"]) -> ReturnedBeams:
-        """The same beams with the time offset of a parameter vector; `self` must be without."""
+        """Return the beams with the time offset of a parameter vector; `self` must have none."""
         return self.late_by(x[LAG[0]]) if x[LAG[0]] else self
 
     @property
     def direction(self) -> Float64[ndarray, " n"]:
-        """+1, -1 or 0 (standing) for each beam."""
+        """+1, -1 or 0 (at rest) for each beam."""
         return np.where(np.abs(self.speed_rad_s) > AT_REST_RAD_S, np.sign(self.speed_rad_s), 0.0)
 
 
@@ -113,14 +108,13 @@ _COLUMNS = ("range_m", "bearing_rad", "joint_rad", "speed_rad_s", "recording", "
 def gather(
     recordings: Sequence[Recording], *, one_place: bool, own_body: OwnBody | None = None, gamma_rot_rad: float = 0.0
 ) -> tuple[ReturnedBeams, dict[str, int]]:
-    """All beams that returned from the scene and have an angle, and how many were left out, reason by reason.
+    """Return all beams with a return and an angle, and the counts of dropped ones by reason.
 
     Args:
         recordings: of static scenes.
-        one_place: the scanner stood still from the first recording to the last, so that all show one scene.
-        own_body: beams that end on the scanner. Its parts turn with the beams that see them: to a calibration they
-            are walls that agree with every error.
-        gamma_rot_rad: axis angle at joint position 0, from where the mask counts.
+        one_place: the scanner did not move between the recordings.
+        own_body: self-occlusion mask; parts of the rotor are walls that agree with any error.
+        gamma_rot_rad: axis angle at joint position 0, for the mask.
     """
     ranges, bearings, numbers, times = [], [], [], []
     verdicts = np.zeros(len(Verdict), np.int64)
@@ -153,7 +147,7 @@ def gather(
 
 
 def _joint(curve: AxisCurve, time_ns: Int64[ndarray, " n"]) -> tuple[Float64[ndarray, " n"], Float64[ndarray, " n"]]:
-    """Angle and speed of the joint; beyond its ends the curve goes on at its last speed."""
+    """Return angle and speed of the joint; the curve is extrapolated at its last speed."""
     first_ns, last_ns = int(curve.knot_ns[0]), int(curve.knot_ns[-1])
     half_ns = min(_SPEED_OVER_NS, (last_ns - first_ns) // 2)
     if not half_ns:
@@ -165,7 +159,7 @@ def _joint(curve: AxisCurve, time_ns: Int64[ndarray, " n"]) -> tuple[Float64[nda
 
 
 def start_vector(angles: AngleSet) -> Float64[ndarray, " parameters"]:
-    """Parameters as the angle set has them, shape (COUNT,)."""
+    """Return the parameters of an angle set, shape (COUNT,)."""
     x = np.zeros(COUNT)
     x[0:2] = np.radians(angles.delta_rotvec_rot_deg)
     x[2:4] = np.array(angles.t_rot_laser_mm[:2]) / 1000
@@ -182,47 +176,47 @@ def backlash_rad(servo: str) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mount:
-    """The laser's scan plane in the rotation frame, for one vector of parameters."""
+    """Designed mount of the laser in the rotation frame."""
 
     designed: Rotation  # rotation of the angle set without its delta, shape (3, 3)
-    along_m: float  # translation along the axis, which no calibration changes
-    backlash_rad: float  # of the servo's gear, as wide as a backlash can be that is not found
+    along_m: float  # translation along the axis, which is not calibrated
+    backlash_rad: float  # of the servo's gear, bound of a backlash that is not estimated
 
     @staticmethod
     def of(angles: AngleSet) -> Mount:
-        """The mount of an angle set, its delta taken off."""
+        """Return the mount of an angle set, without its delta."""
         bare = angles.model_copy(update={"delta_rotvec_rot_deg": (0.0, 0.0)})
         return Mount(bare.R_rot_laser(), angles.t_rot_laser_mm[2] / 1000, backlash_rad(angles.servo))
 
     def plane(self, x: Float64[ndarray, " parameters"]) -> Floats:
-        """First two columns of `exp(delta) R_designed`, and what 1 rad of each delta adds to them, shape (3, 3, 2)."""
+        """Return the first two columns of `exp(delta) R_designed`, and their derivatives, shape (3, 3, 2)."""
         exact = frames.rotvec_to_matrix([x[0], x[1], 0.0]) @ self.designed
         turn = _left_jacobian(np.array([x[0], x[1], 0.0]))
         return np.stack([exact[:, :2], *(np.cross(turn[:, k], exact[:, :2], axisb=0, axisc=0) for k in (0, 1))])
 
 
 def _left_jacobian(rotvec_rad: Float64[ndarray, " 3"]) -> Float64[ndarray, "3 3"]:
-    """exp(v + dv) = exp(J dv) exp(v) for small dv, shape (3, 3)."""
+    """Return J with exp(v + dv) = exp(J dv) exp(v) for small dv, shape (3, 3)."""
     angle = float(np.linalg.norm(rotvec_rad))
     K = np.cross(rotvec_rad, np.eye(3), axisb=0, axisc=0)
-    one = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    two = (1 - np.sinc(angle / np.pi)) / angle**2 if angle > 1e-4 else 1 / 6
-    return np.eye(3) + one * K + two * (K @ K)
+    a = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    b = (1 - np.sinc(angle / np.pi)) / angle**2 if angle > 1e-4 else 1 / 6
+    return np.eye(3) + a * K + b * (K @ K)
 
 
 def axis_angle(
     x: Float64[ndarray, " parameters"], joint_rad: Float64[ndarray, " n"], direction: Float64[ndarray, " n"]
 ) -> Float64[ndarray, " n"]:
-    """Psi of each beam, shape (n,)."""
-    one, two = joint_rad, 2 * joint_rad
-    harmonics = x[5] * np.cos(one) + x[6] * np.sin(one) + x[7] * np.cos(two) + x[8] * np.sin(two)
+    """Return psi of each beam, shape (n,)."""
+    j = joint_rad
+    harmonics = x[5] * np.cos(j) + x[6] * np.sin(j) + x[7] * np.cos(2 * j) + x[8] * np.sin(2 * j)
     return joint_rad + harmonics - 0.5 * x[10] * direction
 
 
 def beam_rays(
     mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams
 ) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
-    """Origin and direction of each beam, its lag already in `beams.joint_rad`, each shape (n, 3)."""
+    """Return origin and direction of each beam, each shape (n, 3); `beams.joint_rad` must include the lag."""
     psi = axis_angle(x, beams.joint_rad, beams.direction)
     columns = mount.plane(x)[0]
     u = np.multiply.outer(np.cos(beams.bearing_rad), columns[:, 0])

@@ -1,7 +1,7 @@
-"""What the recordings show, and what they do not: which parameters to find, which to hold, when to refuse, and why.
+"""Observability: free and fixed parameters, with reasons, and rejection of unsuitable recordings.
 
-Least squares answers always; whether the answer means something is asked here. The question is put with walls that
-bulge as real ones do: what only perfect planes would show counts as not shown.
+Least squares always has a result; this decides whether it is meaningful, for walls of realistic unevenness: parameters
+that only perfect planes would show are not observable.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from scanwright.firmware_io.calibration.solve import Grouping, Reduced, covarian
 from scanwright.firmware_io.calibration.surfaces import seen_twice
 from scanwright.firmware_io.calibration.tiles import FlatTiles
 
-BUILDERS_BULGE_M = 5e-3  # what walls may be off over a metre (DIN 18202, finished walls)
-FLATTEST_FAN_RAD = np.radians(3.0)  # a plane turned into itself shows no angle; nearer, noise grows without bound
-_TWICE = 0.05  # share of the beams
-_ONE_LINE = 0.01  # share of the surface that faces across it
-_JOINED = 0.5  # of the flat patches: three of 100 furnished rooms have 0.57 or 0.58, and none of these is wrong
+BUILDERS_BULGE_M = 5e-3  # permitted unevenness of walls over a metre (DIN 18202, finished walls)
+FLATTEST_FAN_RAD = np.radians(3.0)  # a scan plane perpendicular to the axis shows no angle; near it, noise diverges
+_TWICE = 0.05  # fraction of the beams
+_ONE_LINE = 0.01  # fraction of the surface that faces across it
+_JOINED = 0.5  # fraction of the flat patches; three of 100 furnished rooms have 0.57 or 0.58, with correct results
 
 
 @dataclass(frozen=True, slots=True)
 class Fixed:
-    """A parameter that stays as it was, and why."""
+    """A fixed parameter, and the reason."""
 
     names: tuple[str, ...]
     words: str
@@ -38,19 +38,15 @@ class Fixed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
-    """What to find."""
+    """Free and fixed parameters."""
 
-    free: Int64[ndarray, " free"]  # parameters to find, in the order of `PARAMETERS`
-    fixed: tuple[Fixed, ...]  # those that the recordings do not show
-    notes: tuple[str, ...]  # what a person should know though nothing had to be held for it
+    free: Int64[ndarray, " free"]  # in the order of `PARAMETERS`
+    fixed: tuple[Fixed, ...]
+    notes: tuple[str, ...]  # further warnings
 
 
 def check_fan(mount: Mount) -> None:
-    """Refuse a scan plane that the axis turns into itself.
-
-    Raises:
-        RecordingError: the scan plane is (nearly) perpendicular to the axis.
-    """
+    """Raise RecordingError if the scan plane is (nearly) perpendicular to the axis."""
     tilt_rad = float(np.arccos(np.clip(abs(mount.designed[2, 2]), 0.0, 1.0)))
     if tilt_rad < FLATTEST_FAN_RAD:
         raise RecordingError(
@@ -78,19 +74,19 @@ def choose_observable(
     normal: Float64[ndarray, "tiles width width"],
     backlash_rad: float,
 ) -> Choice:
-    """Decide which parameters the recordings (all their `beams`) show, with a gear of that play.
+    """Choose the parameters that the recordings show, for a gear of that backlash.
 
     Raises:
-        RecordingError: they do not show one of the mounting errors. The message names it and the reason.
+        RecordingError: a mounting error is not observable; the message names it and the reason.
     """
     turned_deg = np.degrees(np.ptp(beams.joint_rad))
     twice = tiles.count[seen_twice(tiles, grouping)].sum() / tiles.count.sum()
     if twice < _TWICE:
         raise RecordingError(
             f"too little is seen twice: {twice:.1%} of the flat surface is seen by both sides of the fan (needed: "
-            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg. Mounting errors then look like a scene of another "
-            "shape: record a full turn. A scanner that can only tilt shows them only where both ends of its fan see "
-            f"the same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches"
+            f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg. Mounting errors then look like another shape of the "
+            "scene: record a full turn. A scanner that can only tilt shows them only if both ends of its fan see the "
+            f"same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches"
         )
     free = np.array(MOUNT)
     sd = _sd(reduced(normal, grouping, free, BUILDERS_BULGE_M), free)
@@ -109,7 +105,7 @@ def choose_observable(
                 free = tried
                 continue
             why = (
-                f"found together with the others, {PARAMETERS[worst].words} would be known to "
+                f"estimated together with the others, {PARAMETERS[worst].words} would be known to "
                 f"+-{_shown(worst, sd[worst])} only (limit {_shown(worst)})"
             )
             if group == model.BACKLASH and model.LAG[0] in free:
@@ -118,7 +114,7 @@ def choose_observable(
     share = _facing(tiles, grouping)[0]
     notes = []
     if share[0] < _ONE_LINE:
-        notes.append(f"{_geometry(tiles, grouping)}; what was found rests on the other surfaces alone")
+        notes.append(f"{_geometry(tiles, grouping)}; the result depends on the other surfaces alone")
     joined = tiles.count[grouping.used].sum() / tiles.count.sum()
     if joined < _JOINED:
         notes.append(f"only {joined:.0%} of the flat patches join surfaces: the true error may exceed the stated one")
@@ -126,13 +122,13 @@ def choose_observable(
 
 
 def spectrum(part: Reduced, free: Int64[ndarray, " free"]) -> Float64[ndarray, " free"]:
-    """Singular values of the information in units of each parameter's limit, falling: below 1 is not shown."""
+    """Return singular values of the information in units of the limits, decreasing: below 1 is not observable."""
     unit = np.array([PARAMETERS[k].limit for k in free])
     return np.sqrt(np.maximum(np.linalg.eigvalsh(part.information * np.outer(unit, unit))[::-1], 0.0))
 
 
 def _sd(part: Reduced, free: Ints) -> dict[int, float]:
-    """Standard deviation of each free parameter; infinite if nothing is known."""
+    """Return the standard deviation of each free parameter; infinite if it is not observable."""
     return dict(zip(free.tolist(), np.sqrt(np.diag(covariance(part))).tolist(), strict=True))
 
 
@@ -144,7 +140,7 @@ def _inside(backlash_rad: float) -> str:
 
 
 def _motion(beams: ReturnedBeams, group: tuple[int, ...], backlash_rad: float) -> str:
-    """Why the motion of the axis cannot show a parameter, "" if it can."""
+    """Return why the motion of the axis does not show a parameter, "" if it does."""
     if group not in (model.LAG, model.BACKLASH):
         return ""
     directions = set(np.unique(beams.direction).tolist()) - {0.0}
@@ -162,7 +158,7 @@ def _motion(beams: ReturnedBeams, group: tuple[int, ...], backlash_rad: float) -
 
 
 def _facing(tiles: FlatTiles, grouping: Grouping) -> tuple[Floats, Floats]:
-    """Shares of the surface that face along three perpendicular directions, rising, and these (columns)."""
+    """Return the fractions of the surface along three principal directions, increasing, and these (columns)."""
     used = grouping.used
     normal = grouping.q[grouping.surface[used]]
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
@@ -172,7 +168,7 @@ def _facing(tiles: FlatTiles, grouping: Grouping) -> tuple[Floats, Floats]:
 
 
 def _geometry(tiles: FlatTiles, grouping: Grouping) -> str:
-    """The scene in words: what all its surfaces have in common."""
+    """Describe what all surfaces of the scene have in common."""
     share, directions = _facing(tiles, grouping)
     facing = directions * np.sign(directions[np.abs(directions).argmax(axis=0), np.arange(3)])
     shown = ["({:.2f}, {:.2f}, {:.2f})".format(*(column + 0.0)) for column in facing.T.round(2)]

@@ -1,4 +1,4 @@
-"""What a calibration found, as a record for programs and as lines for people."""
+"""Report of a calibration, as a record and as lines of text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from scanwright.firmware_io.calibration.scene_motion.overlapping_views import Ov
 from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
 
 _WALLS = 3  # largest ones, whose straightness is reported
-_FEW = 3  # beams that a slim thing may leave where others went through
+_FEW = 3  # ray conflicts caused by a slim object
 _RESIDUAL = 1.5  # times the noise within small patches
 _LESS_CRISP = "the cloud has become less crisp (higher entropy)"
 _SURE = 2.0  # standard deviations, from which on a delay is a result
@@ -26,19 +26,14 @@ _SURE = 2.0  # standard deviations, from which on a delay is a result
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How well beams and planes agree under one vector of parameters.
+    """Residuals of beams and planes for one vector of parameters."""
 
-    Attributes:
-        walls_m: straightness of the largest surfaces: root mean square height of what each side of the fan sees in each
-            square metre. Noise averages out of it; bent and double walls do not.
-    """
-
-    residual_m: float  # root mean square of the ranges' residuals about the surfaces that they belong to
-    walls_m: tuple[float, ...]
+    residual_m: float  # root mean square of the ranges' residuals about their surfaces
+    walls_m: tuple[float, ...]  # rms height, per side of the scan plane and square metre, of the largest surfaces
 
 
 def agreement(result: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> Agreement:
-    """Agreement of the beams that a calibration used, under any parameters; the planes are fitted anew."""
+    """Return the residuals of the beams of a calibration for any parameters, with refitted planes."""
     tiles, grouping = result.tiles, result.grouping
     on = result.clear & (grouping.surface[tiles.tile] >= 0)
     beams, tile = tiles.beams.select(on).late_by(x[LAG[0]]), tiles.tile[on]
@@ -66,7 +61,7 @@ def _straightness(result: Estimate, normal: Floats, grouping: Grouping) -> tuple
 def calibration_report(
     result: Estimate, start: Float64[ndarray, " parameters"], mount: Mount, beams: ReturnedBeams, witness: Witness
 ) -> dict[str, Any]:
-    """The record that goes with the calibrated angle set; it has `faults` if the result is wrong."""
+    """Return the record of a calibration; it has `faults` if the result is wrong."""
     sd = np.full(COUNT, np.nan)
     sd[result.choice.free] = np.sqrt(np.diag(result.covariance))
     applied = start.copy()
@@ -119,8 +114,8 @@ def calibration_report(
         },
         "range_noise_mm": result.noise_m * 1e3,
         "wall_bulge_mm": result.bulge_m * 1e3,
-        "residual_mm": {name: one.residual_m * 1e3 for name, one in fit.items()},
-        "wall_straightness_mm": {name: [wall * 1e3 for wall in one.walls_m] for name, one in fit.items()},
+        "residual_mm": {name: each.residual_m * 1e3 for name, each in fit.items()},
+        "wall_straightness_mm": {name: [wall * 1e3 for wall in each.walls_m] for name, each in fit.items()},
         "entropy": {
             "kernel_mm": witness.width_m * 1e3,
             "before": witness.before,
@@ -147,7 +142,6 @@ def _moved(result: Estimate) -> Iterator[str]:
 
 
 def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedBeams, residual_m: float) -> list[str]:
-    """One line each."""
     warnings, noise_m = [], result.tiles.noise_m
     if views.seen_through > _FEW:
         joined = len(beams.curves) > 1 and not beams.place.any()
@@ -170,7 +164,7 @@ def _motion_warnings(result: Estimate, views: OverlappingViews, beams: ReturnedB
 
 
 def lines(record: dict[str, Any]) -> Iterator[str]:
-    """The record for a person."""
+    """Format the record."""
     for reason, count in record["left_out"].items():
         yield f"dropped {count:,} beams: {reason.replace('_', ' ')}"
     yield (
@@ -178,9 +172,9 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         f"{record['beams_at_edges']:,} near edges (not used); "
         f"range noise {record['range_noise_mm']:.1f} mm, surface unevenness {record['wall_bulge_mm']:.1f} mm"
     )
-    for one in record["parameters"]:
-        change = f"  from {one['start']:.4f}" if one["applied_by"] == "angle set" else ""
-        yield f"  {one['words']:22} {one['value']:10.4f} +- {one['sd']:.4f} {one['unit']}{change}"
+    for entry in record["parameters"]:
+        change = f"  from {entry['start']:.4f}" if entry["applied_by"] == "angle set" else ""
+        yield f"  {entry['words']:22} {entry['value']:10.4f} +- {entry['sd']:.4f} {entry['unit']}{change}"
     for fixed in record["held"]:
         yield f"  {fixed['words']:22}       not estimated: {fixed['why']}"
     residual, walls, entropy = record["residual_mm"], record["wall_straightness_mm"], record["entropy"]
@@ -208,6 +202,6 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         yield f"warning: {note}"
     for fault in record["faults"]:
         yield f"error: {fault}"
-    for one in record["parameters"]:
-        if one["name"] == "lag_s" and abs(one["value"]) > _SURE * one["sd"]:
-            yield f"the angles are late: lag_s = {one['value'] / 1e3:.6f} corrects them"
+    for entry in record["parameters"]:
+        if entry["name"] == "lag_s" and abs(entry["value"]) > _SURE * entry["sd"]:
+            yield f"the angles are late: lag_s = {entry['value'] / 1e3:.6f} corrects them"

@@ -1,13 +1,13 @@
-"""Least squares of ranges against unknown planes.
+"""Least squares of ranges with unknown planes.
 
-A beam (o, d) meets the plane q . p = 1 at the range (1 - q . o) / (q . d); what it measured instead is its residual.
-Neither the residual's derivatives nor the choice of beams depends on the noise, so the estimate is the likeliest one
-and reaches the Cramer-Rao bound. The sums of all beams of a tile, over
+A beam (o, d) meets the plane q . p = 1 at the range (1 - q . o) / (q . d); the difference to its range is the residual.
+Neither its derivatives nor the choice of beams depends on noise, so the estimate is the maximum likelihood one and
+reaches the Cramer-Rao bound. The sums of all beams of a tile, over
 
     parameters x (k) | its surface's plane q (3) | its spot's bulge u (1) | the residual (1)
 
-are one small symmetric matrix. From these alone every bulge (walls are not as flat as planes: u of each spot is
-drawn from a normal distribution) and every plane is eliminated: what remains is the information on x, k x k.
+are one small symmetric matrix. All bulges (unevenness u of each spot, normally distributed) and planes are eliminated
+from these: the rest is the information on x, k x k.
 """
 
 from __future__ import annotations
@@ -33,25 +33,21 @@ _REFITS = 4  # of the robust weights
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grouping:
-    """Which surface and which spot of it each tile sees.
-
-    Attributes:
-        spot: number of each tile's spot, counted over all surfaces; meaningless where surface is -1, shape (m,).
-    """
+    """Surface and spot of each tile."""
 
     surface: Int64[ndarray, " tiles"]  # number of each tile's surface, -1 for none, shape (m,)
-    spot: Int64[ndarray, " tiles"]
+    spot: Int64[ndarray, " tiles"]  # number of each tile's spot, over all surfaces; invalid without one, shape (m,)
     q: Float64[ndarray, "surfaces 3"]  # plane of each surface, q . p = 1, shape (s, 3)
 
     @property
     def used(self) -> Ints:
-        """Tiles that see a surface."""
+        """Tiles with a surface."""
         return np.flatnonzero(self.surface >= 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
-    """What is left when bulges and planes are gone."""
+    """Normal equations without bulges and planes."""
 
     information: Float64[ndarray, "free free"]  # of the free parameters, shape (k, k)
     right: Float64[ndarray, " free"]  # right-hand side, shape (k,)
@@ -67,16 +63,16 @@ def sums(
     q: Float64[ndarray, "tiles 3"],
     kink: float = KINK,
 ) -> Float64[ndarray, "tiles width width"]:
-    """Normal equations of every tile, shape (m, WIDTH, WIDTH).
+    """Return the normal equations of each tile, shape (m, WIDTH, WIDTH).
 
     Args:
-        mount: where the laser sits.
+        mount: of the laser.
         x: parameters, shape (COUNT,).
-        beams: their lag already applied.
+        beams: with the lag applied.
         tile: of each beam, shape (n,).
         weight: 1 / variance of each beam's range, shape (n,).
-        q: plane that each beam should meet, one row per tile, shape (m, 3).
-        kink: standard deviations beyond which a residual counts in proportion, not in square (Huber).
+        q: plane of each tile, shape (m, 3).
+        kink: standard deviations beyond which residuals count linearly (Huber).
     """
     return _sums(
         mount.plane(x), mount.along_m, x, beams.joint_rad, beams.speed_rad_s, beams.direction, beams.bearing_rad,
@@ -109,7 +105,7 @@ def _sums(
         c, s = np.cos(psi), np.sin(psi)
         cb, sb = np.cos(bearing[i]), np.sin(bearing[i])
         a, b, n = q[tile[i], 0], q[tile[i], 1], q[tile[i], 2]
-        # the plane as the turning frame sees it
+        # plane in the rotating frame
         e, f = c * a + s * b, c * b - s * a
         u0 = plane[0, 0, 0] * cb + plane[0, 0, 1] * sb
         u1 = plane[0, 1, 0] * cb + plane[0, 1, 1] * sb
@@ -158,13 +154,9 @@ def _sums(
 def reduced(
     normal: Float64[ndarray, "tiles width width"], grouping: Grouping, free: Int64[ndarray, " free"], bulge_m: float
 ) -> Reduced:
-    """Eliminate every spot's bulge (standard deviation `bulge_m`; 0 for perfect planes) and every surface's plane.
+    """Eliminate the bulges of all spots (standard deviation `bulge_m`; 0 for perfect planes) and all planes.
 
-    Args:
-        normal: the sums of all tiles, shape (m, WIDTH, WIDTH).
-        grouping: the tiles' surfaces and spots.
-        free: parameters to find, shape (k,).
-        bulge_m: standard deviation of the walls from planes.
+    `normal`: sums of all tiles, shape (m, WIDTH, WIDTH); `free`: parameters to estimate, shape (k,).
     """
     spot, first = _per_spot(grouping, normal)
     surface_of = grouping.surface[first]
@@ -181,7 +173,7 @@ def reduced(
 
 
 def _per_spot(grouping: Grouping, values: Floats) -> tuple[Floats, Ints]:
-    """Values of tiles summed over each spot, and one tile of each spot."""
+    """Return values of tiles summed over each spot, and one tile of each spot."""
     used = grouping.used
     spots, first, numbers = np.unique(grouping.spot[used], return_index=True, return_inverse=True)
     label = np.full(len(values), -1)
@@ -190,7 +182,7 @@ def _per_spot(grouping: Grouping, values: Floats) -> tuple[Floats, Ints]:
 
 
 def _summed(values: Floats, label: Ints, labels: int) -> Floats:
-    """Rows summed by label, zero where a label has none; those of label -1 are left out."""
+    """Return rows summed by label, zero for a label without rows; skips those of label -1."""
     out = np.zeros((labels, *values.shape[1:]))
     _add(values.reshape(len(values), -1), label, out.reshape(labels, -1))
     return out
@@ -205,7 +197,7 @@ def _add(values: Array, label: Ints, out: Array) -> None:
 
 
 def step(part: Reduced) -> tuple[Floats, Floats]:
-    """One Gauss-Newton step of the free parameters, and of every surface's plane."""
+    """Return one Gauss-Newton step of the free parameters, and of the plane of each surface."""
     scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     scaled = part.information * np.outer(scale, scale)
     dx = -scale * np.linalg.lstsq(scaled, scale * part.right, rcond=1e-10)[0]
@@ -213,7 +205,7 @@ def step(part: Reduced) -> tuple[Floats, Floats]:
 
 
 def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
-    """Covariance of the free parameters, shape (k, k); infinite if the information is singular."""
+    """Return the covariance of the free parameters, shape (k, k); infinite if the information is singular."""
     scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information * np.outer(scale, scale))
     with np.errstate(divide="ignore"):
@@ -230,15 +222,15 @@ def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
 
 
 def moved_by_last(part: Reduced) -> Floats:
-    """What the other parameters take on for each unit that the last one is off while it is held, shape (k - 1,)."""
+    """Return the error of the other parameters per unit of error of the fixed last one, shape (k - 1,)."""
     others = Reduced(part.information[:-1, :-1], part.right[:-1], part.plane_rows)
     return covariance(others) @ part.information[:-1, -1]
 
 
 def bulge_m(normal: Floats, grouping: Grouping) -> float:
-    """How far spots are off their planes, beyond noise: standard deviation, from the median."""
+    """Return the standard deviation of spots from their planes, beyond noise, by the median."""
     spot, _ = _per_spot(grouping, normal[:, _U, [_U, _E]])
-    spot = spot[spot[:, 0] > 0]  # those seen at grazing angles only have nothing to say
+    spot = spot[spot[:, 0] > 0]  # without those seen only at grazing angles
     square, noise = (spot[:, 1] / spot[:, 0]) ** 2, 1 / spot[:, 0]
     low, high = 0.0, float(square.max())
     for _ in range(60):
@@ -251,14 +243,14 @@ def bulge_m(normal: Floats, grouping: Grouping) -> float:
 
 
 def misfits(normal: Floats, beams: Ints) -> Floats:
-    """Mean squared residual of each tile, in units of its variance, shape (m,); `beams` in each of them."""
+    """Return the mean squared residual of each tile, in units of its variance, shape (m,); `beams`: their number."""
     return normal[:, _E, _E] / np.maximum(beams, 1)
 
 
 def planes_alone(
     mount: Mount, x: Floats, beams: ReturnedBeams, tile: Ints, weight: Floats, grouping: Grouping
 ) -> Grouping:
-    """The same surfaces with the planes that fit best when the parameters stay as they are."""
+    """Fit the planes of the surfaces with fixed parameters."""
     none = np.array([], np.int64)
     for _ in range(_REFITS):
         normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)])
@@ -267,11 +259,11 @@ def planes_alone(
 
 
 def heights(normal: Floats) -> tuple[Floats, Floats]:
-    """Mean height of each tile over its surface [m] and its weight, each shape (m,)."""
+    """Return the mean height of each tile over its surface [m] and its weight, each shape (m,)."""
     weight = normal[:, _U, _U]
     return -normal[:, _U, _E] / np.maximum(weight, 1e-300), weight
 
 
 def rms(normal: Floats, weight_sum: float) -> float:
-    """Root mean square of the residuals that a sum was made from [m]."""
+    """Return the root mean square of the residuals in sums [m]."""
     return float(np.sqrt(normal[:, _E, _E].sum() / weight_sum))

@@ -1,7 +1,7 @@
-"""Surfaces: tiles that lie in one plane, as near as the present knowledge of the scanner allows.
+"""Surfaces: tiles in one plane, within the present errors of the scanner.
 
-The largest surface first: the plane that most beams agree with takes its tiles, and so on until what is left is in
-too few looks to say anything. A surface may be a whole wall, or one board that two sides of the fan see.
+The largest surface is first: the plane with most beams gets its tiles, and so on until too few tiles remain. A surface
+can be an entire wall, or a board that both sides of the scan plane see.
 """
 
 from __future__ import annotations
@@ -19,25 +19,23 @@ from scanwright.firmware_io.calibration.model import Mount, beam_rays
 from scanwright.firmware_io.calibration.solve import Grouping
 from scanwright.firmware_io.calibration.tiles import FlatTiles, normals
 
-_SAMPLE = 200  # tiles: so many tell which planes are the largest
-_REFITS = 15  # a plane grows from its seed to the ends of its wall
+_SAMPLE = 200  # tiles, which suffice to rank planes by size
+_REFITS = 15  # to grow a plane from its seed to the ends of its wall
 _MISFIT = 4.0  # standard deviations of a mean of squares
-_GRAZING = 0.08  # cosine: to a plane it grazes, a beam is near everywhere
-_SPOT_M = 1.0  # walls keep their height over their plane about as far as this
-_NEAREST_M = 0.1  # a plane this near the axis has no usable form q . p = 1
+_GRAZING = 0.08  # cosine, below which a beam is near the plane everywhere
+_SPOT_M = 1.0  # correlation length of the unevenness of walls
+_NEAREST_M = 0.1  # to the axis; the form q . p = 1 fails nearer
 _NO_PLANE = "no flat patches lie in one plane: a calibration needs walls, floors or other planes, densely scanned"
-_FEWEST = 3  # tiles: two looks at one place and one more, or three places
+_FEWEST = 3  # tiles: two views of one place and one more, or three places
 
 
 def group(
     tiles: FlatTiles, mount: Mount, x: Float64[ndarray, " parameters"], near_m: float, turn_rad: float, vague_rad: float
 ) -> Grouping:
-    """Put tiles together that are within `near_m` and `turn_rad` (beyond their own noise) of one plane.
+    """Group tiles that are within `near_m` and `turn_rad` (beyond their noise) of one plane.
 
-    Tiles that know their normal worse than `vague_rad` are left alone: they would join any plane that they touch.
-
-    Raises:
-        RecordingError: no tiles share a plane.
+    Tiles with a normal less certain than `vague_rad` are dropped: they would join any plane. RecordingError if no tiles
+    share a plane.
     """
     origin, direction = beam_rays(mount, x, tiles.middle.under(x))
     point = origin + (tiles.middle.range_m + x[4])[:, None] * direction
@@ -86,7 +84,7 @@ def _grown(
     limit: Array,
     near_m: float,
 ) -> tuple[Array, float, Mask]:
-    """The plane n . p = c that grows from a tile to the ends of its wall, and which tiles that are left lie in it."""
+    """Grow the plane n . p = c from a tile to the ends of its wall; return it and the remaining tiles in it."""
     n, c = normal[seed].copy(), _dot(normal[seed], point[seed])
     mine = np.zeros(left.size, np.bool_)
     for _ in range(_REFITS):
@@ -115,9 +113,9 @@ def _dot(a: Array, b: Array) -> float:
 
 @njit(cache=True, nogil=True)
 def _plane(mine: Mask, point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
-    """Plane through those of weighted points that are marked; few of them lean on their normals.
+    """Fit a plane to the marked points, with their normals if they are in a row.
 
-    In loops: products and means of whole arrays would take three seconds to compile.
+    In loops, as products and means of arrays would take three seconds to compile.
     """
     total, mean, n, spread = 0.0, np.zeros(3), np.zeros(3), np.zeros((3, 3))
     for i in range(mine.size):
@@ -135,7 +133,7 @@ def _plane(mine: Mask, point: Array, normal: Array, weight: Array) -> tuple[Arra
                     spread[k, other] += weight[i] * (point[i, k] - mean[k]) * (point[i, other] - mean[other])
     values, vectors = np.linalg.eigh(spread)
     length = np.sqrt(_dot(n, n))
-    if values[1] < 1e-2 * values[2]:  # in a row: any plane through the row fits
+    if values[1] < 1e-2 * values[2]:  # in a row
         for k in range(3):
             n[k] /= length
     else:
@@ -146,16 +144,13 @@ def _plane(mine: Mask, point: Array, normal: Array, weight: Array) -> tuple[Arra
 
 
 def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping:
-    """The same surfaces without the tiles that scatter about them more than chance allows.
-
-    `misfit` is the mean squared residual of each tile in units of its variance, `beams` their number, shape (m,) each.
-    """
+    """Drop the tiles whose mean squared residual `misfit`, in units of its variance, is significantly above 1."""
     chance = 1 + _MISFIT * np.sqrt(2 / np.maximum(beams, 1))
     return replace(grouping, surface=np.where(misfit < chance, grouping.surface, -1))
 
 
 def seen_twice(tiles: FlatTiles, grouping: Grouping) -> Ints:
-    """Tiles whose spot both sides of the fan see."""
+    """Return the tiles whose spot both sides of the scan plane see."""
     used = grouping.used
     spots, inverse = np.unique(grouping.spot[used], return_inverse=True)
     sides = np.zeros((spots.size, 2), bool)

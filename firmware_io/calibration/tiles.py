@@ -1,8 +1,8 @@
-"""Tiles: what the lidar saw through a small window of bearing and joint angle, where that is flat.
+"""Tiles: flat parts of the scene in small windows of bearing and joint angle.
 
-A tile is cut from the beams by their bearing and joint angle, never by where their points lie: so neither noise nor a
-wrong mounting moves a beam from one tile into another, and one tile holds one look at one place, of one pass of the
-axis. Windows that see an edge are cut into four until they are flat or too small.
+Beams are assigned to tiles by bearing and joint angle, not by their points: so neither noise nor a wrong mounting
+changes the tile of a beam, and a tile is one view of one place, in one pass of the axis. Windows with an edge are split
+into four until they are flat or too small.
 """
 
 from __future__ import annotations
@@ -20,30 +20,25 @@ from scanwright.firmware_io.calibration.model import Mount, ReturnedBeams, axis_
 from scanwright.firmware_io.samples import AxisCurve
 
 _WINDOWS_RAD = tuple(np.radians([6.0, 3.0, 1.5]))
-_LEAST = 12  # beams in a tile: three make a plane, the rest say whether it is one
-_FEWEST = 50  # windows: their median roughness is the noise
-_FLICKER_RAD = np.radians(1.0)  # more than the backlash of any servo: smaller reversals are none
-_ROUGHEST = 1.5  # times the noise: far or dark surfaces are noisier than most, edges are far rougher
-_STEEPEST = np.cos(np.radians(84.0))  # flatter looks along a surface are all roughness and beam width
+_LEAST = 12  # beams in a tile: three define a plane, the others check it
+_FEWEST = 50  # windows, whose median roughness is the noise
+_FLICKER_RAD = np.radians(1.0)  # above the backlash of any servo
+_ROUGHEST = 1.5  # times the noise; far or dark surfaces are noisier, edges far rougher
+_STEEPEST = np.cos(np.radians(84.0))  # grazing views beyond are dominated by roughness and beam width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatTiles:
-    """Flat looks, and the beams in them sorted by tile.
-
-    Attributes:
-        normal_laser: normal of the tile's plane in the laser frame, towards the laser, shape (m, 3).
-        side: which side of the fan looks, 0 or 1: the first half of the fan meets what the second half sees too.
-    """
+    """Flat tiles, with their beams sorted by tile."""
 
     beams: ReturnedBeams  # beams of all tiles
     start: Int64[ndarray, " bounds"]  # index of each tile's first beam, shape (m + 1,)
-    middle: ReturnedBeams  # one beam per tile, through its middle, its range by the tile's own plane, shape (m,)
-    normal_laser: Float64[ndarray, "tiles 3"]
-    normal_sd_rad: Float64[ndarray, " tiles"]  # how well that is known, shape (m,)
+    middle: ReturnedBeams  # one beam per tile through its middle, its range by the tile's plane, shape (m,)
+    normal_laser: Float64[ndarray, "tiles 3"]  # normal of the tile in the laser frame, towards the laser, shape (m, 3)
+    normal_sd_rad: Float64[ndarray, " tiles"]  # its standard deviation, shape (m,)
     rms_m: Float64[ndarray, " tiles"]  # of the beams' ranges about the tile's plane, shape (m,)
-    side: Int64[ndarray, " tiles"]
-    noise_m: float  # standard deviation of a range: the median of what tiles show
+    side: Int64[ndarray, " tiles"]  # side of the scan plane, 0 or 1, shape (m,)
+    noise_m: float  # standard deviation of a range: median of the tiles
     dropped: int  # beams in no tile
 
     @property
@@ -53,7 +48,7 @@ class FlatTiles:
 
     @property
     def variance_m2(self) -> Float64[ndarray, " tiles"]:
-        """Variance of a range in each tile, shape (m,): the common noise, and more if a tile is rougher than that."""
+        """Variance of a range in each tile, shape (m,): the common noise, or more in a rougher tile."""
         chance = 1 + 3 * np.sqrt(2 / np.maximum(self.count - 3, 1))
         return self.noise_m**2 + np.maximum(self.rms_m**2 - chance * self.noise_m**2, 0.0)
 
@@ -75,11 +70,7 @@ class _Flat:
 
 
 def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " parameters"]) -> FlatTiles:
-    """Cut all beams into flat tiles.
-
-    Raises:
-        RecordingError: no window of the recording shows a flat surface.
-    """
+    """Assign all beams to flat tiles; RecordingError without a flat window."""
     side, turned_back = fan_side(beams, mount), _turned_back(beams)
     noise_m = _noise(beams, side, turned_back, mount, x)
     left = np.arange(beams.range_m.size)
@@ -87,7 +78,10 @@ def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " paramet
     for window_rad in _WINDOWS_RAD:
         order, start = _windows(beams, side, turned_back, left, window_rad)
         flat = _fit(beams.select(order), start, mount, x)
-        accepted = _is_flat(flat, noise_m)
+        freedom = np.maximum(np.diff(flat.start) - 3, 1)
+        with np.errstate(invalid="ignore"):
+            smooth = flat.rms_m < noise_m * (_ROUGHEST + 2.5 / np.sqrt(2 * freedom))
+            accepted = smooth & (flat.slant > _STEEPEST)
         rows = np.repeat(accepted, np.diff(flat.start))
         results.append((order[rows], _only(flat, accepted)))
         left = order[~rows]
@@ -108,28 +102,28 @@ def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " paramet
 
 
 def normals(tiles: FlatTiles, mount: Mount, x: Float64[ndarray, " parameters"]) -> Float64[ndarray, "tiles 3"]:
-    """Normal of each tile in the fixed frame of the axis, shape (m, 3)."""
+    """Return the normal of each tile in the fixed frame of the axis, shape (m, 3)."""
     columns = mount.plane(x)[0]
     R = np.column_stack([columns, np.cross(columns[:, 0], columns[:, 1])])
     return _turned(tiles.normal_laser @ R.T, axis_angle(x, tiles.middle.under(x).joint_rad, tiles.middle.direction))
 
 
 def fan_side(beams: ReturnedBeams, mount: Mount) -> Int64[ndarray, " beams"]:
-    """0 or 1: on which side of the bearing that comes closest to the axis a beam lies, shape (n,)."""
+    """Return 0 or 1 by the side of each beam of the bearing closest to the axis, shape (n,)."""
     toward = mount.designed[2, :2]
     bearing_rad = np.arctan2(toward[1], toward[0])
     return (np.sin(beams.bearing_rad - bearing_rad) > 0).astype(np.int64)
 
 
 def _windows(beams: ReturnedBeams, side: Ints, turned_back: Ints, which: Ints, window_rad: float) -> tuple[Ints, Ints]:
-    """Beams sorted by window, and the first one of each window that holds enough beams; others are kept behind."""
+    """Return the beams sorted by window, and the index of the first one of each window."""
     mine = beams.select(which)
     keys = (
         mine.recording,
         turned_back[which],
         side[which],
         np.floor(mine.bearing_rad / window_rad).astype(np.int64),
-        np.floor(mine.joint_rad / window_rad).astype(np.int64),  # counts turns: one pass of the axis to a window
+        np.floor(mine.joint_rad / window_rad).astype(np.int64),  # counts turns: one pass of the axis per window
     )
     key = np.zeros(which.size, np.int64)
     for part in keys:
@@ -140,7 +134,7 @@ def _windows(beams: ReturnedBeams, side: Ints, turned_back: Ints, which: Ints, w
 
 
 def _turned_back(beams: ReturnedBeams) -> Int64[ndarray, " beams"]:
-    """How often the axis has turned back before each beam, shape (n,)."""
+    """Return the number of reversals of the axis before each beam, shape (n,)."""
     back = np.zeros(beams.time_ns.size, np.int64)
     for k, curve in enumerate(beams.curves):
         mine = beams.recording == k
@@ -149,7 +143,7 @@ def _turned_back(beams: ReturnedBeams) -> Int64[ndarray, " beams"]:
 
 
 def _reversals_ns(curve: AxisCurve) -> list[int]:
-    """Times at which the axis was furthest before it came back by more than an encoder's flicker."""
+    """Return the times of the extremes of the axis before reversals by more than noise."""
     results: list[int] = []
     direction, furthest, at_ns = 0, float(curve.coefficient[0, 0]), int(curve.knot_ns[0])
     for time_ns, angle_rad in zip(curve.knot_ns.tolist(), curve.angle_at(curve.knot_ns).tolist(), strict=True):
@@ -163,7 +157,7 @@ def _reversals_ns(curve: AxisCurve) -> list[int]:
 
 
 def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
-    """The plane q of each window: 1/r is linear in it, so one weighted least squares finds it."""
+    """Fit the plane q of each window by weighted least squares, as 1/r is linear in it."""
     origin, direction = beam_rays(mount, x, beams)
     range_m = beams.range_m + x[4]
     count = np.diff(start)
@@ -180,12 +174,12 @@ def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
 
 @njit(cache=True, nogil=True)
 def _normal_equations(origin: Array, direction: Array, range_m: Array, start: Ints) -> tuple[Array, Array]:
-    """Sums of each window: regressors with each other, shape (m, 3, 3), and with 1/r, shape (m, 3)."""
+    """Return sums of each window: regressors with each other, shape (m, 3, 3), and with 1/r, shape (m, 3)."""
     windows = start.size - 1
     information, right = np.zeros((windows, 3, 3)), np.zeros((windows, 3))
     row = np.zeros(3)
     for w in range(windows):
-        weight = range_m[start[w] : start[w + 1]].mean() ** 2  # turns a difference of 1/r into one of r
+        weight = range_m[start[w] : start[w + 1]].mean() ** 2  # converts a difference of 1/r to one of r
         for k in range(start[w], start[w + 1]):
             for i in range(3):
                 row[i] = weight * (direction[k, i] + origin[k, i] / range_m[k])
@@ -200,7 +194,7 @@ def _normal_equations(origin: Array, direction: Array, range_m: Array, start: In
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _misfits(origin: Array, direction: Array, range_m: Array, start: Ints, q: Array) -> tuple[Array, Array]:
-    """Sums of each window: squares of what its ranges are off its plane, and of the beams' slants to it."""
+    """Return sums of each window: squared residuals of its ranges, and slants of its beams."""
     square, slants = np.zeros(len(q)), np.zeros(len(q))
     for w in range(len(q)):
         a, b, c = q[w]
@@ -213,7 +207,7 @@ def _misfits(origin: Array, direction: Array, range_m: Array, start: Ints, q: Ar
 
 
 def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x: Floats) -> float:
-    """Median of the roughness of the smallest windows that hold enough beams."""
+    """Return the median roughness of the smallest windows with enough beams."""
     everything = np.arange(beams.range_m.size)
     for window_rad in reversed(_WINDOWS_RAD):
         order, start = _windows(beams, side, turned_back, everything, window_rad)
@@ -224,14 +218,8 @@ def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x:
     widest = np.degrees(_WINDOWS_RAD[0])
     raise RecordingError(
         f"fewer than {_FEWEST} windows of {widest:.0f} x {widest:.0f} deg hold {_LEAST} beams: the scan is too coarse, "
-        "or too short, to tell flat surfaces; turn the axis more slowly or scan longer"
+        "or too short, to find flat surfaces; turn the axis more slowly or scan longer"
     )
-
-
-def _is_flat(flat: _Flat, noise_m: float) -> Bool[ndarray, " windows"]:
-    freedom = np.maximum(np.diff(flat.start) - 3, 1)
-    with np.errstate(invalid="ignore"):
-        return (flat.rms_m < noise_m * (_ROUGHEST + 2.5 / np.sqrt(2 * freedom))) & (flat.slant > _STEEPEST)
 
 
 def _only(flat: _Flat, which: Bool[ndarray, " windows"]) -> _Flat:
@@ -241,7 +229,7 @@ def _only(flat: _Flat, which: Bool[ndarray, " windows"]) -> _Flat:
 
 
 def _middle(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats, q: Floats) -> ReturnedBeams:
-    """One beam through the middle of each tile."""
+    """Return one beam through the middle of each tile."""
     first, count = start[:-1], np.diff(start)
 
     def mean(column: Floats) -> Floats:

@@ -1,1 +1,1 @@
-"""Cloud files: PLY, PCD, LAS, E57, NPZ, XYZ."""
+"""Reading and writing of cloud files."""

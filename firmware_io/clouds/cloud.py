@@ -1,7 +1,4 @@
-"""A cloud as all formats see it, and the lines of text that carry what a format has no field for.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Point cloud of any format, and lines of text for properties without a field; errors raise RecordingError."""
 
 from __future__ import annotations
 
@@ -25,10 +22,10 @@ Column = NDArray[Any]
 COLUMN_TYPES = {"intensity": "<f4", "time_s": "<f8", "joint_rad": "<f8", "ring": "<u2"} | dict.fromkeys(
     ("red", "green", "blue", "alpha"), "|u1"
 )
-"""What the columns of our own clouds hold. Others keep the type of their file."""
+"""Types of the columns of assembled clouds. Others keep the type of their file."""
 _OTHER_LETTERS = re.compile(r"[^A-Za-z0-9_.-]")
-_NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
-_ORTHONORMAL_ERROR = 1e-3  # and so is a matrix
+_NORM_ERROR = 1e-2  # of a quaternion printed with three digits
+_ORTHONORMAL_ERROR = 1e-3  # of such a matrix
 _COLUMN_KINDS = {"f4", "f8", *(f"{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
 _EVER_NS = 2**63  # an int64 ends there, in 2262
 _FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
@@ -36,17 +33,14 @@ _FARTHEST_M = 1e9  # maps in the Earth's coordinates lie 6.4e6 m from its centre
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cloud:
-    """Points as one stand of one scanner saw them; row i of every column belongs to point i.
+    """Points of one scan position; row i of each column belongs to point i. Invalid values raise RecordingError.
 
     Attributes:
-        points_m: shape (n, 3), float32 or float64, in the frame of the cloud; NaN where nothing came back.
-        columns: further scalars by name, shape (n,) each; ours are `COLUMN_TYPES`.
+        points_m: float32 or float64, in the frame of the cloud; NaN without a return.
+        columns: further scalars by name, shape (n,) each.
         shape: rows and columns of an organised cloud, row by row; (1, n) of a flat one.
-        T_world_cloud: where the cloud stands, shape (4, 4).
-        start_ns: moment of `time_s` = 0 since 1970, where it is known.
-
-    Raises:
-        RecordingError: arrays do not fit each other, a column is no numbers, the pose is none, or the start is no time.
+        T_world_cloud: pose of the cloud, shape (4, 4).
+        start_ns: time of `time_s` = 0 since 1970, if known.
     """
 
     points_m: Float[ndarray, "n 3"]
@@ -85,25 +79,25 @@ class Cloud:
         return np.isfinite(self.points_m).all(axis=1)
 
     def flat(self) -> Cloud:
-        """The points alone: no row without one, no shape."""
+        """Return the cloud without rows and columns, and without rows that are not a point."""
         valid = self.valid
         if valid.all():
             return Cloud(self.points_m, self.columns, (1, len(valid)), self.T_world_cloud, self.start_ns)
         return self.select(np.flatnonzero(valid))
 
     def select(self, rows: Int64[ndarray, " kept"]) -> Cloud:
-        """Some of the rows, as a flat cloud."""
+        """Return some of the rows as a flat cloud."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Cloud(self.points_m[rows], columns, (1, len(rows)), self.T_world_cloud, self.start_ns)
 
     @property
     def placed(self) -> bool:
-        """Whether the cloud has a pose of its own."""
+        """Whether the cloud has a pose other than the identity."""
         return not np.array_equal(self.T_world_cloud, np.eye(4))
 
 
 def check_pose(T: Pose) -> None:
-    """Refuse what is no pose."""
+    """Raise RecordingError if a matrix is not a pose."""
     if T.shape != (4, 4) or T.dtype.kind != "f" or not np.isfinite(T).all():
         raise RecordingError(f"pose: shape {T.shape}, {T.dtype}: 4 x 4 finite numbers")
     R = T[:3, :3]
@@ -116,14 +110,14 @@ def check_pose(T: Pose) -> None:
 
 
 def as_type(values: Column, kind: np.dtype[Any] | str) -> Column:
-    """The values in another type, which must hold them; only fractions are rounded, and only to a type of floats."""
+    """Convert values to a type that can represent them; only fractions are rounded, and only to floats."""
     kind = np.dtype(kind)
     with np.errstate(all="ignore"):
         converted = values.astype(kind)
         if kind.kind == "f":
             fits = np.isfinite(converted) | ~np.isfinite(values) if values.dtype.kind == "f" else np.isfinite(converted)
         else:
-            # no type of whole numbers holds all of the others: compare on the wider one's ground
+            # compare value and sign, since no integer type can represent all others
             fits = (converted == values) & ((converted < 0) == (values < 0))
     if not fits.all():
         raise RecordingError(f"{values[np.argmin(fits)]} does not fit {kind.name}")
@@ -131,7 +125,7 @@ def as_type(values: Column, kind: np.dtype[Any] | str) -> Column:
 
 
 def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
-    """The cloud as one structured array, little endian: x y z, then its columns, in names that headers can hold."""
+    """Return a structured array, little endian: x y z, then the columns, with names for headers."""
     real = "<f4" if cloud.points_m.dtype == np.float32 else "<f8"
     kinds = [(axis, real) for axis in "xyz"]
     names = {name: _OTHER_LETTERS.sub("_", name) for name in cloud.columns}  # LAS and E57 have spaces and colons
@@ -145,7 +139,7 @@ def cloud_rows(cloud: Cloud) -> NDArray[np.void]:
 
 
 def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
-    """The cloud of a structured array with x y z, and of what the lines of its header tell."""
+    """Return the cloud of a structured array with x y z, and of the lines of its header."""
     names = rows.dtype.names or ()
     if not {*"xyz"} <= set(names):
         raise RecordingError(f"the columns are {' '.join(names)}; a cloud has x y z")
@@ -156,7 +150,7 @@ def cloud_from_rows(rows: NDArray[np.void], lines: Iterable[str]) -> Cloud:
 
 
 def headlines(cloud: Cloud) -> list[str]:
-    """Shape, pose and start in words, for the comments of a file."""
+    """Format shape, pose and start for the comments of a file."""
     height, width = cloud.shape
     lines = [f"width {width}", f"height {height}"] if cloud.organised else []
     if cloud.placed:
@@ -167,7 +161,7 @@ def headlines(cloud: Cloud) -> list[str]:
 
 
 def with_header(cloud: Cloud, lines: Iterable[str]) -> Cloud:
-    """The cloud with what `headlines` wrote."""
+    """Return the cloud with the properties in lines of `headlines`."""
     shape, T, start_ns = list(cloud.shape), cloud.T_world_cloud, cloud.start_ns
     for line in lines:
         match line.split():
@@ -190,14 +184,14 @@ def _numbers(line: str, words: Iterable[str]) -> list[float]:
 
 
 def pose_numbers(T: Pose) -> Float64[ndarray, " 7"]:
-    """Position and quaternion: x y z qx qy qz qw."""
+    """Return position and quaternion of a pose: x y z qx qy qz qw."""
     from scipy.spatial.transform import Rotation
 
     return np.concatenate([T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True)])
 
 
 def pose_matrix(numbers: Iterable[float]) -> Pose:
-    """Inverse of `pose_numbers`."""
+    """Return the pose of `pose_numbers`."""
     from scipy.spatial.transform import Rotation
 
     x, y, z, *quaternion = numbers
@@ -210,5 +204,5 @@ def pose_matrix(numbers: Iterable[float]) -> Pose:
 
 
 def colour_bytes(values: Column) -> Column:
-    """Colours as bytes, of whole numbers up to 255 or to 65535."""
+    """Convert integer colours up to 255 or 65535 to bytes."""
     return (values // 257 if values.max(initial=0) > 255 else values).astype(np.uint8)

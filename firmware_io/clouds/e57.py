@@ -1,7 +1,7 @@
 """E57 (ASTM E2807): several scans in one file, each with its pose, organised by row and column, invalid points marked.
 
-Written node by node with libe57, as the layer above it knows neither times nor columns of other names, and rounds to
-float32. Ours go under an extension of the format, prefix `sw`, which other software skips.
+Written node by node with libe57, as pye57 supports neither times nor columns of other names, and rounds to float32.
+Such columns have an extension of the format, prefix `sw`, which other software skips.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts, surv
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"
-_MOST_PACKED = 8  # points to a byte: three axes of a bit each, with nothing else
-_MOST_EMPTY = 100  # cells to a point: rows and columns that are emptier mean something else
+_MOST_PACKED = 8  # points per byte: three axes of a bit each
+_MOST_EMPTY = 100  # cells per point, above which rows and columns have another meaning
 _AT_ONCE = 100_000  # points
 _NO_POINT = 2  # cartesianInvalidState: neither a point nor a direction
 _COLOURS = {"red": "colorRed", "green": "colorGreen", "blue": "colorBlue"}
@@ -46,7 +46,7 @@ _STRUCTURE = {"cartesianInvalidState", "sphericalInvalidState", "rowIndex", "col
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
-    """All scans of a file."""
+    """Read all scans of a file."""
     if not path.is_file():
         raise RecordingError(f"{path}: cannot read: No such file or directory")
     with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
@@ -105,7 +105,7 @@ def _write_scans(place: Path, scans: Iterable[_Scan], name: str) -> None:
         e57.image_file.cancel()
         raise
     finally:
-        del e57.image_file  # its destructor would close it once more, and complain where the disk is full
+        del e57.image_file  # its destructor would close it again, with an error on a full disk
 
 
 def _read_scan(e57: pye57.E57, number: int) -> Cloud:
@@ -148,7 +148,7 @@ def _flat_cloud(header: Any, values_of: dict[str, Column]) -> Cloud:
 
 
 def _organised(cloud: Cloud, row: Column, column: Column) -> Cloud:
-    """The cloud with every point in its cell; cells that the file left out are NaN."""
+    """Return the cloud with each point in its cell, and NaN in cells that the file omits."""
     row, column = row - row.min(), column - column.min()
     height, width = int(row.max()) + 1, int(column.max()) + 1
     cell = row * width + column
@@ -257,7 +257,7 @@ def _write_points(file: Any, points: Any, parts: Iterable[dict[str, Column]]) ->
             if writer is None:
                 buffers = libe57.VectorSourceDestBuffer()
                 for name, values in fields.items():
-                    # The bindings take int64 for int32, and libe57 refuses an infinity on its way to single
+                    # The bindings take int64 for int32, and libe57 refuses to convert an infinity to single
                     arrays[name] = np.empty(_AT_ONCE, np.float32 if values.dtype == np.float32 else np.float64)
                     buffers.append(libe57.SourceDestBuffer(file, name, arrays[name], _AT_ONCE, True, True))
                 writer = points.writer(buffers)
@@ -268,11 +268,11 @@ def _write_points(file: Any, points: Any, parts: Iterable[dict[str, Column]]) ->
                 writer.write(count)
     finally:
         if writer is not None:
-            writer.close()  # one that outlives its file takes the process with it
+            writer.close()  # an open writer without its file crashes the process
 
 
 def _node(file: Any, values: Column, limits: tuple[float, float]) -> Any:
-    """What says how one field is stored; `limits` are those of its integers."""
+    """Return the node of the type of one field; `limits` are those of its integers."""
     if values.dtype.kind == "f":
         precision = libe57.E57_SINGLE if values.dtype.itemsize == 4 else libe57.E57_DOUBLE
         return libe57.FloatNode(file, 0.0, precision)

@@ -1,4 +1,4 @@
-"""What people do to a cloud before they use it: strays out, one point to a voxel, which way its surfaces face."""
+"""Filters of a cloud: outliers, one point per voxel, and normals."""
 
 from __future__ import annotations
 
@@ -16,16 +16,11 @@ _AT_ONCE = 1 << 16  # points: bounds the memory of their neighbours
 
 
 def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = NEIGHBOURS) -> Bool[ndarray, " n"]:
-    """Points that stand alone, shape (n,): on average farther from their neighbours than most others are from theirs.
+    """Return isolated points, shape (n,), whose mean distance to their neighbours exceeds that of others.
 
-    Farther than the mean of all by more than `sigmas` standard deviations: R. B. Rusu, "Semantic 3D Object Maps for
-    Everyday Manipulation in Human Living Environments" (2009), section 4.1, as PCL and Open3D do it. In a cloud of one
-    stand far surfaces are sparser than near ones, and go first.
-
-    Args:
-        points_m: shape (n, 3), finite.
-        sigmas: more leave more in.
-        neighbours: of each point.
+    The limit is the mean of all points plus `sigmas` standard deviations: R. B. Rusu, "Semantic 3D Object Maps for
+    Everyday Manipulation in Human Living Environments" (2009), section 4.1, as in PCL and Open3D. In a cloud of one
+    scan position, far surfaces are sparser than near ones and are dropped first. `points_m` must be finite.
     """
     count = len(points_m)
     k = min(neighbours, count - 1)
@@ -36,10 +31,7 @@ def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = N
 
 
 def one_to_a_voxel(points_m: Float[ndarray, "n 3"], edge_m: float) -> Int64[ndarray, " kept"]:
-    """Index of the point nearest to the mean of each voxel, in increasing order, shape (m,).
-
-    Points stay as measured, with their time, beam and intensity.
-    """
+    """Return the indices of the points nearest to the mean of each voxel, increasing, shape (m,)."""
     voxel = voxel_of(np.asarray(points_m, float), edge_m)
     mean_m = voxel_sums(voxel, points_m) / np.bincount(voxel)[:, None]
     off_m2 = np.sum((points_m - mean_m[voxel]) ** 2, axis=1)
@@ -51,14 +43,9 @@ def one_to_a_voxel(points_m: Float[ndarray, "n 3"], edge_m: float) -> Int64[ndar
 def normals(
     points_m: Float[ndarray, "n 3"], seen_from_m: Float64[ndarray, "... 3"], neighbours: int = NEIGHBOURS
 ) -> Float32[ndarray, "n 3"]:
-    """Unit normals of the surfaces that points lie on, towards where they were seen from, shape (n, 3).
+    """Return unit normals of surfaces towards `seen_from_m`, shape (3,) or (n, 3); NaN for fewer than three points.
 
-    The direction in which a point and its neighbours spread least; NaN where fewer than three points are.
-
-    Args:
-        points_m: shape (n, 3), finite.
-        seen_from_m: shape (3,) or (n, 3).
-        neighbours: that lie on one surface.
+    A normal is the direction of the smallest spread of a point and its neighbours. `points_m` must be finite.
     """
     normals = np.full((len(points_m), 3), np.nan, np.float32)
     if len(points_m) < 3:
@@ -80,7 +67,7 @@ def normals(
 def _nearest(
     points_m: Float[ndarray, "n 3"], count: int
 ) -> Iterator[tuple[Float64[ndarray, "m k"], Int64[ndarray, "m k"]]]:
-    """Distances and indices of the nearest points, each first itself, (m, count) at a time."""
+    """Yield distances and indices of the nearest points, including the point itself, (m, count) at a time."""
     from scipy.spatial import cKDTree
 
     tree = cKDTree(points_m)

@@ -1,9 +1,7 @@
-"""The formats of clouds. One line here makes a format known to every command.
+"""Formats of clouds; unusable input raises RecordingError.
 
-An installed package adds one without a line here: an entry point of the group "scanwright.cloud_formats" that names a
-`CloudFormat`; its module has `read(path) -> (clouds, notes)` and, if it can write, `write(path, cloud) -> notes`.
-
-Input that cannot be used raises RecordingError.
+An installed package adds one by an entry point of the group "scanwright.cloud_formats" that names a `CloudFormat`; its
+module has `read(path) -> (clouds, notes)` and, if it can write, `write(path, cloud) -> notes`.
 """
 
 from __future__ import annotations
@@ -28,17 +26,13 @@ _CLOUDS = "scanwright.firmware_io.clouds"
 
 @dataclass(frozen=True, slots=True)
 class CloudFormat:
-    """A format of clouds.
-
-    Attributes:
-        rows: fields if the format has fields for rows and columns, comments if it can keep them in comments, else none.
-    """
+    """A format of clouds."""
 
     name: str  # suffix of its files in lower case, without the dot
     module: str  # dotted name of the module that reads and writes it; imported when it is used
-    packages: tuple[str, ...] = ()  # top-level names of the packages that the module needs, of the extra `clouds`
-    rows: Literal["fields", "comments", "none"] = "none"
-    several: bool = False  # a file can hold several clouds; `write` takes a list of them
+    packages: tuple[str, ...] = ()  # top-level names of required packages of the extra `clouds`
+    rows: Literal["fields", "comments", "none"] = "none"  # how it stores rows and columns of an organised cloud
+    several: bool = False  # whether a file can contain several clouds, and `write` has a list of them
 
 
 FORMATS = (
@@ -61,11 +55,11 @@ def all_formats() -> dict[str, CloudFormat]:
 
 
 def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
-    """Read all clouds of a file (E57 and PTX hold several, the others one), with notes about what was not read.
+    """Read all clouds of a file (E57 and PTX can have several), with notes about dropped data.
 
     Raises:
-        InstallError: the format needs a package that is not installed.
-        RecordingError: the format is unknown, or the content of the file is not what its suffix promises.
+        InstallError: the format requires a package that is not installed.
+        RecordingError: the format is unknown, or the file does not have it.
     """
     if path.is_dir():
         raise RecordingError(f"{path}: is a folder; name a file of a cloud")
@@ -78,39 +72,34 @@ def read_clouds(path: Path) -> tuple[list[Cloud], list[str]]:
 
 
 def check_target(path: Path) -> None:
-    """Refuse a file that cannot be written, before the work whose result it is to hold.
-
-    Raises:
-        InstallError: the format needs a package that is not installed.
-        RecordingError: the format is unknown or is only read, or no file can be there.
-    """
+    """Check that a file can be written; raises as `write_clouds`."""
     _writer(path)
     check_place(path, RecordingError)
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What became of clouds that were written."""
+    """Result of writing clouds."""
 
-    paths: tuple[Path, ...]  # the files
-    rows: int  # in all of them
-    notes: tuple[str, ...]  # what they do not hold, one sentence each
+    paths: tuple[Path, ...]
+    rows: int  # of all files
+    notes: tuple[str, ...]  # dropped data, one sentence each
 
 
 def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False) -> Written:
-    """Write clouds, each to a file of its own where the format holds one.
+    """Write clouds, to one file if the format supports several.
 
-    Rows without a point are left out, unless the cloud is organised and the format says what its rows and columns are
-    (PCD, E57, NPZ): many readers of the others take NaN for a point at 0.
+    Rows without a point are dropped, unless the cloud is organised and the format has fields for rows and columns
+    (PCD, E57, NPZ): many readers of the others read NaN as a point at 0.
 
     Args:
-        path: the file, or what several are numbered after.
+        path: the file, or the name after which several are numbered.
         clouds: with a point in each.
         organised: keep the rows and columns of organised clouds in PLY and XYZ too, in comments.
 
     Raises:
-        InstallError: the format needs a package that is not installed.
-        RecordingError: the format is not known or cannot hold this, or the file cannot be written.
+        InstallError: the format requires a package that is not installed.
+        RecordingError: the format is unknown, read-only or cannot store this, or the file cannot be written.
     """
     form, module = _format(path), _writer(path)
     if organised:
@@ -129,8 +118,8 @@ def write_clouds(path: Path, clouds: Sequence[Cloud], *, organised: bool = False
     if form.several:
         return Written((path,), rows, (*notes, *module.write(path, formed)))
     paths = [path] if len(clouds) == 1 else [path.with_stem(f"{path.stem}_{k}") for k in range(1, len(clouds) + 1)]
-    for one, cloud in zip(paths, formed, strict=True):
-        notes += module.write(one, cloud)
+    for file, cloud in zip(paths, formed, strict=True):
+        notes += module.write(file, cloud)
     return Written(tuple(paths), rows, tuple(dict.fromkeys(notes)))
 
 
@@ -159,7 +148,7 @@ def cloud_module(path: Path) -> Any:
 
 
 def _module(form: CloudFormat, path: Path) -> Any:
-    """Import the module of a format, once its packages are known to be there."""
+    """Import the module of a format, or raise InstallError without its packages."""
     need = f"{path}: {form.name} needs {' and '.join(form.packages)}"
     if "pye57" in form.packages and platform.machine() == "aarch64":
         need += ", which has no wheel for Linux on aarch64: choose another format, or use another computer"

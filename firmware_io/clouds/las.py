@@ -1,7 +1,6 @@
-"""LAS and LAZ 1.4: points of a map in its world, whole numbers of a tenth of a millimetre (more beyond 200 km).
+"""LAS and LAZ 1.4: points in the world, integers of a tenth of a millimetre (more beyond 200 km).
 
-The pose, the start of the times and the rows of an organised cloud stand in a record of our own (a VLR), which other
-software ignores: it sees the points where they belong, in the world.
+Pose and start of the times are in a separate record (VLR), which other software ignores.
 """
 
 from __future__ import annotations
@@ -22,19 +21,19 @@ from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts, surv
 from scanwright.firmware_io.foreign import foreign
 
 _HEADER = struct.Struct("<94xHII")  # size of the header, byte of the first point, number of records before it
-_RECORD_BYTES = 54  # of the head of each
+_RECORD_BYTES = 54  # head of a record
 _STEPS_M = (1e-4, 1e-3, 1e-2)
 _MOST_STEPS = 2**31 - 1  # LAS stores coordinates as int32
-_PACKED = 1000  # times smaller than its points LAZ never gets
+_PACKED = 1000  # above the compression ratio of LAZ
 _OURS = "scanwright"
 _EXACT = "intensity_exact"
 _OWN_FIELD = {"intensity": "intensity", "time_s": "gps_time"}
-_COLOURS = ("red", "green", "blue")  # 16 bits; ours are bytes
+_COLOURS = ("red", "green", "blue")  # 16 bits; in `Cloud` bytes
 _STANDARD = {"X", "Y", "Z", "intensity", "gps_time", *_COLOURS}
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
-    """The cloud of a file, in the frame of its scanner where the file tells it, else in the world."""
+    """Read the cloud of a file, in the frame of its scanner if the file has a pose, or in the world."""
     _check_header(path)
     las = foreign(f"{path}: not a LAS file", laspy.read, path)
     return [_cloud(las.header, las.points)], _notes(path, las.points)
@@ -55,7 +54,7 @@ def parts(path: Path, rows: int) -> Parts:
 
 
 def _notes(path: Path, points: Any) -> list[str]:
-    """Name what is not read of these points."""
+    """Return a note of the dimensions that are not read."""
     unread = [
         name
         for name in points.point_format.standard_dimension_names
@@ -93,7 +92,7 @@ def _cloud(header: laspy.LasHeader, las: Any, *, measured: bool = False) -> Clou
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
-    """Write a flat cloud; lines about what the file does not hold."""
+    """Write a flat cloud; return notes of dropped data."""
     known = survey([cloud])
     if known is None:
         raise RecordingError(f"{path}: no row is a point")
@@ -111,7 +110,7 @@ def write_parts(path: Path, known: CloudSurvey, parts: Iterable[Cloud]) -> list[
         header.vlrs.append(laspy.VLR(_OURS, 1, "pose and start of times", "\n".join(lines).encode()))
     notes = [f"LAS rounds coordinates to {1000 * step_m:g} mm"]
     if known.head.placed:
-        notes.append("LAS has no scan pose: the points are moved into the world, a record of ours keeps the pose")
+        notes.append("LAS has no scan pose: the points are moved into the world, a Scanwright record keeps the pose")
     exact = "intensity" in names and "intensity" not in known.integers
     if exact:
         notes.append(f"LAS intensities are whole numbers to 65535: the exact ones are the extra dimension {_EXACT}")
@@ -146,7 +145,7 @@ def _points(header: laspy.LasHeader, cloud: Cloud, *, exact: bool) -> laspy.Scal
 
 
 def _check_header(path: Path) -> None:
-    """Refuse a header that announces what the file has no room for, or no coordinates."""
+    """Raise RecordingError if the header announces more than the file has, or invalid coordinates."""
     _check_records(path)
     with foreign(f"{path}: not a LAS file", laspy.open, path) as reader:
         header = reader.header
@@ -163,7 +162,7 @@ def _check_header(path: Path) -> None:
 
 
 def _check_records(path: Path) -> None:
-    """Refuse more variable length records than fit between header and points: laspy would read for minutes."""
+    """Raise RecordingError for more variable length records than fit, which laspy would read for minutes."""
     size = path.stat().st_size if path.is_file() else 0
     with foreign(f"{path}: cannot read", path.open, "rb") as stream:
         head = stream.read(_HEADER.size)
@@ -177,10 +176,10 @@ def _check_records(path: Path) -> None:
 
 
 def _check_chunks(path: Path, at: int, points: int) -> None:
-    """Refuse a table of chunks that is longer than there are points: the decoder ends the process over it.
+    """Raise RecordingError for a table of chunks longer than the points, which crashes the decoder.
 
-    Its place stands before the points, or at the very end of a file that was streamed; it begins with a version and
-    the number of chunks (LASzip, chunk table).
+    Its place is before the points, or at the end of a streamed file; it begins with a version and the number of chunks
+    (LASzip, chunk table).
     """
     size = path.stat().st_size
     with path.open("rb") as stream:
@@ -198,7 +197,7 @@ def _check_chunks(path: Path, at: int, points: int) -> None:
 
 
 def _step_m(path: Path, known: CloudSurvey) -> float:
-    """The finest step at which 32 bits reach over all points."""
+    """Return the smallest step with which 32 bits cover all points."""
     across_m = float((known.high_m - known.low_m).max()) + 1
     for step_m in _STEPS_M:
         if across_m < step_m * _MOST_STEPS:

@@ -1,4 +1,4 @@
-"""NumPy's own archive: holds everything exactly."""
+"""NPZ archive of NumPy, which stores all data exactly."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _COLUMN = "column."
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
-    """The cloud of a file such as `write` makes."""
+    """Read the cloud of a file of `write`."""
     arrays = read_npz(path, RecordingError)
     if missing := {"points_m", "shape", "T_world_cloud"} - set(arrays):
-        raise RecordingError(f"{path}: no array {', '.join(sorted(missing))}: not a cloud of ours")
+        raise RecordingError(f"{path}: no array {', '.join(sorted(missing))}: not a cloud of Scanwright")
     columns = {name.removeprefix(_COLUMN): array for name, array in arrays.items() if name.startswith(_COLUMN)}
     points_m, shape, T = arrays["points_m"], arrays["shape"], arrays["T_world_cloud"]
-    for name, array, wanted in (
+    for name, array, expected in (
         ("points_m", points_m, (len(points_m), 3) if points_m.ndim else ()),
         ("T_world_cloud", T, (4, 4)),
     ):
-        if array.shape != wanted or not wanted or array.dtype not in (np.float32, np.float64):
-            raise RecordingError(f"{path}: {name}: shape {array.shape}, {array.dtype}: {wanted or '(n, 3)'}, float")
+        if array.shape != expected or not expected or array.dtype not in (np.float32, np.float64):
+            raise RecordingError(f"{path}: {name}: shape {array.shape}, {array.dtype}: {expected or '(n, 3)'}, float")
     if shape.shape != (2,) or shape.dtype.kind not in "iu" or int(shape[0]) * int(shape[1]) != len(points_m):
         raise RecordingError(
             f"{path}: shape = {str(shape.tolist())[:80]}: two whole numbers, {len(points_m)} rows in all"

@@ -1,7 +1,7 @@
-"""PCD 0.5 to 0.7 of the Point Cloud Library: holds everything, the start of the times as a comment.
+"""PCD 0.5 to 0.7 of the Point Cloud Library; the start of the times is a comment.
 
-Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Read by ourselves, since the usual library
-fails on older versions and on padding.
+Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Read here, since pypcd4 fails on older
+versions and on padding.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _LONGEST_HEADER = 1 << 16  # bytes: hundreds of fields
-_DIGITS = 16  # of a count: more than any file has points
-_MOST_PACKED = 100  # times smaller LZF never gets: 264 bytes in 3
+_DIGITS = 16  # of a count
+_MOST_PACKED = 100  # above the compression ratio of LZF, 264 bytes in 3
 _KINDS = {"<f4", "<f8", *(f"<{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
 _AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
 
@@ -96,7 +96,7 @@ class PcdField:
 
     @property
     def padding(self) -> bool:
-        """Whether it only fills up the row."""
+        """Whether it is padding."""
         return self.name == "_"
 
     def columns(self) -> list[tuple[str, str]]:
@@ -128,7 +128,7 @@ class PcdHeader:
 
 
 def _header(path: Path) -> PcdHeader:
-    """Read the header; refuse one that announces more rows than the file has bytes for."""
+    """Read the header; RecordingError if it announces more rows than the file has."""
     with foreign(f"{path}: cannot read", path.open, "rb") as stream:
         data = foreign(f"{path}: cannot read", stream.read, _LONGEST_HEADER)
     size = path.stat().st_size
@@ -254,7 +254,7 @@ _PACKED = ("blue", "green", "red", "alpha")  # the bytes of PCL's rgba, lowest f
 
 
 def _packed(rows: NDArray[np.void]) -> NDArray[np.void]:
-    """Rows with their colours in one column, as PCL has them."""
+    """Combine the colours in one column, as in PCL."""
     if not set(_PACKED) <= set(rows.dtype.names or ()):
         return rows
     rgba = np.zeros(rows.size, np.uint32)
@@ -265,7 +265,7 @@ def _packed(rows: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def _unpacked(rows: NDArray[np.void]) -> NDArray[np.void]:
-    """Rows with a column for each colour; PCL's older rgb is a float of the same bits, without alpha."""
+    """Split the colours into columns; PCL's older rgb is a float of the same bits, without alpha."""
     packed = next((name for name in ("rgba", "rgb") if name in (rows.dtype.names or ())), None)
     if packed is None or rows.dtype[packed].itemsize != 4:
         return rows

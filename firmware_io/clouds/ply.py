@@ -1,9 +1,7 @@
-"""PLY: written binary little endian, shape, pose and start of a cloud as comments; read in every form.
+"""PLY: written binary little endian, with shape, pose and start of a cloud as comments; read in all encodings.
 
-Format: G. Turk, "The PLY polygon file format" (1994). Written by ourselves, because the usual library is GPL. It holds
-everything but integers of 64 bits.
-
-Input that cannot be used raises RecordingError.
+Format: G. Turk, "The PLY polygon file format" (1994), without integers of 64 bits. Unusable input raises
+RecordingError.
 """
 
 from __future__ import annotations
@@ -46,10 +44,9 @@ _LONGEST_HEADER = 1 << 20  # bytes: thousands of comments
 
 @contextmanager
 def ply_writer(path: Path, fields: np.dtype[np.void], comments: Iterable[str]) -> Iterator[PlyRows]:
-    """Write rows as they come; the file appears only when the body ends well.
+    """Write rows of a structured type of little-endian scalars; the file gets its name after the body ends well.
 
-    The header's number of rows is filled in at the end: nothing has to be known before, nothing is kept. `fields` is a
-    structured type of little-endian scalars.
+    The number of rows in the header is written at the end.
     """
     with atomic_write(path, RecordingError) as part, foreign(f"{path}: cannot write", part.open, "wb") as stream:
         rows = PlyRows(stream, fields, [line for comment in comments for line in comment.splitlines()])
@@ -59,7 +56,7 @@ def ply_writer(path: Path, fields: np.dtype[np.void], comments: Iterable[str]) -
 
 
 class PlyRows:
-    """Rows on their way to a file; its header counts them."""
+    """Writer of rows to a stream, with their number in the header."""
 
     def __init__(self, stream: IO[bytes], fields: np.dtype[np.void], comments: Sequence[str]) -> None:
         self._stream, self._fields, self._comments = stream, fields, comments
@@ -74,8 +71,8 @@ class PlyRows:
         self.rows += rows.size
 
     def header(self) -> bytes:
-        """Return the header, whose length never changes."""
-        # A last comment gives back what the number takes.
+        """Return the header, whose length is constant."""
+        # The last comment compensates the length of the number.
         filler = "-" * (_DIGITS - len(str(self.rows)))
         columns = [f"property {_WORDS[self._fields[name].str[1:]]} {name}" for name in self._fields.names or ()]
         lines = [
@@ -91,7 +88,7 @@ class PlyRows:
 
 
 def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterable[str] = ()) -> None:
-    """Write bare points (n, 3) as a cloud of x y z."""
+    """Write points (n, 3) as a cloud of x y z."""
     check_place(path, RecordingError)
     if path.suffix != ".ply":
         raise RecordingError(f"{path}: clouds are written as PLY; name it {path.with_suffix('.ply').name}")
@@ -204,7 +201,8 @@ def parts(path: Path, rows: int) -> Parts | None:
 
 def _chunks(path: Path, header: PlyHeader, rows: int) -> Iterator[NDArray[np.void]]:
     """Read the rows of a cloud, so many at a time, without mapping the file: mapped pages count as memory."""
-    vertex, first = header.vertex, header.lines + _rows_before(header)
+    vertex = header.vertex
+    first = header.lines + sum(element.rows for element in header.elements[: header.elements.index(vertex)])
     if header.form == "ascii":
         with path.open(encoding="ascii", errors="replace") as stream:
             lines = islice(stream, first, first + vertex.rows)
@@ -217,10 +215,6 @@ def _chunks(path: Path, header: PlyHeader, rows: int) -> Iterator[NDArray[np.voi
         stream.seek(start)
         for begin in range(0, vertex.rows, rows):
             yield np.fromfile(stream, fields, min(rows, vertex.rows - begin))
-
-
-def _rows_before(header: PlyHeader) -> int:
-    return sum(element.rows for element in header.elements[: header.elements.index(header.vertex)])
 
 
 def read_ply(path: Path) -> NDArray[np.void]:
@@ -300,7 +294,7 @@ def _notes(path: Path, header: PlyHeader) -> list[str]:
 
 
 def write(path: Path, cloud: Cloud) -> list[str]:
-    """Write a cloud; lines about what the file does not hold."""
+    """Write a cloud; return notes of dropped data."""
     return _write(path, cloud, [cloud])
 
 

@@ -1,9 +1,8 @@
-"""Clouds as text (xyz, txt, asc, csv, pts): one point a line. We write names, types, shape, pose and start as comments.
+"""Text clouds (xyz, txt, asc, csv, pts), one point per line; names, types, shape, pose and start are comments.
 
-A first line of words names the columns; else the first three are x y z. Separators are spaces, tabs, commas or
-semicolons. Decimal commas are read only on request, since `1,5,2,5` may be two numbers or four.
-
-Input that cannot be used raises RecordingError.
+A first line of words names the columns; without it the first three are x y z. Separators are spaces, tabs, commas or
+semicolons. Decimal commas are read only on request, since `1,5,2,5` may be two numbers or four. Unusable input raises
+RecordingError.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from scanwright.firmware_io.clouds.cloud import Cloud, Column, as_type, cloud_ro
 from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
 from scanwright.firmware_io.foreign import foreign, of_file
 
-_DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest that bring every value back
+_DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest for an exact round trip
 _TYPES = {"|i1", "|u1", *(f"<{kind}{size}" for kind in "iu" for size in (2, 4, 8)), *_DIGITS}
 _COMMENTS = ("#", "//", "!")
 _ALIASES = {"r": "red", "g": "green", "b": "blue", "a": "alpha", "i": "intensity"} | {
@@ -70,10 +69,7 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
 
 
 def parts(path: Path, rows: int) -> Parts | None:
-    """Return the cloud of a file in parts of so many lines; None if its comments tell rows and columns.
-
-    Columns are named and typed by the first lines.
-    """
+    """Return the cloud of a file in parts of `rows` lines; None if it is organised. The first lines define columns."""
     with foreign(f"{path}: cannot read", path.open, encoding="utf-8-sig") as stream:
         lines = [line.rstrip("\n") for line in islice(stream, _HEAD)]
     layout, comments, numeric, every = _survey_lines(path, lines)
@@ -175,7 +171,7 @@ def _layout(path: Path, lines: Sequence[str], comments: Sequence[str]) -> _Layou
 
 
 def _separator(place: str, line: str) -> str | None:
-    """Return the separator of a line of numbers, None for spaces; refuse a decimal comma."""
+    """Return the separator of a line of numbers, None for spaces; RecordingError for a decimal comma."""
     words = line.split(";") if ";" in line else line.split()
     if "," in line and len(words) > 2 and not line.split(",")[1][:1].isspace():
         raise RecordingError(f"{place}: {line.strip()[:60]!a}: {_DECIMAL_COMMA}")
@@ -221,7 +217,7 @@ def _typed(path: Path, name: str, values: Floats, kind: str) -> Column:
 
 
 def _colours(columns: dict[str, Column]) -> dict[str, Column]:
-    """Return the colours as bytes if that is what they are."""
+    """Return the colours as bytes if all are integers up to 255."""
     names = [name for name in ("red", "green", "blue", "alpha") if name in columns]
     values = [columns[name] for name in names]
     if any(((value < 0) | (value > 255) | (value % 1 != 0)).any() for value in values):
@@ -239,7 +235,7 @@ def read_numbers(
         lines: one row each.
         place: number of the first of them in the file.
         separator: of the words; None for spaces.
-        columns: which words to read; None for all, which must be as many in each line.
+        columns: indices of the words to read; None for all, whose number must be constant.
     """
     last = [place - 1, ""]
 

@@ -1,4 +1,4 @@
-"""Voxels of a cloud: which point lies in which, and sums over them."""
+"""Voxels of a cloud, and sums over them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def voxel_sums(voxel: Ints, values: Array) -> Floats:
 
 @njit(cache=True)
 def _numbered(points_m: Floats, edge_m: float, level: NDArray[np.uint8]) -> Ints:
-    """Number the voxels by an open hash table: one pass, whatever the extent of the cloud."""
+    """Number the voxels by an open hash table, in one pass for any extent of the cloud."""
     n = len(points_m)
     size = 1
     while size < 2 * n:

@@ -1,1 +1,1 @@
-"""Colours for a cloud from the images of a camera."""
+"""Colours of a cloud from camera images."""

@@ -1,4 +1,4 @@
-"""The images of a camera, and where each was taken from."""
+"""Images of a camera, with poses."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ def load_views(
     poses: Trajectory | None = None,
     lag_s: float = 0.0,
 ) -> list[CameraView]:
-    """The images of a camera with their poses.
+    """Return the images of a camera with their poses.
 
     Args:
         camera: `camera.images` is an image, or a CSV file with the columns file and time_ns (since 1970, on the clock
-            of the recording) or joint_deg; what moves needs one of them for every image.
-        folder: that the names of files start from, the task's.
+            of the recording) or joint_deg, required for a moving camera.
+        folder: of the task, for relative names.
         angles: angle set of the scanner.
         recording: for the servo's angle at the time of an image.
         poses: of the platform, if the cloud is on a map.
-        lag_s: how late the joint log's stamps are.
+        lag_s: delay of the joint log's stamps.
 
     Raises:
-        RecordingError: no such image, or its place is unknown.
+        RecordingError: an image does not exist, or its pose is unknown.
     """
     listed = folder / camera.images
     shots = list(_listed(listed)) if listed.suffix.lower() == ".csv" else [_Shot(listed)]
@@ -60,7 +60,7 @@ def load_views(
     curve = straight(recording.joint_log) if recording.at_rest else axis_curve(recording.joint_log, at_rest=False)[0]
     views = []
     for shot in shots:
-        with opened(shot.file, camera):  # a faulty image is reported before the work, not after
+        with opened(shot.file, camera):  # report a faulty image early
             pass
         T_cloud_world = np.eye(4)
         if poses is not None:
@@ -116,7 +116,7 @@ def _T_world_frame(camera: Camera, angles: AngleSet, shot: _Shot, curve: AxisCur
 
 @contextmanager
 def opened(path: Path, camera: Camera) -> Iterator[Image.Image]:
-    """An image of the camera's size; its pixels are read later."""
+    """Open an image and check its size; its pixels are read later."""
     try:
         with Image.open(path) as image:
             if image.size != camera.size_px:

@@ -1,11 +1,10 @@
-"""Colours for clouds, from images of a camera whose lens and place the task file gives.
+"""Colours of clouds from images of a camera whose lens and pose are in the task file.
 
-A point gets the colour of its pixel in the image whose optical axis it lies nearest to, of those in which it is seen.
-The cloud itself decides whether it is seen: every point is a disc that reaches to its neighbours; the discs nearest to
-the camera are drawn into a depth image, and what lies behind them stays without colour. What the scanner has not seen
-hides nothing. Discs face the camera, so those of a slanted surface cover each other: a point may lie as much deeper as
-its surface recedes over a disc, and 5 cm. A disc also covers a little of its surroundings: along the edges of near
-things points are left without colour rather than given a wrong one.
+A point gets the colour of its pixel in the image with the nearest optical axis in which it is visible. Visibility
+follows from the cloud: each point is a disc that reaches to its neighbours; the discs nearest to the camera are drawn
+into a depth image, and points behind them get no colour. Objects that the scanner has not seen hide no points. Discs
+face the camera, so those of a slanted surface overlap: a point can be deeper by the slope of its surface over a disc,
+plus 5 cm. A disc also covers some of its surroundings: points along the edges of near objects get no colour.
 """
 
 from __future__ import annotations
@@ -33,18 +32,18 @@ from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import Recording, open_recording
 
 COLOURS = ("red", "green", "blue", "alpha")
-"""Columns of a coloured cloud, bytes; alpha is 255 if there is a colour, else 0."""
-_AT_ONCE = 1 << 18  # rows: bounds the memory
-_NOISE_M = 0.05  # of a range: points so near behind another are not hidden
-_SLANTS = (1.0, 3.0, 10.0)  # tangent of a surface's slant to the camera: at least, where it is unknown, at most
-_BASE_RAD = np.radians(2.0)  # between the points that tell how a surface lies: noise must not decide it
-_STEEP = 6.0  # times as far apart as at normal incidence; beyond it they lie on two surfaces
-_WIDEST_PX = 50  # of a disc: nearer surfaces are drawn coarser
+"""Columns of a coloured cloud, bytes; alpha is 255 with a colour, 0 without."""
+_AT_ONCE = 1 << 18  # rows, to bound the memory
+_NOISE_M = 0.05  # of a range; points so near behind another are visible
+_SLANTS = (1.0, 3.0, 10.0)  # tangent of a surface's slant to the camera: smallest, unknown, largest
+_BASE_RAD = np.radians(2.0)  # between the points that define the slant, above noise
+_STEEP = 6.0  # times the distance at normal incidence, beyond which points are on two surfaces
+_WIDEST_PX = 50  # largest disc
 
 
 @dataclass(frozen=True, slots=True)
 class ColourSummary:
-    """What became of the points of one cloud: `points == coloured + hidden + outside`."""
+    """Counts of points of one cloud: `points == coloured + hidden + outside`."""
 
     points: int
     coloured: int
@@ -53,7 +52,7 @@ class ColourSummary:
     images: int
 
     def line(self, cloud: Path) -> str:
-        """The same of one cloud, in words."""
+        """Format the counts."""
         return (
             f"coloured {self.coloured:,} points of {cloud.name} from {self.images} images; without colour "
             f"{self.hidden:,} behind others, {self.outside:,} in no image"
@@ -63,13 +62,11 @@ class ColourSummary:
 def painter(
     loaded: LoadedTask, recording: Path, angles: AngleSet, poses: Trajectory | None, lag_s: float, *, organised: bool
 ) -> Callable[[Path], ColourSummary]:
-    """What colours an organised cloud of a recording, in place, with the images of a task's camera.
-
-    Rows without a point go once it is coloured, unless it is to stay `organised`.
+    """Return a function that colours an organised cloud of a recording in place; options as for `colour_cloud`.
 
     Raises:
-        TaskError: the task describes no camera.
-        RecordingError: the recording is unreadable, no such image, or its place is unknown.
+        TaskError: the task has no camera.
+        RecordingError: the recording is unreadable, an image does not exist, or its pose is unknown.
     """
     camera, source = loaded.task.camera, open_recording(recording)
     if camera is None:
@@ -82,15 +79,15 @@ def painter(
 def colour_cloud(
     path: Path, camera: Camera, views: list[CameraView], spacing: Spacing, from_m: Floats, *, organised: bool = False
 ) -> ColourSummary:
-    """Colour a PLY cloud in place, in constant memory but for seven bytes a point and one depth image.
+    """Colour a PLY cloud in place, in constant memory except for seven bytes per point and one depth image.
 
     Args:
-        path: cloud such as `assemble` writes; how surfaces lie is seen in organised ones only.
-        camera: that took all images.
+        path: cloud of `assemble`; slants are known only in organised ones.
+        camera: of all images.
         views: the images.
         spacing: of beams and scan lines.
-        from_m: place of the scanner in the cloud, shape (3,): the farther from it, the sparser the points.
-        organised: leave the cloud so; else rows without a point go once it is coloured.
+        from_m: position of the scanner in the cloud, shape (3,), from which points get sparser.
+        organised: keep the rows without a point.
 
     Raises:
         RecordingError: an image cannot be read or has another size, or the cloud cannot be written.
@@ -100,7 +97,8 @@ def colour_cloud(
     nearest_rad = np.full(rows.size, np.inf, np.float32)
     inside = np.zeros(rows.size, np.bool_)
     for view in views:
-        picture = _picture(view.file, camera)
+        with opened(view.file, camera) as image:
+            picture = np.array(image.convert("RGB"))
         depth = np.full(picture.shape[:2], np.inf, np.float32)
         for _, seen in _seen(rows, width, camera, view, spacing, from_m):
             _draw(seen.column, seen.row, seen.depth_m, seen.radius_px, depth)
@@ -121,23 +119,18 @@ def colour_cloud(
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """How far apart neighbouring beams and neighbouring scan lines lie [rad]."""
+    """Angles between neighbouring beams and neighbouring scan lines [rad]."""
 
     beam_rad: float
     line_rad: float
 
 
 def spacing_of(recording: Recording) -> Spacing:
-    """Beams as spaced by the sensor, lines as the axis usually turned from scan to scan."""
+    """Return the spacing of beams of the sensor, and the median rotation of the axis between scans."""
     scan = next(islice(recording.scans(), 1))
     joint_rad = recording.joint_log.angle_at(recording.stamp_ns)
     turned = np.abs(np.diff(joint_rad[np.isfinite(joint_rad)]))
     return Spacing(abs(scan.angle_increment_rad), float(np.median(turned)) if turned.size else 0.0)
-
-
-def _picture(path: Path, camera: Camera) -> UInt8[ndarray, "rows columns 3"]:
-    with opened(path, camera) as image:
-        return np.array(image.convert("RGB"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +149,7 @@ class _Seen:
 def _seen(
     rows: NDArray[np.void], width: int, camera: Camera, view: CameraView, spacing: Spacing, from_m: Floats
 ) -> Iterator[tuple[int, _Seen]]:
-    """The points that lie in an image, hidden or not, some at a time, and where their rows begin."""
+    """Yield the points in an image, visible or not, in parts, and the first row of each part."""
     T_camera_cloud = np.linalg.inv(view.T_cloud_camera)
     at_once = max(_AT_ONCE // width, 1) * width if width else _AT_ONCE
     for begin in range(0, rows.size, at_once):
@@ -170,7 +163,7 @@ def _seen(
         range_m = np.linalg.norm(points_m - from_m, axis=1)
         slant, radius_m = (values[which] for values in _discs(in_camera, range_m, width, spacing))
         wide = np.ceil(max(camera.focal_px) * radius_m / depth_m.clip(1e-3)).clip(0, _WIDEST_PX)
-        drawn_m = (wide + 1) * depth_m / min(camera.focal_px)  # pixels are whole, at both ends
+        drawn_m = (wide + 1) * depth_m / min(camera.focal_px)  # rounding to pixels at both ends
         aside_rad = np.arctan2(np.hypot(in_camera[which, 0], in_camera[which, 1]), in_camera[which, 2])
         seen = _Seen(
             which=which,
@@ -185,9 +178,9 @@ def _seen(
 
 
 def _discs(in_camera: Floats, range_m: Floats, width: int, spacing: Spacing) -> tuple[Floats, Floats]:
-    """Tangent of each point's surface to the camera's view of it, and the radius of its disc [m], each (n,).
+    """Return the tangent of each point's slant to the camera, and the radius of its disc [m], each (n,).
 
-    Both come from neighbours in an organised cloud; where there are none, surfaces are taken to face the scanner.
+    Both follow from neighbours in an organised cloud; without these, surfaces are assumed to face the scanner.
     """
     least, unknown, most = _SLANTS
     facing_m = np.hypot(spacing.beam_rad, spacing.line_rad) / 2 * range_m
@@ -206,7 +199,7 @@ def _discs(in_camera: Floats, range_m: Floats, width: int, spacing: Spacing) -> 
 
 
 def _tangent(grid: Floats, far_m: Floats, step_rad: float, axis: int) -> tuple[Floats, Floats]:
-    """From a point to one some steps on (or before, at the end), NaN where they lie on two surfaces; per step [m]."""
+    """Return the vector to a point some steps ahead (behind at the end), NaN across surfaces, and its step [m]."""
     steps = int(np.clip(round(_BASE_RAD / step_rad) if step_rad else 1, 1, grid.shape[axis] // 2))
     ahead = np.roll(grid, -steps, axis) - grid
     end = [slice(None)] * 2
@@ -254,7 +247,7 @@ def _write(
 
 
 def origin_m(recording: Recording, angles: AngleSet, poses: Trajectory | None) -> Float64[ndarray, " 3"]:
-    """Where the scanner stood in its cloud [m], in the middle of the recording, shape (3,)."""
+    """Return the position of the scanner in its cloud [m], in the middle of the recording, shape (3,)."""
     stood = np.array(angles.t_world_rot_mm) / 1000
     if poses is None:
         return stood

@@ -1,1 +1,1 @@
-"""Emulators: devices made of software, on pseudo-terminals, that behave as the hardware does."""
+"""Emulated devices on pseudo-terminals."""

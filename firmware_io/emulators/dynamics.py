@@ -1,7 +1,6 @@
-"""True motion of a servo's horn: motor, gear with play, control loop and off-axis mass (`servo_plant.py`).
+"""True motion of a servo's horn: motor, gear with backlash, control loop and off-axis mass (`servo_plant.py`).
 
-The gear's teeth are stiff (a millisecond) against turns of seconds, so a stiff solver integrates, up to the requested
-time.
+The teeth of the gear are stiff (a millisecond) compared with turns of seconds, so a stiff solver integrates.
 """
 
 from __future__ import annotations
@@ -25,27 +24,24 @@ _SOLVERS = {"LSODA": LSODA, "Radau": Radau, "BDF": BDF}
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """The horn at one moment; `duty` is what the loop puts out, `torque` what the motor gives, as fractions."""
+    """State of the horn at one time."""
 
     angle_rad: float
     rate_rad_s: float
-    duty: float
-    torque: float
+    duty: float  # of the control loop, as a fraction
+    torque: float  # of the motor, as a fraction of the stall torque
 
 
 @dataclass(frozen=True, slots=True)
 class Solver:
-    """How the motion is integrated: method and relative tolerance; the absolute one is a thousandth of it (rad)."""
+    """Method and relative tolerance of the integration; the absolute tolerance is a thousandth of it (rad)."""
 
     method: Literal["LSODA", "Radau", "BDF"] = "LSODA"
     rtol: float = 1e-6
 
 
 class HornMotion:
-    """The horn's motion under a history of drives, integrated lazily and kept for `history_s`.
-
-    Times are integer nanoseconds on the caller's clock. Thread-safe.
-    """
+    """The horn's motion under a history of drives, integrated on request and kept for `history_s`. Thread-safe."""
 
     def __init__(
         self,
@@ -62,13 +58,13 @@ class HornMotion:
         self._history_s = history_s
         self._origin_ns = time_ns
         self._lock = Lock()
-        self._drives: list[tuple[float, Actuation, float, float]] = []  # start, drive, where the walk starts, block
+        self._drives: list[tuple[float, Actuation, float, float]] = []  # start, drive, first setpoint, blocked angle
         self._ends: list[float] = []  # of the steps, increasing
         self._steps: list[Callable[[Floats], Floats]] = []
         self._begin(0.0, np.array([angle_rad, 0.0, angle_rad, 0.0, 0.0, angle_rad]), Actuation(), angle_rad)
 
     def drive(self, time_ns: int, drive: Actuation) -> None:
-        """From `time_ns` on, `drive` acts; what was integrated beyond is forgotten."""
+        """Apply `drive` from `time_ns` on; drops the motion integrated beyond."""
         with self._lock:
             t = max((time_ns - self._origin_ns) / 1e9, self._drives[-1][0])
             state = self._states(np.array([t]))[:, 0]
@@ -84,34 +80,32 @@ class HornMotion:
             self._begin(t, state, drive, setpoint)
 
     def change(self, time_ns: int, **values: object) -> None:
-        """From `time_ns` on, these fields of the present drive are others."""
+        """Change fields of the present drive from `time_ns` on."""
         self.drive(time_ns, replace(self._drives[-1][1], **values))  # type: ignore[arg-type]
 
     def drive_at(self, time_ns: int) -> Actuation:
-        """The drive that acts at one time."""
+        """Return the drive at one time."""
         with self._lock:
             return self._drives[self._index((time_ns - self._origin_ns) / 1e9)][1]
 
     def angle_rad(self, time_ns: Int64[ndarray, " *k"]) -> Float64[ndarray, " *k"]:
-        """True angle of the horn at given times, in their shape; ValueError for a time before what is kept."""
+        """Return the true angle of the horn at given times, in their shape; ValueError before the history."""
         at_s = (np.asarray(time_ns, np.int64) - self._origin_ns) / 1e9
         with self._lock:
             return self._states(at_s.ravel())[2].reshape(at_s.shape)
 
     def motion(self, time_ns: int) -> Motion:
-        """Angle, rate and effort at one time."""
+        """Return the state of the horn at one time."""
         t = (time_ns - self._origin_ns) / 1e9
         with self._lock:
             state = self._states(np.array([t]))[:, 0]
-            start_s, drive, start, _ = self._drives[
-                bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1
-            ]
+            start_s, drive, start, _ = self._drives[self._index(t)]
         setpoint = walked_rad(t - start_s, start, drive.goal, drive.rate_rad_s)
         duty, torque = effort(self._plant, drive, setpoint, *state[[1, 2, 4, 5]])
         return Motion(float(state[2]), float(state[3]), duty, torque)
 
     def _index(self, t: float) -> int:
-        """Index of the drive that acts at `t`."""
+        """Return the index of the drive at `t`."""
         return max(0, bisect.bisect_right(self._drives, t, key=lambda entry: entry[0]) - 1)
 
     def _begin(self, t: float, state: Floats, drive: Actuation, setpoint: float) -> None:
@@ -119,13 +113,13 @@ class HornMotion:
         self._drives.append((t, drive, setpoint, hold_rad))
         rhs = equations(self._plant, self._load, drive, t, setpoint, hold_rad)
         rtol = self._solver.rtol
-        # No upper end: steps are taken as they are asked for. First steps are short, as a drive begins with a jump.
+        # No upper end: steps are made on request. The first ones are short, as a drive begins with a jump.
         self._integrator = _SOLVERS[self._solver.method](
             rhs, t, state, t + 1e9, rtol=rtol, atol=rtol / 1000, first_step=1e-6, max_step=1.0
         )
 
     def _states(self, at_s: Floats) -> Floats:
-        """States at given times, shape (6, n); integrates as far as needed."""
+        """Return the states at given times, shape (6, n); integrates as far as needed."""
         if at_s.size == 0:
             return np.empty((6, 0))
         if at_s.min() < self._first_s():
@@ -134,7 +128,7 @@ class HornMotion:
         while self._integrator.t < last:
             self._integrator.step()
             if self._integrator.status == "failed":
-                raise ArithmeticError(f"the solver gave up at {self._integrator.t:.6f} s")
+                raise ArithmeticError(f"the solver failed at {self._integrator.t:.6f} s")
             self._ends.append(self._integrator.t)
             self._steps.append(self._integrator.dense_output())
         states = np.empty((6, at_s.size))
@@ -142,14 +136,11 @@ class HornMotion:
         for step in np.unique(which):
             here = which == step
             states[:, here] = self._steps[step](at_s[here]) if self._ends else self._integrator.y[:, None]
-        self._forget(last - self._history_s)
+        outdated = bisect.bisect_left(self._ends, last - self._history_s)
+        if outdated > 1000:  # in bulk, to cost nothing per step
+            del self._ends[:outdated], self._steps[:outdated]
+            del self._drives[: self._index(self._first_s())]
         return states
 
     def _first_s(self) -> float:
         return float(self._steps[0].t_old) if self._steps else self._drives[0][0]  # type: ignore[attr-defined]
-
-    def _forget(self, before_s: float) -> None:
-        outdated = bisect.bisect_left(self._ends, before_s)
-        if outdated > 1000:  # in bulk, so that it costs nothing per step
-            del self._ends[:outdated], self._steps[:outdated]
-            del self._drives[: self._index(self._first_s())]

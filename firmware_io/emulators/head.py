@@ -1,4 +1,4 @@
-"""What the emulated servo has to turn: the head as built, from the masses in `scanner.urdf`."""
+"""Load of the emulated servo: the head as built, from the masses in `scanner.urdf`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _GRAVITY_M_S2 = np.array([0.0, 0.0, -frames.STANDARD_GRAVITY_M_S2])
 
 
 def read_load(out: Path, angles: AngleSet) -> Load:
-    """Inertia and gravity of the links `rot` and `laser`; a light, balanced head if there is no `scanner.urdf`."""
+    """Return inertia and gravity of the links `rot` and `laser`; a light, balanced head without `scanner.urdf`."""
     file = out / "scanner.urdf"
     if not file.is_file():
         return Load()
@@ -35,9 +35,9 @@ def read_load(out: Path, angles: AngleSet) -> Load:
             moment_kg_m += link_kg * centre_rot
             inertia_kg_m2 += (R @ link_kg_m2 @ R.T)[2, 2] + link_kg * float(centre_rot[:2] @ centre_rot[:2])
     except (OSError, ElementTree.ParseError, KeyError, AttributeError, TypeError, ValueError) as error:
-        raise DeviceError(f"{file}: no masses of the links rot and laser ({error}); build the scanner anew") from error
+        raise DeviceError(f"{file}: no masses of the links rot and laser ({error}); run `build` again") from error
     g_rot = angles.T_world_rot(0.0)[:3, :3].T @ _GRAVITY_M_S2
-    # The torque about the axis, (c x g')_z with gravity turned back by the joint angle, is a cosine of that angle.
+    # The torque about the axis, (c x g')_z with gravity rotated by the negative joint angle, is a cosine of that angle.
     phase_rad = math.atan2(moment_kg_m[1], moment_kg_m[0]) - math.atan2(g_rot[1], g_rot[0]) + math.pi / 2
     return Load(
         inertia_kg_m2=float(inertia_kg_m2),
@@ -48,7 +48,7 @@ def read_load(out: Path, angles: AngleSet) -> Load:
 
 
 def _friction_nm(angles: AngleSet) -> float:
-    """Middle of the friction that the catalogue states for the ring; that of a light bearing if it states none."""
+    """Return the mean of the specified friction of the ring; that of a light bearing if it is unspecified."""
     ring = load_catalogue().products.get(angles.slip_ring or "")
     if not isinstance(ring, SlipRing) or ring.friction_nm is None:
         return Load().bearing_nm
@@ -56,7 +56,7 @@ def _friction_nm(angles: AngleSet) -> float:
 
 
 def _inertial(link: ElementTree.Element) -> tuple[float, Vector, Rotation]:
-    """Mass [kg], centre [m] and inertia about it [kg m2], in the frame of the link."""
+    """Return mass [kg], centre [m] and inertia about it [kg m2], in the frame of the link."""
     inertial = link.find("inertial")
     mass_kg = float(inertial.find("mass").get("value"))  # type: ignore[union-attr, arg-type]
     centre_m = np.array(inertial.find("origin").get("xyz").split(), float)  # type: ignore[union-attr]

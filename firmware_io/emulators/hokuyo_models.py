@@ -11,7 +11,7 @@ from scanwright.firmware_io.lidar.scip.parameters import Parameters
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """What tells one model from another."""
+    """Properties of a model."""
 
     parameters: Parameters  # its PP reply
     product: str  # PROD of VV
@@ -20,9 +20,9 @@ class Identity:
     speed: str  # SCSP of II
     mode: str = "CLASSIC"  # MESM of II
     line: str = "USB Full Speed"  # SBPS of II
-    speed_request: str = "04"  # status of a CR request that changes nothing
-    no_return: int  # number that stands for a beam that does not come back
-    too_near: int  # number that stands for something in front of the least range
+    speed_request: str = "04"  # status of a CR request without effect
+    no_return: int  # error code of a beam without return
+    too_near: int  # error code of a range below the smallest one
     intensity: bool = True  # whether it measures intensities
 
 
@@ -69,8 +69,8 @@ _UST_10LX = Identity(  # no capture: product, serial number and mode are made up
     no_return=65533,
     too_near=65533,
 )
-# No captures of the others: parameters as a user lists them (hokuyoaist, issue 1) and a simulator tells them (urg_sim),
-# the rest is made up after the sensors above.
+# No captures of the others: parameters from a user (hokuyoaist, issue 1) and a simulator (urg_sim); the rest is made up
+# after the sensors above.
 _UG01 = replace(
     _URG_04LX,
     parameters=replace(_URG_04LX.parameters, model="URG-04LX-UG01"),
@@ -102,13 +102,13 @@ IDENTITIES = {
 
 @dataclass(frozen=True, slots=True)
 class Quartz:
-    """A sensor's clock: it showed `clock_ms` at `began_ns` and runs `rate_error` fast."""
+    """A sensor's clock."""
 
     began_ns: int
-    clock_ms: int
-    rate_error: float
+    clock_ms: int  # at `began_ns`
+    rate_error: float  # relative, positive if fast
 
     def ms(self, time_ns: int) -> int:
-        """What it shows, 24 bit."""
+        """Return the sensor time, 24 bit."""
         shown_ms = self.clock_ms + math.floor((time_ns - self.began_ns) * (1 + self.rate_error) / 1e6)
         return shown_ms % STAMP_WRAP_MS

@@ -1,6 +1,6 @@
-"""Emulator of LD06, LD19 and STL27L: they send from power-up, their motor wanders, their clock has milliseconds.
+"""Emulator of LD06, LD19 and STL27L.
 
-Written from the maker's description of the packet; what it lacks is marked [assumed].
+Written from the maker's description of the packet; undocumented values are marked [assumed].
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600
 _POINTS = 12  # LD19 development manual
 _BYTES = 47  # LD19 development manual
 _BACKLOG = 1 << 10  # bytes [assumed]: some packets
-_CHUNK_NS = 8_000_000  # measured at once: a ray alone costs as much as a hundred
+_CHUNK_NS = 8_000_000  # measured together: one ray costs as much as a hundred
 _BOOT_NS = 1_000_000_000  # [assumed]
 
 
 def checksum(data: bytes) -> int:
-    """Remainder of the bytes, as a polynomial over two, by x^8 + x^6 + x^3 + x^2 + 1."""
+    """Return the remainder of the bytes, as a binary polynomial, by x^8 + x^6 + x^3 + x^2 + 1."""
     rest = int.from_bytes(data, "big") << 8
     for bit in range(rest.bit_length() - 1, 7, -1):
         if rest >> bit & 1:
@@ -34,7 +34,7 @@ def checksum(data: bytes) -> int:
 
 
 def write_packet(speed_deg_s: float, start_deg: float, end_deg: float, stamp_ms: int, points: list[list[int]]) -> bytes:
-    """A packet; each point is a range [mm] and an intensity."""
+    """Encode a packet; each point is a range [mm] and an intensity."""
     data = bytearray([0x54, 0x2C])
     for number in (round(speed_deg_s), round(start_deg * 100) % 36_000):
         data += number.to_bytes(2, "little")
@@ -62,24 +62,24 @@ class LdrobotMachine:
 
     @property
     def scanning(self) -> object:
-        """Always."""
+        """Constant: it always scans."""
         return True
 
     @property
     def point_ns(self) -> float:
-        """True time between two points: its clock counts them out."""
+        """True time between two points, defined by its clock."""
         return 1e9 / (self.lidar.steps_per_turn * self.lidar.scan_rate_hz) / (1 + self.rate_error)
 
-    def hear(self, _received: bytes, _now_ns: int) -> tuple[bytes, bytes]:
-        """Its line goes one way."""
+    def receive(self, _received: bytes, _now_ns: int) -> tuple[bytes, bytes]:
+        """Ignore requests."""
         return b"", b""
 
     def next_ns(self) -> int:
-        """When the next packets are measured."""
+        """Return the end of the next packets."""
         return self.began_ns + round((self._packet + self._together) * _POINTS * self.point_ns)
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """Packets of the next milliseconds."""
+        """Measure the packets of the next milliseconds."""
         number = _POINTS * self._packet + np.arange(_POINTS * self._together)
         since_ns = number * self.point_ns
         turning_s, share = spun_up(since_ns / 1e9) if self._from_rest else (since_ns / 1e9, np.ones(since_ns.size))
@@ -99,13 +99,13 @@ class LdrobotMachine:
         self._packet += self._together
         return packets
 
-    def leave_out(self, before_ns: int) -> None:
-        """Passes over what should have been measured before."""
+    def skip_to(self, before_ns: int) -> None:
+        """Skip the packets before a time."""
         behind = (before_ns - self.next_ns()) / (_POINTS * self.point_ns)
         self._packet += max(math.floor(behind), 0)
 
     def power_cycle(self, now_ns: int) -> None:
-        """Silent for as long as it starts; its clock is at 0 and its motor stands."""
+        """Restart: no packets while it starts, clock at 0, motor at rest."""
         self._from_rest = True
         self.began_ns, self.first_ms, self._packet = now_ns + _BOOT_NS, 0, 0
 
@@ -117,9 +117,8 @@ class LdrobotMachine:
 def ldrobot_emulator(
     lidar: Lidar, ranging: Ranging, seed: int = 0, *, rate_error: float = 0.0, first_ms: int = 0
 ) -> LidarLine[LdrobotMachine]:
-    """The emulator of a sensor of the catalogue; `rate_error` and `first_ms` are of its clock."""
+    """Return the emulator of a catalogue sensor; `rate_error` and `first_ms` are of its clock."""
     if lidar.name not in BAUDS:
         raise DeviceError(f"no LDROBOT emulator of the lidar '{lidar.name}'{suggest(lidar.name, BAUDS)}")
     machine = LdrobotMachine(lidar, ranging, time.monotonic_ns(), BAUDS[lidar.name], rate_error, first_ms)
-    # a line without a reader keeps next to nothing
     return LidarLine(lidar.name, machine, head=6, backlog=_BACKLOG, network=False, seed=seed)

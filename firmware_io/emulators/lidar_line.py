@@ -25,38 +25,35 @@ Ranging = Callable[[Times, Floats], tuple[Floats, Floats]]
 """True times [ns, time.monotonic_ns] in order and bearings [rad] of beams, (n,) -> range [m] (inf or NaN: no return,
 -inf: too near) and intensity, both (n,)."""
 
-_AHEAD_NS = 8_000_000  # measuring takes a computer a while: begun before the turn ends, it makes no scan late
-_LAG_NS = 500_000_000  # where this computer sees more slowly than a sensor turns, scans are left out, not piled up
+_AHEAD_NS = 8_000_000  # ray casting begins this long before the end of a turn, so that no scan is late
+_LAG_NS = 500_000_000  # if ray casting is slower than the sensor, scans are dropped after this delay
 
 
 class Machine(Protocol):
-    """What a sensor does, at given times.
-
-    Attributes:
-        scanning: another value each time that it begins or ends to scan.
-    """
+    """A sensor without its line, at given times."""
 
     @property
-    def scanning(self) -> object: ...  # noqa: D102
+    def scanning(self) -> object:
+        """A new value at each start and stop of scanning."""
 
-    def hear(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
-        """What it answers to what came, and the end of it that is no whole request yet."""
+    def receive(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
+        """Return the replies to complete requests, and the bytes of an incomplete one."""
         ...
 
     def next_ns(self) -> int:
-        """When the beams that it measures next are over; far away if it measures none."""
+        """Return the end of the next packets; far in the future if it does not scan."""
         ...
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """Measures them: when each packet is sent whole, and its bytes."""
+        """Measure the next packets; return the time of the last byte and the bytes of each."""
         ...
 
-    def leave_out(self, before_ns: int) -> None:
-        """Passes over the beams of before that time."""
+    def skip_to(self, before_ns: int) -> None:
+        """Skip the packets before a time."""
         ...
 
     def power_cycle(self, now_ns: int) -> None:
-        """The power was away."""
+        """Restart after a power cut."""
         ...
 
 
@@ -65,20 +62,16 @@ M_co = TypeVar("M_co", bound=Machine, covariant=True)
 
 @dataclass(slots=True)
 class _Channel:
-    """One client's way to the sensor: what came and is no whole request yet, and what waits to be sent."""
+    """Connection of one client."""
 
     fd: int
     close: Callable[[], None]
-    received: bytes = b""
-    waiting: bytearray = field(default_factory=bytearray)
+    received: bytes = b""  # of an incomplete request
+    waiting: bytearray = field(default_factory=bytearray)  # to be sent
 
 
 class LidarLine(Generic[M_co]):
-    """A lidar on a pseudo-terminal (`port`, a name that lasts) and over TCP (`address`); whoever asked gets the scans.
-
-    Attributes:
-        port: like "/dev/serial/by-id/...": it stays the same over a re-plug.
-    """
+    """A lidar on a pseudo-terminal (`port`, the same after a reconnection) and over TCP (`address`)."""
 
     def __init__(
         self,
@@ -96,13 +89,13 @@ class LidarLine(Generic[M_co]):
         Args:
             name: of the model.
             machine: the sensor.
-            jitter_s: scans arrive up to this much late.
-            head: bytes of a packet before its ranges, which `garble` spares.
-            backlog: bytes that wait for a slow reader before whole packets are dropped.
+            jitter_s: largest random delay of scans.
+            head: bytes of a packet before its ranges, which `garble` does not change.
+            backlog: bytes that wait for a slow reader before packets are dropped.
             network: whether it has TCP too.
             seed: of jitter and faults.
         """
-        self.machine = machine  # the sensor
+        self.machine = machine
         self._name = name
         self._head = head
         self._backlog = backlog
@@ -112,7 +105,7 @@ class LidarLine(Generic[M_co]):
         self._jitter_ns = round(jitter_s * 1e9)
         self._lock = threading.RLock()
         self._faults: deque[Callable[[bytes], bytes]] = deque()
-        self._sent: deque[tuple[int, bytes]] = deque()  # packets under way: when they arrive
+        self._sent: deque[tuple[int, bytes]] = deque()  # arrival and bytes of packets
         self._channels: dict[int, _Channel] = {}
         self._scans_to = -1
         self._tcp_port = 0
@@ -143,9 +136,9 @@ class LidarLine(Generic[M_co]):
             raise self._error
 
     def plug(self) -> None:
-        """The cable is in: the port is there, and somebody listens on the network."""
+        """Connect the cable: create the port, and listen on the network."""
         with self._lock:
-            master, slave = os.openpty()  # as long as the slave is open here, clients may come and go
+            master, slave = os.openpty()  # the open slave keeps the port without clients
             tty.setraw(slave)
             Path(self.port).unlink(missing_ok=True)
             Path(self.port).symlink_to(os.ttyname(slave))
@@ -158,13 +151,13 @@ class LidarLine(Generic[M_co]):
             self._scans_to = master
             if self._network:
                 self._server = socket.create_server(("127.0.0.1", self._tcp_port))
-                self._server.setblocking(False)  # who was about to connect may be gone again
+                self._server.setblocking(False)  # a client may be gone before it is accepted
                 self._tcp_port = self._server.getsockname()[1]
                 self.address = f"127.0.0.1:{self._tcp_port}"
         os.write(self._wake, b"x")
 
     def unplug(self) -> None:
-        """The cable is out: the port is gone, connections break; the sensor keeps its power and turns on."""
+        """Disconnect the cable: remove the port and break connections; the sensor keeps its power."""
         with self._lock:
             for fd in list(self._channels):
                 self._channels.pop(fd).close()
@@ -174,13 +167,13 @@ class LidarLine(Generic[M_co]):
             self._sent.clear()
 
     def power_cycle(self) -> None:
-        """Brown-out: the sensor starts anew, its clock at 0 and its laser off; the cable stays in."""
+        """Restart the sensor, its clock at 0 and its laser off; the cable stays connected."""
         with self._lock:
             self.machine.power_cycle(time.monotonic_ns())
             self._sent.clear()
 
     def garble(self, replies: int = 1) -> None:
-        """Flip one bit of the measured numbers in each of the next scans."""
+        """Flip one bit of the ranges in each of the next scans."""
 
         def flip(scan: bytes) -> bytes:
             at, bit = int(self._rng.integers(self._head, len(scan) - 3)), 1 << int(self._rng.integers(6))
@@ -190,7 +183,7 @@ class LidarLine(Generic[M_co]):
             self._faults.extend([flip] * replies)
 
     def cut(self, replies: int = 1) -> None:
-        """Lose a run of bytes, line ends among them, in each of the next scans: lines are cut and merged."""
+        """Lose a run of bytes with line ends in each of the next scans."""
 
         def lose(scan: bytes) -> bytes:
             at = int(self._rng.integers(len(scan) - 1))
@@ -203,7 +196,7 @@ class LidarLine(Generic[M_co]):
         try:
             while self._running:
                 self._serve()
-        except Exception as error:  # a look that fails: __exit__ raises it where somebody sees it
+        except Exception as error:  # raised again by __exit__
             self._error = error
 
     def _serve(self) -> None:
@@ -256,17 +249,16 @@ class LidarLine(Generic[M_co]):
             self._drop(channel)
             return
         scanning = self.machine.scanning
-        answers, channel.received = self.machine.hear(channel.received + received, time.monotonic_ns())
+        answers, channel.received = self.machine.receive(channel.received + received, time.monotonic_ns())
         channel.waiting += answers
         if self.machine.scanning is not scanning:  # began or ended
             self._scans_to = channel.fd
             self._sent.clear()
 
     def _turn(self) -> None:
-        """Measure the turn that is about to be over, and hand out the scans that have arrived."""
-        self.machine.leave_out(time.monotonic_ns() - _LAG_NS)
-        over_ns = self.machine.next_ns()
-        if over_ns - _AHEAD_NS <= time.monotonic_ns():
+        """Measure the turn that is about to end, and send the packets that are due."""
+        self.machine.skip_to(time.monotonic_ns() - _LAG_NS)
+        if self.machine.next_ns() - _AHEAD_NS <= time.monotonic_ns():
             late_ns = round(self._rng.uniform(0, self._jitter_ns)) if self._jitter_ns else 0
             for sent_ns, packet_bytes in self.machine.next_packets():
                 packet = self._faults.popleft()(packet_bytes) if self._faults else packet_bytes

@@ -1,4 +1,4 @@
-"""What a Hokuyo lidar does: requests in, replies out, turn after turn, at given times."""
+"""Emulated Hokuyo lidar without its line, at given times."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scanwright.firmware_io.emulators.hokuyo_models import Identity, Quartz
 from scanwright.firmware_io.lidar.lidar import StampAt
 from scanwright.firmware_io.lidar.scip import measurement, protocol
 
-Look = Callable[[Times], tuple[Floats, Floats]]
+TurnRanging = Callable[[Times], tuple[Floats, Floats]]
 
 _SCAN = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?")
 _BOOT_NS = 1_000_000_000  # [assumed]
@@ -23,31 +23,31 @@ _NEVER_NS = 1 << 62  # 146 years
 
 @dataclass(slots=True)
 class Scanning:
-    """Scans that somebody asked for: the echo without its last two digits and text, and what is left to do."""
+    """Requested scans."""
 
     window: measurement.Window
-    echo: bytes
+    echo: bytes  # without its last two digits and text
     text: bytes
     skip: int
     remaining: int
     endless: bool
-    turn: int
+    turn: int  # next one
     skipped: int = 0
 
 
 @dataclass
 class LidarMachine:
-    """The state of one sensor; times are true ones, `time.monotonic_ns()` or made up."""
+    """State of one sensor; times are true ones."""
 
-    identity: Identity  # which model
-    look: Look  # true times of all beams of a turn -> ranges and intensities
+    identity: Identity
+    ranging: TurnRanging  # true times of all beams of a turn -> ranges and intensities
     quartz: Quartz  # the sensor's clock
-    motor_error: float = 0.0  # turns take this part longer than the sensor says
-    stamp_at: StampAt = "step_0"  # which moment of a turn the stamps mean
-    scip_1: bool = False  # it talks SCIP 1.1 until it is told otherwise
+    motor_error: float = 0.0  # relative, turns are longer than reported
+    stamp_at: StampAt = "step_0"  # step of its timestamps
+    scip_1: bool = False  # whether it uses SCIP 1.1 until SCIP 2.0 is requested
     state: str = "Sensor works well."  # STAT of II
     laser: bool = False  # whether it is on
-    scanning: Scanning | None = None  # what it scans for; None if not requested
+    scanning: Scanning | None = None
     _adjusting: bool = False
     _rebooting: bool = False
     _silent_until_ns: int = 0
@@ -63,42 +63,46 @@ class LidarMachine:
 
     @property
     def arc_ns(self) -> int:
-        """From the moment that a stamp means to the end of the last step: a scan cannot arrive earlier."""
+        """Time from the stamp to the end of the last step, before which no scan arrives."""
         parameters = self.identity.parameters
         return round(parameters.since_stamp_s(parameters.last_step + 1, self.stamp_at) * (1 + self.motor_error) * 1e9)
 
     def turn_ns(self, turn: int) -> int:
-        """True time at which a turn passes step 0."""
+        """Return the true time of step 0 of a turn."""
         return self._zero_ns + round(turn * self.period_ns)
 
-    def hear(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
-        """Replies to whole requests, and what is none yet."""
+    def receive(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
+        """Return the replies to complete requests, and the bytes of an incomplete one."""
         *requests, rest = received.replace(b"\r", b"\n").split(b"\n")
         return b"".join(self.answer(request, now_ns) for request in requests), rest
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """The scan of the turn that is over next; none if nobody asked for it."""
-        over_ns = self.next_ns()
+        """Measure the next turn; no packet if it is skipped or not requested."""
+        end_ns = self.next_ns()
         scan = self.next_scan()
-        return [(over_ns, scan)] if scan else []
+        return [(end_ns, scan)] if scan else []
 
     def next_ns(self) -> int:
-        """When the next turn is measured to its end; never if nobody waits for one."""
-        return self._measured_ns(self.scanning.turn) if self.scanning else _NEVER_NS
+        """Return the end of the next requested turn."""
+        if self.scanning is None:
+            return _NEVER_NS
+        parameters = self.identity.parameters
+        part = (parameters.last_step + 1) / parameters.steps_per_turn
+        return self.turn_ns(self.scanning.turn) + round(part * self.period_ns)
 
     def power_cycle(self, now_ns: int) -> None:
-        """Begin anew, as after a brown-out: clock at 0, laser off, no answer for a second."""
+        """Restart: clock at 0, laser off, no reply for a second."""
         self._reset(now_ns)
         self._silent_until_ns = now_ns + _BOOT_NS
 
-    def leave_out(self, until_ns: int) -> None:
-        """Forget the turns that were over before a time and that nobody has measured."""
+    def skip_to(self, before_ns: int) -> None:
+        """Skip the turns that end before a time."""
         if self.scanning is not None:
-            behind = math.floor((until_ns - self.next_ns()) / self.period_ns)
+            behind = math.floor((before_ns - self.next_ns()) / self.period_ns)
             self.scanning.turn += max(behind, 0)
 
     def next_scan(self) -> bytes:
-        """Measure the next turn; empty if it is one to skip."""
+        """Measure the next turn; empty if it is skipped."""
         scanning = self.scanning
         if scanning is None:
             return b""
@@ -115,7 +119,7 @@ class LidarMachine:
         return protocol.reply(echo, "99", self._lines(scanning.window, turn))
 
     def answer(self, request: bytes, now_ns: int) -> bytes:
-        """The reply to one request, without its LF; empty while it boots."""
+        """Return the reply to one request without its LF; empty while it starts."""
         if now_ns < self._silent_until_ns or not request:
             return b""
         body, _, text = request.partition(b";")
@@ -141,7 +145,7 @@ class LidarMachine:
         return protocol.reply(request, self._command(body, now_ns))
 
     def _command(self, body: bytes, now_ns: int) -> str:
-        """Status of the requests that have no other answer."""
+        """Execute a request without data and return its status."""
         rebooting, self._rebooting = self._rebooting, body == b"RB"
         if body == b"BM":
             was_on, self.laser = self.laser, True
@@ -203,11 +207,11 @@ class LidarMachine:
         return protocol.reply(request, "00")
 
     def _lines(self, window: measurement.Window, turn: int) -> list[bytes]:
-        """Measure a turn and write it down."""
+        """Measure a turn and return the lines of its reply."""
         parameters = self.identity.parameters
         steps = np.arange(parameters.first_step, parameters.last_step + 1)
         step_ns = self.period_ns / parameters.steps_per_turn
-        range_m, intensity = self.look(self.turn_ns(turn) + np.rint(steps * step_ns).astype(np.int64))
+        range_m, intensity = self.ranging(self.turn_ns(turn) + np.rint(steps * step_ns).astype(np.int64))
         begin, end = window.first_step - parameters.first_step, window.last_step - parameters.first_step + 1
         value = clustered(self._numbers(range_m[begin:end]), window.cluster, parameters.range_min_mm)
         if window.characters == 2:
@@ -219,16 +223,12 @@ class LidarMachine:
         return protocol.data_lines(self.quartz.ms(stamp_ns), protocol.encode(value.tolist(), window.characters))
 
     def _numbers(self, range_m: Floats) -> Times:
-        """Whole millimetres, and the model's numbers for what is none."""
+        """Return integer millimetres, and error codes of invalid ranges."""
         parameters = self.identity.parameters
         lost = np.isnan(range_m) | (range_m * 1e3 > parameters.range_max_mm)
         near = ~lost & (range_m * 1e3 < parameters.range_min_mm)
         value = np.rint(np.where(lost | near, 0.0, range_m) * 1e3).astype(np.int64)
         return np.where(lost, self.identity.no_return, np.where(near, self.identity.too_near, value))
-
-    def _measured_ns(self, turn: int) -> int:
-        parameters = self.identity.parameters
-        return self.turn_ns(turn) + round((parameters.last_step + 1) / parameters.steps_per_turn * self.period_ns)
 
     def _reset(self, now_ns: int) -> None:
         self.scanning, self.laser, self._adjusting = None, False, False
@@ -269,7 +269,7 @@ class LidarMachine:
 
 
 def clustered(value: Times, cluster: int, range_min_mm: int) -> Times:
-    """One number per cluster: the least that is no error code, else its first (SCIP 2.0, p. 10)."""
+    """Return one number per cluster: the smallest that is not an error code, or its first (SCIP 2.0, p. 10)."""
     padded = np.append(value, np.repeat(value[-1:], -value.size % cluster)).reshape(-1, cluster)
     valid = np.where(padded >= range_min_mm, padded, np.iinfo(np.int64).max)
     return np.where((padded >= range_min_mm).any(axis=1), valid.min(axis=1), padded[:, 0])

@@ -1,4 +1,4 @@
-"""`scanwright emulate`: both emulators at once, the lidar on the horn of the servo, in a room."""
+"""Emulated scanner of `scanwright emulate`: the lidar on the horn of the servo, in a scene."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from scanwright.firmware_io.device_ports import Ports
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Machine
 from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.emulators.servo_plant import Load
-from scanwright.firmware_io.emulators.world import looking, range_model, rays
+from scanwright.firmware_io.emulators.world import range_model, rays, scene_ranging
 from scanwright.firmware_io.lidar.families import family_of
 
 
 @dataclass(frozen=True, slots=True)
 class EmulatedScanner:
-    """A scanner that runs; `ports` is where programs find it."""
+    """A running emulated scanner."""
 
     ports: Ports
     lidar: LidarLine[Machine]
@@ -48,18 +48,17 @@ def emulated_scanner(
 
     Args:
         angles: angle set of the scanner.
-        scene: what it stands in, in its world frame.
-        load: what hangs on the servo; None for a light, balanced head.
-        protocol: of the servo; None for the one that the model has from the factory.
-        sigma_mm: replaces the data sheet's range noise.
+        scene: surroundings, in the world frame.
+        load: of the servo; None for a light, balanced head.
+        protocol: of the servo; None for the factory setting.
+        sigma_mm: replaces the range noise of the data sheet.
         seed: of the noise.
-        factory_servo: give the servo the settings it has from the factory, not those of one that is set up for the
-            motion of the angle set.
+        factory_servo: whether the servo has factory settings instead of those for the motion of the angle set.
 
     Raises:
-        SceneError: the sensor would see nothing there.
+        SceneError: no surface is in range.
         TaskError: sensor or servo are not in the catalogue.
-        DeviceError: there is no emulator of one of them.
+        DeviceError: sensor or servo has no emulator.
     """
     lidar = load_catalogue().get(angles.sensor, Lidar)
     make_emulator = resolve_name(family_of(lidar.name).emulator)
@@ -76,6 +75,6 @@ def emulated_scanner(
         servo = stack.enter_context(ServoEmulator(angles.servo, protocol, load=load, seed=seed))
         if not factory_servo:
             servo.set_up(spins=None if angles.motion is None else isinstance(angles.motion, Spin))
-        ranging = looking(scene, angles, servo.axis.angle_rad, model, seed)
+        ranging = scene_ranging(scene, angles, servo.axis.angle_rad, model, seed)
         emulator = stack.enter_context(make_emulator(lidar, ranging, seed))
         yield EmulatedScanner(Ports(emulator.port, servo.port, os.getpid()), emulator, servo)

@@ -1,17 +1,17 @@
-"""A servo as a plant: motor, gear with play, control loop, an off-axis mass that gravity pulls; and their equations.
+"""Model of a servo: motor, gear with backlash, control loop, and an off-axis mass.
 
-All quantities are seen at the horn. With motor angle m, horn angle h, duty u of the supply s:
+All quantities refer to the horn. With motor angle m, horn angle h, duty u of the supply s:
 
     J_m m'' = T_stall (s u - m' / w_0) - T_c tanh(m' / eps) - T_gear
     J_h h'' = T_gear + T_g cos(h + phase) - T_b tanh(h' / eps)
-    T_gear  = k d max(0, 1 + mu d' sign d),   d = (m - h) outside of the play, 0 within
+    T_gear  = k d max(0, 1 + mu d' sign d),   d = (m - h) outside of the backlash, 0 within
 
-The control loop sees the horn through a sensor lag (the encoder sits on the output shaft). In velocity mode it is a PI
-loop, in position mode a proportional one towards a goal that walks at the set rate (MX, XM), or the AX-12A's
-compliance: nothing within one count, then a least current ("punch") and a steep slope. That slope behind a slow sensor
-leaves little phase margin: an AX-12A overshoots and rings wherever a sweep begins and ends, an MX-64R does not.
+The encoder on the output shaft has a delay. In velocity mode the control loop is a PI loop; in position mode it is a
+proportional one towards a setpoint that moves at the set rate (MX, XM), or the AX-12A's compliance: nothing within one
+count, then a smallest current ("punch") and a steep slope. That slope with a slow sensor leaves little phase margin: an
+AX-12A overshoots and oscillates at the ends of a sweep, an MX-64R does not.
 
-Motor data are the catalogue's; what no maker publishes is assumed, and marked so in `plant_of`.
+Motor data are the catalogue's; unpublished values are marked as assumed in `plant_of`.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from scanwright.firmware_io.servo.bus.registers import RPM
 
 Mode = Literal["off", "share", "velocity", "position"]
 _PLASTIC_TEETH = ("AX-12A", "XL330-M288", "XL430-W250")
-_SLOW_RAD_S = 1e-4  # below it Coulomb friction fades, so that it has a slope a solver can follow
+_SLOW_RAD_S = 1e-4  # below it Coulomb friction decreases, so that its slope is finite for the solver
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What hangs on the horn."""
+    """Load of the horn."""
 
     inertia_kg_m2: float = 5e-4  # about the axis
-    gravity_nm: float = 0.0  # largest torque of gravity on the axis; 0 if the axis is upright or the head balanced
+    gravity_nm: float = 0.0  # largest torque of gravity on the axis; 0 for an upright axis or a balanced head
     gravity_phase_rad: float = 0.0  # that torque is `gravity_nm cos(angle + gravity_phase_rad)`
     bearing_nm: float = 0.01  # Coulomb friction of bearing and slip ring
 
@@ -49,19 +49,19 @@ class Plant:
     no_load_rad_s: float  # at full supply
     inertia_kg_m2: float  # of rotor and gear
     friction_nm: float  # Coulomb friction of motor and gear
-    backlash_rad: float  # full play of the gear
+    backlash_rad: float  # of the gear, end to end
     stiffness_nm_rad: float  # of the teeth
-    impact_s_rad: float  # how much of a hit the teeth swallow (mu above)
-    sensor_lag_s: float  # between the horn's angle and what the loop knows of it
+    impact_s_rad: float  # damping of the teeth (mu above)
+    sensor_lag_s: float  # delay of the measured angle of the horn
     velocity_p: float  # duty per rad/s of speed error
     velocity_i: float  # duty per rad of the error's integral
     position_p: float  # duty per rad of position error
     margin_rad: float  # position error that the loop ignores
-    punch: float  # least duty beyond the margin
+    punch: float  # smallest duty beyond the margin
 
 
 def plant_of(model: str) -> Plant:
-    """The plant of a model: torque, speed and play from its maker, loop gains from its control table's defaults."""
+    """Return the plant of a model: torque, speed and backlash from its maker, loop gains from its control table."""
     ax = model == "AX-12A"
     servo = load_catalogue().get(model, Servo)
     no_load_rad_s, backlash_deg = servo.no_load_rpm * RPM, servo.backlash_deg
@@ -89,18 +89,18 @@ def plant_of(model: str) -> Plant:
 
 @dataclass(frozen=True, slots=True)
 class Actuation:
-    """What acts on the plant from one moment on."""
+    """Input of the plant from one time on."""
 
-    mode: Mode = "off"  # motor open, share of the supply, velocity or position loop
+    mode: Mode = "off"  # motor open, part of the supply, velocity or position loop
     goal: float = 0.0  # nothing, a duty in -1..1, rad/s or rad
-    rate_rad_s: float = math.inf  # at which the goal position is walked to
+    rate_rad_s: float = math.inf  # of the setpoint in position mode
     supply: float = 1.0  # voltage as a fraction of the rated one
     torque_limit: float = 1.0  # largest duty
-    blocked: bool = False  # something holds the horn where it is
+    blocked: bool = False  # whether the horn is blocked
 
 
 def walked_rad(elapsed_s: float, start: float, goal: float, rate_rad_s: float) -> float:
-    """Where the goal position has walked to [rad], from `start` to `goal`, so long after it set out."""
+    """Return the setpoint [rad] on its way from `start` to `goal` after `elapsed_s`."""
     most_rad = rate_rad_s * elapsed_s if elapsed_s > 0 else 0.0
     return start + max(-most_rad, min(most_rad, goal - start))
 
@@ -114,18 +114,18 @@ def effort(
     i: float,
     seen: float,
 ) -> tuple[float, float]:
-    """Duty of the loop, and torque of the motor as a fraction of the stall torque.
+    """Return the duty of the loop, and the torque of the motor as a fraction of the stall torque.
 
-    `setpoint` is where the goal of a position loop has walked to [rad], the rest are states as in `equations`.
+    `setpoint` is that of a position loop [rad], the others are states as in `equations`.
     """
     if drive.mode == "off":
         return 0.0, 0.0
-    duty = max(-drive.torque_limit, min(drive.torque_limit, _duty_wanted(plant, drive, setpoint, h, i, seen)))
+    duty = max(-drive.torque_limit, min(drive.torque_limit, _unlimited_duty(plant, drive, setpoint, h, i, seen)))
     return duty, drive.supply * duty - m_rate / plant.no_load_rad_s
 
 
-def _duty_wanted(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, seen: float) -> float:
-    """Duty that the loop asks for, whatever the limit."""
+def _unlimited_duty(plant: Plant, drive: Actuation, setpoint: float, h: float, i: float, seen: float) -> float:
+    """Return the duty of the loop without limit."""
     if drive.mode == "share":
         return drive.goal
     if drive.mode == "velocity":
@@ -138,7 +138,7 @@ def _duty_wanted(plant: Plant, drive: Actuation, setpoint: float, h: float, i: f
 def equations(
     plant: Plant, load: Load, drive: Actuation, start_s: float, setpoint: float, hold_rad: float
 ) -> Callable[[float, Floats], list[float]]:
-    """Right-hand side for one drive; states: motor angle and rate, horn angle and rate, integral, angle seen."""
+    """Return the right-hand side for one drive; states: motor angle and rate, those of the horn, integral, encoder."""
     half = plant.backlash_rad / 2
 
     def rhs(t: float, y: Floats) -> list[float]:
@@ -159,9 +159,9 @@ def equations(
         seen_rate = (h - seen) / plant.sensor_lag_s
         integral_rate = 0.0
         if drive.mode == "velocity":
-            # What the limit cuts off flows back. An integral that just stops there would switch at every step, and the
-            # solver would crawl along the switch for ever.
-            cut = duty - _duty_wanted(plant, drive, setpoint, h, i, seen)
+            # Anti-windup by back-calculation: an integral that stops at the limit would switch at every step of the
+            # solver.
+            cut = duty - _unlimited_duty(plant, drive, setpoint, h, i, seen)
             integral_rate = plant.velocity_i * (drive.goal - seen_rate + cut / plant.velocity_p)
         return [
             m_rate,

@@ -1,4 +1,4 @@
-"""Recording without devices, faster than real time: exact motion, no packets, clocks, ripple or faults."""
+"""Simulated recording, faster than real time: exact motion, without packets, clocks, ripple or faults."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ JOINT_HZ = 200.0  # twice as often as a scan reads the servo
 def simulated_recording(
     angles: AngleSet, scene: Scene, *, turns: int = 1, sigma_mm: float | None = None, seed: int = 0
 ) -> RecordingArrays:
-    """Cast every beam of full scans at the axis angle of its own time.
+    """Cast each beam of full scans at the axis angle of its time.
 
     Args:
         angles: angle set of the scanner, with its motion.
-        scene: what it stands in, in its world frame.
+        scene: surroundings, in the world frame.
         turns: full scans.
-        sigma_mm: replaces the range noise of the sensor's data sheet.
+        sigma_mm: replaces the range noise of the data sheet.
         seed: of the noise.
 
     Raises:
-        DeviceError: the angle set does not say how the servo moves.
+        DeviceError: the angle set has no motion.
         TaskError: the sensor is not in the catalogue.
     """
     if angles.motion is None:
@@ -54,7 +54,7 @@ def simulated_recording(
 
 
 def _commanded_rad(motion: Motion, time_s: Floats) -> Floats:
-    """Joint angle at times since the start, as ordered; spin counts turns."""
+    """Return the commanded joint angle at times since the start; a spin counts turns."""
     if isinstance(motion, Spin):
         return 2 * np.pi * time_s / motion.period_s
     if isinstance(motion, Sweep):

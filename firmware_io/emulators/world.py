@@ -1,7 +1,7 @@
-"""What a turning lidar sees: every beam cast at the axis angle of its own time, and the sensor's range of it.
+"""Simulated ranges of a turning lidar: each beam is cast at the axis angle of its time.
 
-Rays use `AngleSet.T_world_laser`, the definition of the frame chain, not the kernel of `assemble`: each checks the
-other.
+Rays use `AngleSet.T_world_laser`, the definition of the frame chain, not the kernel of `assemble`, so that each checks
+the other.
 """
 
 from __future__ import annotations
@@ -23,32 +23,28 @@ from scanwright.design.errors import TaskError
 from scanwright.design.scene.ray_caster import Hits, Scene, build_scene, cast, load_scene
 
 _MOST_NOISE_MM = 1e5  # more is a wrong unit
-_WANDER = 0.01  # of the speed [assumed]
+_SPEED_VARIATION = 0.01  # relative [assumed]
 SPIN_UP_S = 0.5  # time constant of a motor [assumed]: after 1.5 s it has 95 % of its speed
-_WANDER_S = 1.7  # period of it [assumed]
+_VARIATION_S = 1.7  # period of the variation [assumed]
 
 
 @dataclass(frozen=True, slots=True)
 class RangeModel:
-    """How a sensor turns a distance into a range."""
+    """Noise, resolution and limits of a sensor."""
 
-    sigma_m: float | Callable[[Floats], Floats]  # standard deviation of the noise, or that at ranges in metres
-    quantum_m: float  # step of the ranges that it sends
-    range_min_m: float  # nothing nearer is measured
-    range_max_m: float  # nothing farther comes back
-    incidence_max_rad: float  # a surface that is met at a flatter angle (from its normal) sends nothing back
+    sigma_m: float | Callable[[Floats], Floats]  # standard deviation of the noise, or a function of the range [m]
+    quantum_m: float  # resolution of ranges
+    range_min_m: float
+    range_max_m: float
+    incidence_max_rad: float  # largest angle to the normal of a surface with a return
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """One scan as the sensor means it; row i is beam i.
+    """One simulated scan; row i is beam i."""
 
-    Attributes:
-        range_m: shape (n,); +inf if nothing came back, -inf if something was too near (REP 117).
-    """
-
-    range_m: Float64[ndarray, " n"]
-    intensity: Float64[ndarray, " n"]  # shape (n,), 0 if there is no range
+    range_m: Float64[ndarray, " n"]  # shape (n,); +inf without a return, -inf if too near (REP 117)
+    intensity: Float64[ndarray, " n"]  # shape (n,), 0 without a range
 
 
 def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
@@ -67,19 +63,19 @@ def range_model(lidar: Lidar, sigma_mm: float | None = None) -> RangeModel:
 def rays(
     angles: AngleSet, bearing_rad: Float64[ndarray, " n"], joint_rad: Float64[ndarray, " n"]
 ) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
-    """Origins and unit directions in the world of beams, each at its own joint position; all shapes (n, ...)."""
+    """Return origins and unit directions of beams in the world, each at its joint position; all shapes (n, ...)."""
     T_world_laser = angles.T_world_laser(joint_rad)
     in_plane = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=-1)
     return T_world_laser[:, :3, 3], np.einsum("nij,nj->ni", T_world_laser[:, :3, :2], in_plane)
 
 
 def see(scene: Scene, angles: AngleSet, bearing_rad: Float64[ndarray, " n"], joint_rad: Float64[ndarray, " n"]) -> Hits:
-    """True ranges of beams of one sensor in a scene (world frame), each at its own joint position."""
+    """Cast beams of one sensor in a scene (world frame), each at its joint position."""
     return cast(scene, *rays(angles, bearing_rad, joint_rad))
 
 
 def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> Measured:
-    """Return ranges with noise, in whole quanta, and plausible intensities; draws one number per beam."""
+    """Return rounded ranges with noise, and plausible intensities; draws one random number per beam."""
     sigma_m = model.sigma_m(hits.range_m) if callable(model.sigma_m) else model.sigma_m
     noise_m = sigma_m * rng.standard_normal(hits.range_m.size)
     range_m = np.rint((hits.range_m + noise_m) / model.quantum_m) * model.quantum_m
@@ -92,7 +88,7 @@ def measure_ranges(hits: Hits, model: RangeModel, rng: np.random.Generator) -> M
     )
 
 
-def looking(
+def scene_ranging(
     scene: Scene,
     angles: AngleSet,
     angle_at: Callable[[Times], Floats],
@@ -102,28 +98,28 @@ def looking(
     """Return the `Ranging` of a lidar emulator; `angle_at`: true angle of the axis at given times."""
     rng = np.random.default_rng(seed)
 
-    def look(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
+    def ranging(time_ns: Times, bearing_rad: Floats) -> tuple[Floats, Floats]:
         measured = measure_ranges(see(scene, angles, bearing_rad, angle_at(time_ns)), model, rng)
         return measured.range_m, measured.intensity
 
-    return look
+    return ranging
 
 
 def turned_deg(rate_hz: float, since_s: Floats) -> tuple[Floats, Floats]:
-    """Return angle [deg] and speed [deg/s] of a cheap sensor's motor, which wanders by 1 % [assumed]."""
-    usual_deg_s, phase = 360 * rate_hz, 2 * np.pi * since_s / _WANDER_S
-    wandered_s = _WANDER * _WANDER_S / (2 * np.pi) * (1 - np.cos(phase))
-    return usual_deg_s * (since_s + wandered_s), usual_deg_s * (1 + _WANDER * np.sin(phase))
+    """Return angle [deg] and speed [deg/s] of a low-cost sensor's motor, which varies by 1 % [assumed]."""
+    mean_deg_s, phase = 360 * rate_hz, 2 * np.pi * since_s / _VARIATION_S
+    ahead_s = _SPEED_VARIATION * _VARIATION_S / (2 * np.pi) * (1 - np.cos(phase))
+    return mean_deg_s * (since_s + ahead_s), mean_deg_s * (1 + _SPEED_VARIATION * np.sin(phase))
 
 
 def spun_up(since_s: Floats) -> tuple[Floats, Floats]:
-    """Return the time [s] at full speed for the angle turned since rest, and the share of that speed (exponential)."""
+    """Return the time [s] at full speed for the same angle since rest, and the fraction of that speed (exponential)."""
     share = -np.expm1(-since_s / SPIN_UP_S)
     return since_s - SPIN_UP_S * share, share
 
 
 def furnished_room() -> Float64[ndarray, "triangles 3 3"]:
-    """Triangles of the room of the tour, 7.2 x 5.6 x 2.8 m, its floor 0.9 m below the world's origin: (t, 3, 3)."""
+    """Return the triangles of a room, 7.2 x 5.6 x 2.8 m, its floor 0.9 m below the world's origin: (t, 3, 3)."""
     room = [[-3.2, -2.4, -0.9], [4.0, 3.2, 1.9]]
     furniture = [
         [[1.6, -2.4, -0.9], [3.0, -1.6, -0.15]],  # table

@@ -1,1 +1,1 @@
-"""Lidars: one folder a family."""
+"""Lidar drivers, one folder per protocol family."""

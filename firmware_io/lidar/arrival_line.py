@@ -1,6 +1,6 @@
-"""Line that maps a sensor's time to the host's, from packets that can be late but never early.
+"""Line that maps sensor time to host time, fitted below arrivals, which can be late but never early.
 
-The line below all arrivals of the last seconds: the edge of their lower convex hull that spans the middle.
+It is the edge of their lower convex hull that spans the middle of the last seconds.
 """
 
 from __future__ import annotations
@@ -11,31 +11,31 @@ from collections.abc import Callable
 
 from scanwright.firmware_io.lidar.tick_line import half_hull, middle_slope
 
-QUARTZ_RATE = 2e-4  # quartz is better than 100 ppm, and there are two of them
+QUARTZ_RATE = 2e-4  # each of the two quartzes is better than 100 ppm
 
 _BUCKET_NS, _BUCKETS = 200_000_000, 300  # a minute: longer averages better, shorter follows a warming quartz
 _EVEN_BUCKET_NS, _EVEN_BUCKETS = 1_000_000_000, 100  # of packets whose spacing is known
-_FEWEST = 3  # buckets that tell a rate
+_FEWEST = 3  # buckets that determine a rate
 _NEAR = 320  # arrivals among which the earliest must touch the line
-_CHANCE = 2.0  # times the earliness that is usual among so many arrivals
-_USUAL = 0.25  # of the largest rate error: the usual one [assumed]
-_BEHIND_NS = 50_000_000  # longer than a busy computer delays all arrivals of two buckets, shorter than a lidar's turn
+_CHANCE = 2.0  # times the usual gap between the line and the earliest of as many arrivals
+_USUAL = 0.25  # usual rate error as a part of the largest one [assumed]
+_BEHIND_NS = 50_000_000  # longer than a busy computer delays all arrivals of two buckets, shorter than a mirror turn
 
 
 class ArrivalLine:
-    """Host times of a sensor's, in constant memory."""
+    """Conversion from sensor time to host time, in constant memory."""
 
     def __init__(
         self, *, smallest_delay_ns: int, rate_max: float, grain_ns: float, spacing_ns: float | None = None
     ) -> None:
-        """Nothing is known yet.
+        """Start without arrivals.
 
         Args:
-            smallest_delay_ns: from the sensor's time of a packet to its arrival, undelayed: arrivals alone cannot tell.
-            rate_max: how far the sensor's seconds may differ from the host's.
-            grain_ns: standard deviation of what may stay unknown of the sensor's own times.
-            spacing_ns: between packets; with it the rate of a few arrivals is weighed against the usual one, and a line
-                that the last arrivals stay above is lifted to them.
+            smallest_delay_ns: from the sensor time of a packet to its undelayed arrival, which arrivals cannot show.
+            rate_max: largest relative rate error of the sensor's clock.
+            grain_ns: standard uncertainty of the sensor times.
+            spacing_ns: time between packets, if even. The rate is then weighed against the usual one, and the line is
+                lifted to the last arrivals if all of them lie above it.
         """
         self._delay_ns, self._rate_max, self._grain_ns = smallest_delay_ns, rate_max, grain_ns
         self._spacing_ns = spacing_ns
@@ -48,7 +48,7 @@ class ArrivalLine:
         self._count = 0
 
     def add(self, sensor_ns: float, arrival_ns: int, number: int = 0) -> None:
-        """A packet that was whole at `sensor_ns`, later than the last one, has come; `number` is for `retime`."""
+        """Add the arrival of a packet that was complete at `sensor_ns`; `number` identifies it for `retime`."""
         if not self._count:
             self._origin = (sensor_ns, arrival_ns)
         self._count += 1
@@ -65,7 +65,7 @@ class ArrivalLine:
         self._late_ns += (above_ns - self._late_ns) * max(1 / self._count, 1e-3)
 
     def retime(self, sensor_ns: Callable[[int], float | None]) -> None:
-        """The sensor's times of packets by their numbers are known better now; None for those that stay."""
+        """Replace sensor times, by packet number, with better ones; None keeps a time."""
         for k, (since_ns, late_ns, number) in enumerate(self._earliest):
             if (better := sensor_ns(number)) is not None:
                 now_ns = better - self._origin[0]
@@ -74,11 +74,11 @@ class ArrivalLine:
             self._fit()
 
     def host_ns(self, sensor_ns: float) -> int:
-        """Host time of a sensor time."""
+        """Return the host time of a sensor time."""
         return self.arrives_ns(sensor_ns) - self._delay_ns
 
     def arrives_ns(self, sensor_ns: float) -> int:
-        """When what was whole at a sensor time arrives, if nothing holds it up."""
+        """Return the undelayed arrival time of a packet that was complete at a sensor time."""
         lift_ns = max(self._near_ns - _CHANCE * self._chance_ns, 0.0)
         return self._origin[1] + round((sensor_ns - self._origin[0]) * self.rate + self._offset_ns + lift_ns)
 
@@ -88,7 +88,7 @@ class ArrivalLine:
         reach_ns = self._reach_ns
         if self._spacing_ns is None:
             span_ns = max(self._newest_ns - self._earliest[0][0], _BUCKET_NS) if self._earliest else _BUCKET_NS
-            # two arrivals hold the line, some half of the span apart; few tell the rate no better than the bound
+            # two arrivals, about half the span apart, fix the line; few determine the rate no better than the bound
             reach_ns = self._rate_max * span_ns / 2
             if len(self._earliest) >= _FEWEST:
                 reach_ns = min(reach_ns, 2 * self._late_ns / len(self._earliest))
@@ -96,7 +96,7 @@ class ArrivalLine:
 
     @property
     def rate(self) -> float:
-        """Host seconds per sensor's second."""
+        """Host seconds per sensor second."""
         return 1 + self._slope
 
     @property
@@ -117,8 +117,8 @@ class ArrivalLine:
         points = [(since_ns, late_ns) for since_ns, late_ns, _ in self._earliest]
         slope = middle_slope(half_hull(points, 1)) if enough else 0.0
         if self._spacing_ns is not None:
-            # Two arrivals hold the line, some half of the span apart, each late by the mean over half of all: that is
-            # the uncertainty of their rate. Few tell it less well than the usual quality of quartzes does.
+            # Two arrivals, about half the span apart, fix the line; each is late by the mean over half of all. The
+            # rate is weighed against the usual quality of quartzes, which is better than few arrivals.
             span_ns = max(self._newest_ns - points[0][0], self._spacing_ns)
             unsure, usual = 12 * self._late_ns * self._spacing_ns / span_ns**2, _USUAL * self._rate_max
             slope /= 1 + (unsure / usual) ** 2

@@ -1,4 +1,4 @@
-"""Bytes to and from a sensor: over a serial port, USB or not, or over TCP."""
+"""Byte streams to a sensor, over a serial port or TCP; OSError if the connection breaks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import select
 import socket
 import struct
 import termios
-from typing import Protocol
 
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.capture import captured
@@ -17,34 +16,18 @@ from scanwright.firmware_io.serial_port import open_serial_port
 FIRST_BAUD = 115_200  # until a driver sets its own
 
 
-class Stream(Protocol):
-    """Bytes to and from a sensor; OSError when it is gone."""
-
-    def read(self, timeout_s: float) -> bytes:
-        """What has come, at least one byte; empty after the time."""
-        ...
-
-    def write(self, data: bytes) -> None:
-        """Send all of it."""
-        ...
-
-    def close(self) -> None:
-        """Let go of the port."""
-        ...
-
-
 class SerialStream:
-    """A serial port, USB or not."""
+    """A serial port, with or without USB."""
 
     def __init__(self, port: str) -> None:
         self._port = open_serial_port(port, FIRST_BAUD)
-        with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):  # not every driver can
-            self._port.set_low_latency_mode(True)  # an FTDI adapter gathers bytes for 16 ms otherwise
+        with contextlib.suppress(OSError, ValueError, AttributeError, NotImplementedError):  # unsupported by drivers
+            self._port.set_low_latency_mode(True)  # otherwise an FTDI adapter collects bytes for 16 ms
         self._port.reset_input_buffer()
 
     @property
     def baud(self) -> int:
-        """Bits per second; USB and pseudo-terminals ignore it."""
+        """Baud rate; USB and pseudo-terminals ignore it."""
         return self._port.baudrate
 
     @baud.setter
@@ -53,13 +36,13 @@ class SerialStream:
         self._port.reset_input_buffer()
 
     def set_dtr(self, up: bool) -> None:
-        """Raise or lower DTR; what has no such line stays as it is."""
+        """Raise or lower DTR, if the port has that line."""
         with contextlib.suppress(OSError):
             request = termios.TIOCMBIS if up else termios.TIOCMBIC
             fcntl.ioctl(self._port.fileno(), request, struct.pack("I", termios.TIOCM_DTR))
 
     def can(self, baud: int) -> bool:
-        """Whether the port takes that speed; it is as before afterwards."""
+        """Whether the port supports a baud rate; the present one is restored."""
         usual = self._port.baudrate
         try:
             self._port.baudrate = baud
@@ -70,17 +53,17 @@ class SerialStream:
         return True
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come."""
+        """Return all received bytes, at least one; none after the timeout."""
         self._port.timeout = max(timeout_s, 0.0)
         first = self._port.read(1)
         return first + self._port.read(self._port.in_waiting) if first else b""
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
         self._port.write(data)
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         self._port.close()
 
 
@@ -93,7 +76,7 @@ class SocketStream:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def read(self, timeout_s: float) -> bytes:
-        """What has come."""
+        """Return all received bytes, at least one; none after the timeout."""
         if not select.select([self._socket], [], [], max(timeout_s, 0.0))[0]:
             return b""
         received = self._socket.recv(1 << 16)
@@ -102,19 +85,22 @@ class SocketStream:
         return captured(self._address, "<", received)
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
         self._socket.sendall(captured(self._address, ">", data))
 
     def close(self) -> None:
-        """Let go of the connection."""
+        """Close the connection."""
         self._socket.close()
+
+
+Stream = SerialStream | SocketStream
 
 
 def open_stream(address: str) -> Stream:
     """Open "/dev/ttyACM0" or "192.168.0.10:10940".
 
     Raises:
-        DeviceError: no such port or host, or it is in use.
+        DeviceError: the port or host does not exist or is in use.
     """
     host, colon, port = address.rpartition(":")
     if not (colon and port.isdigit()):

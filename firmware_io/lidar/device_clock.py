@@ -20,7 +20,7 @@ from scanwright.firmware_io.lidar.tick_line import StampLine
 
 STAMP_WRAP_MS = 1 << 24  # SCIP 2.0, p. 12
 
-TICK_NS = 1e6 / math.sqrt(12)  # standard deviation of a tick of a millisecond, which may stay unknown
+TICK_NS = 1e6 / math.sqrt(12)  # standard deviation of rounding to a millisecond
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,16 +33,16 @@ class ScanMoment:
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """One question for the sensor's time: when it was asked, what the sensor answered, when the answer was there."""
+    """One request for the sensor's time, and its reply."""
 
     sent_ns: int
-    stamp_ms: int
+    stamp_ms: int  # sensor time in the reply
     answered_ns: int
 
 
 @dataclass(frozen=True, slots=True)
 class TimeSync:
-    """At sensor time `stamp_ms` the host's clock stood at `host_ns`, give or take `half_width_ns` (a bound)."""
+    """Host time `host_ns` of sensor time `stamp_ms`, at most `half_width_ns` off."""
 
     stamp_ms: int
     host_ns: int
@@ -50,32 +50,28 @@ class TimeSync:
 
 
 def synchronised(exchanges: Sequence[Exchange]) -> TimeSync:
-    """Return the offset that all exchanges allow; an answer of n ms means a clock within [n, n + 1) ms.
-
-    Raises:
-        DeviceError: no offset agrees with all of them, because the sensor's clock restarted.
-    """
+    """Return the offset that all exchanges allow, or raise DeviceError; a reply of n ms means [n, n + 1) ms."""
     first = exchanges[0].stamp_ms
     since_ms = [exchange.stamp_ms - first for exchange in exchanges]
     low = max(e.sent_ns - (ms + 1) * 1_000_000 for e, ms in zip(exchanges, since_ms, strict=True))
     high = min(e.answered_ns - ms * 1_000_000 for e, ms in zip(exchanges, since_ms, strict=True))
     drift_ns = round(QUARTZ_RATE * max(e.answered_ns - exchanges[0].sent_ns for e in exchanges))
     if low > high + drift_ns:
-        raise DeviceError("time synchronisation: the answers contradict each other; the sensor's clock began anew")
+        raise DeviceError("time synchronisation: the replies contradict each other; the sensor's clock restarted")
     return TimeSync(first, (low + high) // 2, max(high - low, 0) // 2 + drift_ns)
 
 
 class StampCounter:
-    """Unwraps the stamps of a counter of few bits."""
+    """Unwraps timestamps of a counter that overflows."""
 
     def __init__(self, wrap: int = STAMP_WRAP_MS, per_ms: int = 1) -> None:
-        """`wrap`: stamp at which the counter returns to 0; `per_ms`: ticks per millisecond."""
-        self.restarts = 0  # how often the sensor's clock began anew; stamps compare within one only
+        """`wrap`: number of values of the counter; `per_ms`: ticks per millisecond."""
+        self.restarts = 0  # of the sensor's clock; stamps across a restart do not compare
         self._wrap, self._per_ms = wrap, per_ms
         self._last: tuple[int, int] | None = None
 
     def unwrap(self, stamp: int, arrival_ns: int) -> int:
-        """Ticks since the sensor's clock was last 0; a pause of several wraps is told by the host's clock."""
+        """Return the ticks since the sensor's clock was 0; the host's clock counts the wraps in a pause."""
         if self._last is None:
             self._last = (stamp, arrival_ns)
             return stamp
@@ -83,59 +79,59 @@ class StampCounter:
         step = (stamp - last) % self._wrap
         elapsed = (arrival_ns - last_ns) * self._per_ms // 1_000_000
         step += self._wrap * max(round((elapsed - step) / self._wrap), 0)
-        if step > elapsed + 60_000 * self._per_ms:  # nothing waits a minute in a buffer: the sensor began anew
+        if step > elapsed + 60_000 * self._per_ms:  # no buffer holds a minute: the sensor's clock restarted
             self.restart()
             return self.unwrap(stamp, arrival_ns)
         self._last = (last + step, arrival_ns)
         return last + step
 
     def restart(self) -> None:
-        """What comes next may be from a new life of the sensor's clock."""
+        """Count a restart of the sensor's clock before the next stamp."""
         if self._last is not None:
             self.restarts += 1
             self._last = None
 
 
 class DeviceClock:
-    """Host times of the scans of one sensor, one after the other, in constant memory."""
+    """Host times of consecutive scans of one sensor, in constant memory."""
 
     _origin_ms: float | None  # first stamp
     _sync: TimeSync | None
 
     def __init__(self, scan_period_s: float, *, smallest_delay_ns: int, first_beam_ns: int = 0) -> None:
-        """Nothing is known yet.
+        """Start without scans.
 
         Args:
-            scan_period_s: between two scans, to one part in a hundred.
-            smallest_delay_ns: from the moment that a stamp means to the arrival of an undelayed scan's last byte.
-            first_beam_ns: from that moment to the first beam, which the results are times of.
+            scan_period_s: time between two scans, within 1 %.
+            smallest_delay_ns: from the timestamp to the arrival of an undelayed scan's last byte.
+            first_beam_ns: from the timestamp to the first beam, whose time is returned.
         """
         self._period_ms = scan_period_s * 1e3
         self._delay_ns = smallest_delay_ns
         self._first_beam_ns = first_beam_ns
         self._restarts = 0
-        self._begin_anew()
+        self._reset()
 
     def synchronise(self, sync: TimeSync) -> None:
-        """Keep the results within what a time synchronisation in this life of the sensor's clock allows."""
+        """Bound the results by a time synchronisation, until the sensor's clock restarts."""
         self._sync = sync
 
     def update(self, stamp_ms: float, arrival_ns: int, restarts: int = 0) -> ScanMoment:
-        """Host time of a scan's first beam.
+        """Return the host time of a scan's first beam.
 
         Args:
             stamp_ms: unwrapped stamp, later than the last one.
-            arrival_ns: when its last byte came.
-            restarts: lives of the sensor's clock before this one; a new one forgets all that was learned.
+            arrival_ns: host time of its last byte.
+            restarts: restarts of the sensor's clock so far; a new one resets this clock.
         """
         if restarts != self._restarts:
             self._restarts = restarts
-            self._begin_anew()
+            self._reset()
         self._origin_ms = stamp_ms if self._origin_ms is None else self._origin_ms
         since_ms, fits = stamp_ms - self._origin_ms, self._stamps.fits
         turn = self._stamps.add(since_ms)
         turn_ns = self._turn_ns(turn)
-        if fits != self._stamps.fits:  # the same arrivals, their turns told anew
+        if fits != self._stamps.fits:  # a new line changes the times of earlier turns
             self._arrivals.retime(lambda number: self._turn_ns(number) if number >= self._stamps.first_turn else None)
         self._arrivals.add(turn_ns, arrival_ns, turn)
         time_ns, uncertainty_ns = self._arrivals.host_ns(turn_ns), self._arrivals.uncertainty_ns
@@ -145,7 +141,7 @@ class DeviceClock:
             uncertainty_ns = min(uncertainty_ns, half_ns)
         return ScanMoment(time_ns + self._first_beam_ns, uncertainty_ns)
 
-    def _begin_anew(self) -> None:
+    def _reset(self) -> None:
         self._origin_ms = self._sync = None
         self._stamps = StampLine(self._period_ms)
         self._arrivals = ArrivalLine(
@@ -159,7 +155,7 @@ class DeviceClock:
         return self._stamps.time_ms(turn) * 1e6
 
     def _allowed(self, sync: TimeSync, stamp_ms: float, between_ms: float) -> tuple[int, int]:
-        """Host time of a turn by the synchronisation, and how far it may be off."""
+        """Return the host time of a turn by the synchronisation, and the bound of its error [ns]."""
         since_ms = stamp_ms - sync.stamp_ms + between_ms
         half_ns = sync.half_width_ns + 500_000 + abs(since_ms) * QUARTZ_RATE * 1e6
         return sync.host_ns + round(since_ms * 1e6), round(half_ns)

@@ -1,4 +1,4 @@
-"""Lidar families that can be driven; one line here makes a family known to every command.
+"""Supported lidar families.
 
 An installed package adds a `LidarFamily` by an entry point of the group "scanwright.lidars" (docs/how-to/new-lidar.md).
 """
@@ -20,7 +20,7 @@ from scanwright.firmware_io.lidar.slamtec.driver import SlamtecLidar
 
 _EMULATORS = "scanwright.firmware_io.emulators"  # named as text, since drivers must not import emulators
 
-# If no model is named, they are tried in this order: first the one that only listens.
+# If no model is given, they are tried in this order; the first one sends nothing to the device.
 FAMILIES = (
     LidarFamily("ldrobot", "LDROBOT", LdrobotLidar, f"{_EMULATORS}.ldrobot:ldrobot_emulator"),
     LidarFamily("scip", "Hokuyo (SCIP 2.0)", ScipLidar, f"{_EMULATORS}.lidar:scip_emulator", ("step_0", "rear")),
@@ -34,17 +34,12 @@ FAMILIES = (
 
 @cache
 def all_families() -> dict[str, LidarFamily]:
-    """The shipped families and those of installed packages, by name; raises as `with_installed`."""
+    """Return the shipped families and those of installed packages, by name; raises as `with_installed`."""
     return with_installed(LIDAR_GROUP, LidarFamily, FAMILIES)
 
 
 def family_of(model: str) -> LidarFamily:
-    """The family of a lidar of the catalogue.
-
-    Raises:
-        TaskError: it is not in the catalogue.
-        DeviceError: nothing drives it.
-    """
+    """Return the family of a lidar; TaskError if it is not in the catalogue, DeviceError if it has no driver."""
     name = load_catalogue().get(model, Lidar).family
     if name is None:
         driven = [product.name for product in load_catalogue() if isinstance(product, Lidar) and product.family]
@@ -55,15 +50,15 @@ def family_of(model: str) -> LidarFamily:
 
 
 def open_lidar(address: str, model: str | None = None, stamp_at: StampAt | None = None) -> LidarDriver:
-    """Open "/dev/ttyACM0" or "192.168.0.10:10940", whatever the sensor is doing.
+    """Open a lidar in any state.
 
     Args:
-        address: where it is.
-        model: name in the catalogue of what it should be; None asks one family after the other.
+        address: such as "/dev/ttyACM0" or "192.168.0.10:10940".
+        model: expected catalogue name; None tries all families.
         stamp_at: beam of its timestamps, if documents differ; None for the family's default.
 
     Raises:
-        DeviceError: no such port, it is in use, or what answers is no sensor that is known.
+        DeviceError: the port does not exist or is in use, or no known sensor answers.
         TaskError: the model is not in the catalogue.
     """
     if model is not None:

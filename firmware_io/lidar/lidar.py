@@ -15,34 +15,26 @@ Echo = Literal["first", "last"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedScan:
-    """One turn as it was measured, on the host's clock.
+    """One turn of the mirror, with times of `time.monotonic_ns`."""
 
-    Attributes:
-        scan: its times are those of `time.monotonic_ns`; bearings and times of its own beams where the sensor's speed
-            wanders.
-        arrival_ns: `time.monotonic_ns` when its last byte came.
-        uncertainty_ns: standard uncertainty of its time.
-        warning: what the sensor says of itself that a person should mend, and how; empty if all is well.
-    """
-
-    scan: Scan
-    arrival_ns: int
-    uncertainty_ns: int
-    warning: str = ""
+    scan: Scan  # with bearings and times of each beam if the sensor's speed varies
+    arrival_ns: int  # of its last byte
+    uncertainty_ns: int  # standard uncertainty of its time
+    warning: str = ""  # reported fault and its remedy
 
 
 class LidarDriver(Protocol):
-    """A lidar, opened, its laser off if it can be put out. `with` leaves it stopped and its port closed.
+    """An open lidar, its laser off if that is possible. `with` stops it and closes its port.
 
-    Whatever goes wrong is a DeviceError: DeviceTimeoutError where nothing came in time. A broken packet is counted and
-    passed over, never raised. After an error of `read`, `reconnect` is what may help.
+    All failures raise DeviceError; DeviceTimeoutError if nothing arrives in time. Broken packets are only counted.
+    After an error of `read`, call `reconnect`.
 
     Attributes:
-        address: where it was found last: a serial port, or HOST:PORT.
-        model: name of its type, as in the catalogue. A sensor that does not tell is what it was opened as.
-        serial_number: by which it is found again; empty if the sensor tells none.
-        firmware: version, as the sensor writes it; empty if it tells none.
-        scan_rate_hz: turns per second that it should make.
+        address: last known serial port, or HOST:PORT.
+        model: catalogue name; the requested one if the sensor does not report its model.
+        serial_number: used to identify it after a reconnection; empty if unreported.
+        firmware: version as reported; empty if unreported.
+        scan_rate_hz: nominal turns per second.
         dropped: missing turns between those read.
         bad_packets: packets dropped.
     """
@@ -70,14 +62,14 @@ class LidarDriver(Protocol):
     ) -> None: ...
 
     def condition(self) -> tuple[str, ...]:
-        """Return what it reports of its age and state, one line each; call before `start` only."""
+        """Return the reported age and state, one line each; call before `start` only."""
         ...
 
     def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
         """Set filters of the sensor at the next `start`, until its power is switched off; call before `start`.
 
         Args:
-            echo: echo that a beam reports; None leaves it as it is.
+            echo: echo that a beam reports; None leaves it unchanged.
             mean_filter_off: do not average several scans.
 
         Raises:
@@ -86,40 +78,40 @@ class LidarDriver(Protocol):
         ...
 
     def start(self, *, intensity: bool = False, cluster: int = 1, skip: int = 0) -> None:
-        """Scan until `stop`; a DeviceError if it refuses or cannot do that.
+        """Scan until `stop`; DeviceError if the sensor rejects or does not support that.
 
         Args:
             intensity: measure it too.
-            cluster: beams that share one value, the least range among them.
-            skip: turns to leave out between two.
+            cluster: beams that share one value, the smallest range among them.
+            skip: turns to skip after each returned one.
         """
         ...
 
     def read(self, timeout_s: float | None = None) -> TimedScan:
-        """Return the next turn; without a time it is waited for as long as this sensor may take."""
+        """Return the next turn; the default timeout is the longest time that this sensor needs."""
         ...
 
     def stop(self) -> None:
-        """Laser off, or if a sensor cannot do that: listen no more."""
+        """Switch the laser off, or if that is impossible, stop reading."""
         ...
 
     def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Find the sensor again after an unplug or a reset, and scan on if it did; its clock is learnt anew."""
+        """Find the sensor again after an unplug or a reset, and continue to scan with a new clock."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class LidarFamily:
-    """Lidars that speak one protocol. A product of the catalogue says `family` to be driven by one.
+    """Lidars with one protocol.
 
     Attributes:
-        name: as in the catalogue's `family`.
-        title: maker and protocol, in words.
-        open: address, name of the model (None: whatever answers), beam of its timestamps (None: default) -> the lidar;
-            DeviceError if none of this family answers there.
-        emulator: "package.module:function" that makes an emulated device of (catalogue record,
-            `emulators.lidar_line.Ranging`, seed) -> `emulators.lidar_line.LidarLine`; drivers import no emulators.
-        stamp_choices: values of `stamp_at` that it accepts, if documents differ.
+        name: value of `family` in the catalogue.
+        title: maker and protocol, for messages.
+        open: (address, catalogue name or None for any, beam of its timestamps or None) -> driver; DeviceError if no
+            lidar of this family answers.
+        emulator: "package.module:function" with arguments (catalogue record, `emulators.lidar_line.Ranging`, seed)
+            that returns an `emulators.lidar_line.LidarLine`; drivers import no emulators.
+        stamp_choices: accepted values of `stamp_at`, if documents differ.
     """
 
     name: str

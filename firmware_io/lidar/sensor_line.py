@@ -1,7 +1,7 @@
-"""Line to one sensor, and the life cycle shared by its drivers.
+"""Connection to one sensor, and the life cycle of its drivers. Failures raise DeviceError.
 
-Arrival times are right only if bytes are read when they arrive. After a pause of the reader, bytes waited in the
-buffers of kernel and adapter, and others are missing. A device that is gone, silent or refuses raises DeviceError.
+Arrival times are correct only if bytes are read when they arrive. After a pause of the reader, bytes have waited in the
+buffers of kernel and adapter, and others are lost.
 """
 
 from __future__ import annotations
@@ -22,26 +22,24 @@ from scanwright.firmware_io.serial_port import latency_ms
 
 TURN_S = 1.0  # without a turn: ten turns of the slowest sensor
 _MOST_RESUMES = 20  # in one read: a busy computer catches up after a few
-_POLL_S = 0.05  # between two tries to connect
-_LOOK_S = 0.05  # of one read at most: a read that returns much later was held up, however silent the sensor is
-_SETTLE_S = 0.03  # adapters and sensors that had to wait send the rest of their own buffers within this
+_POLL_S = 0.05  # between two attempts to connect
+_READ_S = 0.05  # longest timeout of one read, so that a much later return shows a pause of the reader
+_SETTLE_S = 0.03  # adapters and sensors send the rest of their buffers within this
 _READS = 10_000  # without finding the port empty
 
 Packet = TypeVar("Packet")
 
 
 class SensorLine:
-    """The line to one sensor, open.
+    """Open connection to one sensor.
 
     Attributes:
-        address: where it is: a serial port, or HOST:PORT.
-        stream: its bytes.
-        longest: bytes of what can be whole; so much that comes too late, and is nothing, ends the waiting.
-        received: count of bytes that came; 0 shows that nothing answers at this speed.
+        address: serial port, or HOST:PORT.
+        longest: size of the longest packet; `receive` stops after as many invalid bytes past its deadline.
+        received: number of received bytes; if 0, nothing replies at this baud rate.
     """
 
     def __init__(self, address: str, longest: int) -> None:
-        """Open it."""
         self.address, self.longest, self.received = address, longest, 0
         self._open(address)
 
@@ -52,15 +50,15 @@ class SensorLine:
 
     @property
     def serial(self) -> SerialStream | None:
-        """Its port, where it is a serial one."""
+        """The serial port; None for TCP."""
         return self.stream if isinstance(self.stream, SerialStream) else None
 
     def send(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all bytes."""
         with self.broken_line_as_error():
             self.stream.write(data)
 
-    def hear(
+    def receive(
         self, feed: Callable[[bytes], list[Packet]], deadline_s: float, pause_s: float = math.inf
     ) -> tuple[list[Packet], int]:
         """Return the next complete packets and their arrival [ns, time.monotonic_ns].
@@ -68,9 +66,8 @@ class SensorLine:
         Args:
             feed: splitter of the received bytes.
             deadline_s: on time.monotonic.
-            pause_s: if arrivals are the sensor's clock, longest time between two reads after which they can be trusted.
-                After a longer one, all waiting bytes are dropped and no packet is returned: the next one continues
-                nothing.
+            pause_s: longest time between two reads. After a longer one, all waiting bytes are dropped and no packet is
+                returned.
 
         Raises:
             DeviceTimeoutError: no complete packet in time.
@@ -78,9 +75,9 @@ class SensorLine:
         """
         late_bytes = 0
         while True:
-            over = time.monotonic() > deadline_s  # told before the look: what came while we were kept waiting counts
+            over = time.monotonic() > deadline_s  # before the read, so bytes that waited in a pause still count
             read_ns = self._read_ns
-            received = self._look(min(deadline_s - time.monotonic(), _LOOK_S))
+            received = self._read(min(deadline_s - time.monotonic(), _READ_S))
             arrival_ns = self._read_ns
             if arrival_ns - read_ns > pause_s * 1e9:
                 self.drop_waiting()
@@ -93,33 +90,33 @@ class SensorLine:
                 raise DeviceTimeoutError(f"{self.name}: nothing came in time; check power and cable")
 
     def drop_waiting(self) -> None:
-        """Drop all bytes that wait; raises DeviceTimeoutError if the sensor sends faster than it is read."""
+        """Drop all waiting bytes; DeviceTimeoutError if the sensor sends faster than it is read."""
         settled_s = time.monotonic() + _SETTLE_S
         for _ in range(_READS):
-            if not self._look(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
+            if not self._read(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
                 return
         raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
     def widened(self, uncertainty_ns: float) -> int:
-        """Return the standard uncertainty of an arrival time with the even delay of a USB adapter added."""
-        return round(math.hypot(uncertainty_ns, self._gathers_ns / math.sqrt(3)))
+        """Return the standard uncertainty of an arrival time with the uniform delay of a USB adapter added."""
+        return round(math.hypot(uncertainty_ns, self._latency_ns / math.sqrt(3)))
 
     def close(self) -> None:
-        """Let go of the port; what is closed stays so."""
+        """Close the port, if it is open."""
         self.stream.close()
 
     def reopen(self, address: str | None = None) -> None:
-        """Open it again, where it was or elsewhere."""
+        """Open it again, at the same or another address."""
         self.close()
         self._open(address or self.address)
         self.address = address or self.address
 
     def _open(self, address: str) -> None:
         self.stream = open_stream(address)
-        self._gathers_ns = 1_000_000 * latency_ms(address)
+        self._latency_ns = 1_000_000 * latency_ms(address)
         self._read_ns = time.monotonic_ns()  # when the last read returned
 
-    def _look(self, timeout_s: float) -> bytes:
+    def _read(self, timeout_s: float) -> bytes:
         with self.broken_line_as_error():
             received = self.stream.read(timeout_s)
         self._read_ns = time.monotonic_ns()
@@ -137,18 +134,18 @@ class SensorLine:
 
     @contextmanager
     def broken_line_as_error(self) -> Iterator[None]:
-        """Turn the exceptions of a vanished port into a DeviceError of one line."""
+        """Convert the exceptions of a vanished port to DeviceError."""
         try:
             yield
-        # A port that we closed after it vanished is None to pyserial, and -1 to select.
+        # After a vanished port is closed, pyserial has None as its descriptor, and select gets -1.
         except (OSError, TypeError, ValueError) as error:
             raise DeviceError(f"{self.name}: connection lost ({error}); plug it in again") from error
 
 
 class LineDriver:
-    """Life cycle of a lidar on a line; `LidarDriver` documents the public methods.
+    """Life cycle of a lidar; `LidarDriver` documents the public methods.
 
-    A family implements `_find` (connect), `_begin`, `_turn` and `_halt`. `with` stops the sensor and closes the line.
+    A family implements `_find`, `_begin`, `_turn` and `_halt`. `with` stops the sensor and closes the line.
     """
 
     address: str
@@ -163,7 +160,7 @@ class LineDriver:
 
     @property
     def model(self) -> str:
-        """Name of its type."""
+        """Catalogue name."""
         return self._lidar.name
 
     @property
@@ -172,11 +169,11 @@ class LineDriver:
         return self._lidar.scan_rate_hz
 
     def condition(self) -> tuple[str, ...]:
-        """Nothing, unless the family reports age or state."""
+        """Return no lines; a family that reports age or state overrides this."""
         return ()
 
     def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
-        """Refuse: only some families have filters; raises as `LidarDriver.set_filters`."""
+        """Raise DeviceError for any filter; a family with filters overrides this."""
         if echo is not None or mean_filter_off:
             raise DeviceError(f"{self._line.name}: echo, mean_filter_off: a {self.model} has no such filter; omit them")
 
@@ -199,15 +196,15 @@ class LineDriver:
         raise DeviceTimeoutError(f"{self._line.name}: this computer is always too late to read it; end other programs")
 
     def stop(self) -> None:
-        """Laser off, if it can be; raises as `LidarDriver.stop`."""
+        """Switch the laser off; raises as `LidarDriver.stop`."""
         self._begun = None
         self._halt()
 
     def reconnect(self, timeout_s: float = 3.0) -> None:
-        """Find the sensor again, and scan on if it did; raises as `LidarDriver.reconnect`."""
+        """Find the sensor again and continue to scan; raises as `LidarDriver.reconnect`."""
         self._until_s = time.monotonic() + timeout_s
         try:
-            while (error := self._still_away()) is not None:
+            while (error := self._failed_attempt()) is not None:
                 if time.monotonic() > self._until_s:
                     gone = f"{self.address}: lidar {self.serial_number}".strip()
                     raise DeviceError(
@@ -217,8 +214,8 @@ class LineDriver:
         finally:
             self._until_s = math.inf
 
-    def _still_away(self) -> DeviceError | None:
-        """Try once to reconnect; why that failed."""
+    def _failed_attempt(self) -> DeviceError | None:
+        """Try once to reconnect; return the error if that fails."""
         try:
             self._find()
             if self._begun is not None:
@@ -229,17 +226,17 @@ class LineDriver:
         return None
 
     def _patience_s(self) -> float:
-        """How long the next turn may take."""
+        """Return the longest duration of the next turn."""
         return TURN_S
 
     def _find(self) -> None:
-        """Open the line again and recognise the sensor."""
+        """Open the line again and identify the sensor."""
 
     def _begin(self, intensity: bool, skip: int) -> None:
-        """Begin to scan."""
+        """Start to scan."""
 
     def _turn(self, deadline_s: float) -> TimedScan | None:
-        """Return the next turn; None if what had waited for this computer was dropped."""
+        """Return the next turn; None after a pause of the reader."""
 
     def _halt(self) -> None:
         """Stop the sensor."""

@@ -1,9 +1,9 @@
 """Start of turns, finer than the ticks of their timestamps. Time is in ticks (milliseconds) since any origin.
 
-A stamp is the last whole tick before the start of a turn, and turns are nearly even. So the starts lie on a line over
-the turn's number that passes within the tick of every stamp; the middle one of these lines is used, half a tick above
-the minimax fit. It spans as many of the last seconds as one line explains. If not even those lie on a line (stamps that
-jitter by more than a tick), a least-squares line is used.
+A stamp is the last tick before the start of a turn, and turns are nearly even. So the starts lie on a line over the
+number of the turn that passes within the tick of every stamp; the middle one of these lines is used, half a tick above
+the minimax fit. It spans as many of the last seconds as one line fits. If stamps jitter by more than a tick, a
+least-squares line is used.
 """
 
 from __future__ import annotations
@@ -15,47 +15,47 @@ from itertools import pairwise
 import numpy as np
 
 Point = tuple[float, float]
-
-_BLOCK_MS = 1e3  # what is forgotten at once
+_BLOCK_MS = 1e3  # dropped together
 _BLOCKS = 100  # 100 s: a beat of turns and ticks takes up to a minute
 _FEWEST = 3  # blocks
-_SLACK_MS = 0.02  # by which a motor may be uneven from turn to turn
+_SLACK_MS = 0.02  # variation of the duration of turns
 
 
 class StampLine:
-    """The line through the stamps of one life of a sensor's clock, in constant memory."""
+    """Line through the stamps between two restarts of a sensor's clock, in constant memory."""
 
     def __init__(self, period_ms: float) -> None:
-        """Nothing is known but the period, to one part in a hundred."""
-        self.first_turn = 0  # the oldest turn that the line holds for
-        self.fits = 0  # how often the line has changed
+        """`period_ms`: duration of a turn, within 1 %."""
+        self.first_turn = 0  # oldest turn of the line
+        self.fits = 0  # number of changes of the line
         self._turn = -1
         self._stamp_ms = -period_ms
         self._slope_ms = period_ms
-        self._start_ms = 0.5  # where the line passes turn 0
+        self._start_ms = 0.5  # of turn 0
         self._blocks: deque[list[Point]] = deque(maxlen=_BLOCKS)
         self._block_ends_ms = -np.inf
         self._new_blocks = 0
 
     def add(self, stamp_ms: float) -> int:
-        """The number of the turn that has this stamp, which is later than the last one."""
+        """Return the number of the turn with this stamp, which is later than the last one."""
         self._turn += max(round((stamp_ms - self._stamp_ms) / self._slope_ms), 1)
         self._stamp_ms = stamp_ms
         missed_ms = self.time_ms(self._turn) - stamp_ms
         if stamp_ms >= self._block_ends_ms:
             if self._blocks:
-                self._blocks[-1] = _outermost(self._blocks[-1])
+                block = self._blocks[-1]
+                self._blocks[-1] = sorted({*half_hull(block, 1), *half_hull(block, -1)})
             self._blocks.append([])
             self._block_ends_ms = stamp_ms + _BLOCK_MS
             self._new_blocks += 1
         self._blocks[-1].append((float(self._turn), stamp_ms))
-        grown = self._new_blocks > len(self._blocks) // 10  # what lies within the tick is news to a short line only
+        grown = self._new_blocks > len(self._blocks) // 10  # stamps within the tick improve only a short line
         if grown or not -_SLACK_MS < missed_ms < 1 + _SLACK_MS:
             self._fit()
         return self._turn
 
     def time_ms(self, turn: int) -> float:
-        """When a turn begins, by the line."""
+        """Return the start of a turn on the line."""
         return self._start_ms + self._slope_ms * turn
 
     def _fit(self) -> None:
@@ -82,7 +82,7 @@ class StampLine:
 
 
 def half_hull(points: Sequence[Point], side: int) -> list[Point]:
-    """Convex hull from below (side 1) or above (-1) of points that are sorted by their first number."""
+    """Return the lower (side 1) or upper (-1) convex hull of points sorted by x."""
     hull: list[Point] = []
     for x, y in points:
         while len(hull) > 1:
@@ -95,7 +95,7 @@ def half_hull(points: Sequence[Point], side: int) -> list[Point]:
 
 
 def middle_slope(below: Sequence[Point]) -> float:
-    """Slope of the edge over the middle: of all lines below the points, it has the least area to them."""
+    """Return the slope of the edge over the middle: the line below the points with the least area to them."""
     middle = (below[0][0] + below[-1][0]) / 2
     for (x0, y0), (x1, y1) in pairwise(below):
         if x0 < x1 and middle <= x1:
@@ -103,13 +103,8 @@ def middle_slope(below: Sequence[Point]) -> float:
     return 0.0
 
 
-def _outermost(points: list[Point]) -> list[Point]:
-    """Those that bound a line above or below."""
-    return sorted({*half_hull(points, 1), *half_hull(points, -1)})
-
-
 def _narrowest(points: list[Point]) -> tuple[float, float, float]:
-    """Slope of the strip of the least height that holds all points, and where its edges pass 0: an edge is a hull's."""
+    """Return slope and intercepts of the edges of the lowest strip around all points; one edge is an edge of a hull."""
     below, above = np.array(half_hull(points, 1)), np.array(half_hull(points, -1))
     slopes = np.concatenate([np.diff(side[:, 1]) / np.diff(side[:, 0]) for side in (below, above)])
     low = (below[:, 1] - slopes[:, None] * below[:, 0]).min(axis=1)

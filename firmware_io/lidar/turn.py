@@ -1,4 +1,4 @@
-"""Turns of sensors that see all around, cut from a stream of points whose bearings and times wander."""
+"""Turns of 360 deg sensors, cut from a stream of points with uneven bearings and times."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
 from scanwright.firmware_io.lidar.lidar import TimedScan
 from scanwright.firmware_io.samples import Scan
 
-_MEAN_TURNS = 64  # speeds wander by a per cent, and a pause of 10 s is 100 turns
-_BACK_DEG = 10.0  # by which the angle of a point may lie before that of the one before it
+_MEAN_TURNS = 64  # speeds vary by 1 %, and a pause of 10 s is 100 turns
+_BACK_DEG = 10.0  # largest decrease of the angle between two points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,17 +25,17 @@ class Points:
     angle_deg: Float64[ndarray, " n"]  # clockwise from its front, shape (n,)
     range_m: Float32[ndarray, " n"]  # NaN without a return, shape (n,)
     intensity: Float32[ndarray, " n"]  # as reported, shape (n,)
-    sensor_ns: Float64[ndarray, " n"]  # when each was measured, on a clock that runs evenly, shape (n,)
+    sensor_ns: Float64[ndarray, " n"]  # sensor time of each, shape (n,)
 
-    def part(self, where: slice) -> Points:
-        """Some of them."""
-        return Points(self.angle_deg[where], self.range_m[where], self.intensity[where], self.sensor_ns[where])
+    def part(self, rows: slice) -> Points:
+        """Return some of the points."""
+        return Points(self.angle_deg[rows], self.range_m[rows], self.intensity[rows], self.sensor_ns[rows])
 
 
 class TurnCutter:
-    """Cuts a stream of points at the sensor's front; the incomplete first turn is dropped.
+    """Splitter of a stream of points at the sensor's front; drops the incomplete first turn.
 
-    Angles of triangulating sensors go back a little: a turn ends where its front is first passed, so the next one can
+    Angles of triangulating sensors can decrease: a turn ends at the first point past the front, so the next one can
     begin a little before 0 and end a little after 360 deg.
     """
 
@@ -44,7 +44,7 @@ class TurnCutter:
         self._last_deg: float | None = None
 
     def add(self, points: Points) -> list[Points]:
-        """The turns that these points end."""
+        """Return the turns that these points end."""
         before_deg = points.angle_deg[0] if self._last_deg is None else self._last_deg
         steps_deg = (np.diff(points.angle_deg, prepend=before_deg) + _BACK_DEG) % 360 - _BACK_DEG
         counted_deg = before_deg + np.cumsum(steps_deg)
@@ -56,7 +56,9 @@ class TurnCutter:
         begin = 0
         for end in np.flatnonzero(np.diff(turn, prepend=0) > 0).tolist():
             if self._parts is not None:
-                turns.append(_joined([*self._parts, counted.part(slice(begin, end))]))
+                parts = [*self._parts, counted.part(slice(begin, end))]
+                columns = ("angle_deg", "range_m", "intensity", "sensor_ns")
+                turns.append(Points(*(np.concatenate([getattr(part, name) for part in parts]) for name in columns)))
             self._parts, begin = [], end
         if self._parts is not None:
             self._parts.append(counted.part(slice(begin, None)))
@@ -64,30 +66,30 @@ class TurnCutter:
 
 
 class TurnQueue:
-    """Turns that wait to be read."""
+    """Queue of unread turns."""
 
     def __init__(self) -> None:
         self.dropped = 0  # missing turns between returned or skipped ones
-        self.begin_anew(0)
+        self.restart(0)
 
-    def begin_anew(self, skip: int) -> None:
-        """A new stream, before which nothing is missing; of its turns `skip` are left out between two."""
+    def restart(self, skip: int) -> None:
+        """Start a new stream, without missing turns before it; skip `skip` turns after each returned one."""
         self._begin_ns = self._seen = 0
         self._turn_ns = 0.0
         self._skip = self._skipped = skip
         self.resume()
 
     def resume(self) -> None:
-        """What comes next does not continue what came: turns between are missing, and a new line tells the time."""
+        """Drop waiting turns; the next points have a new line, and turns before them are missing."""
         self._waiting: deque[tuple[Points, int]] = deque()
         self.cut()
 
     def cut(self) -> None:
-        """Points are missing: the turn that they were of is left out."""
+        """Drop the present turn, which misses points."""
         self._cutter = TurnCutter()
 
     def add(self, points: Points, arrival_ns: int) -> None:
-        """Points that came together."""
+        """Add points of one arrival."""
         self._waiting.extend((turn, arrival_ns) for turn in self._cutter.add(points))
 
     def next(self, line: ArrivalLine) -> tuple[Points, int] | None:
@@ -111,7 +113,7 @@ class TurnQueue:
 def timed_scan(
     turn: Points, line: ArrivalLine, lidar: Lidar, arrival_ns: int, uncertainty_ns: int, *, intensity: bool
 ) -> TimedScan:
-    """A turn on the host's clock; its even grid is the one from its first to its last beam."""
+    """Convert a turn to host time; its even grid spans the first to the last beam."""
     since_ns = (turn.sensor_ns - turn.sensor_ns[0]) * line.rate
     offset_ns = np.maximum.accumulate(np.rint(since_ns)).astype(np.int64)
     bearing_rad = -np.radians(turn.angle_deg)
@@ -130,12 +132,3 @@ def timed_scan(
         beam_offset_ns=offset_ns,
     )
     return TimedScan(scan, arrival_ns, uncertainty_ns)
-
-
-def _joined(parts: list[Points]) -> Points:
-    return Points(
-        np.concatenate([part.angle_deg for part in parts]),
-        np.concatenate([part.range_m for part in parts]),
-        np.concatenate([part.intensity for part in parts]),
-        np.concatenate([part.sensor_ns for part in parts]),
-    )

@@ -1,1 +1,1 @@
-"""Clouds as maps to drive by: the floor, the free space above it, and the files."""
+"""Occupancy grids of clouds for navigation."""

@@ -1,35 +1,32 @@
-"""The floor of a levelled cloud: the level that most of what lies lowest has in common.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Detection of the floor of a levelled cloud; RecordingError without a floor."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 from numpy import ndarray
 
 from scanwright.design.errors import RecordingError
 
 _CELL_M = 0.25  # narrower than free floor between furniture
-_THICK_M = 0.1  # of the layer that is taken for one level: three sigmas of the noisiest sensor either way, and a carpet
+_THICK_M = 0.1  # of one level: three sigmas of the noisiest sensor in both directions, and a carpet
 _LEAST_M2 = 1.0  # smaller levels are tables
-_MOST_BELOW = 0.05  # of all points: reflections hang below a floor, a room does not
+_MOST_BELOW = 0.05  # fraction of the points below a floor, by reflections
 _MOST_TILT_RAD = math.radians(1.0)  # a wall of 0.1 m, six metres away
 _GIVE_IT = "pass its height as floor_m"
 
 
 def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> float:
-    """Height of the floor.
+    """Return the height of the floor.
 
-    Every square of 0.25 m has its lowest point. The level that most of these share is the floor, if it has an area (a
-    fan that lies level draws lines, no area), and if next to nothing lies below it (of a ceiling the walls do).
+    Each square of 0.25 m has a lowest point. The level of most of these is the floor, if it has an area (a horizontal
+    scan plane has only lines), and if almost no points are below it (unlike a ceiling).
 
     Args:
         points_m: shape (n, 3), finite, z up.
-        below_m: the floor lies below this height, such as that of the scanner.
+        below_m: upper bound of the floor, such as the height of the scanner.
     """
     squares = np.floor(points_m[:, :2] / _CELL_M).astype(np.int64)
     order = np.lexsort((points_m[:, 2], squares[:, 1], squares[:, 0]))
@@ -42,7 +39,9 @@ def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> 
     counts = np.searchsorted(height_m, height_m + _THICK_M, side="right") - np.arange(height_m.size)
     low_m = float(height_m[np.argmax(counts)])
     on_level = lowest[np.abs(points_m[lowest, 2] - low_m - _THICK_M / 2) <= _THICK_M / 2]
-    area_m2 = _inner(squares[on_level]) * _CELL_M**2
+    level = {(int(x), int(y)) for x, y in squares[on_level]}  # count squares with four neighbours
+    inner = sum({(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)} <= level for x, y in level)
+    area_m2 = inner * _CELL_M**2
     if area_m2 < _LEAST_M2:
         raise RecordingError(
             f"floor: what lies lowest shares no level: {area_m2:.2g} m2 at z = {low_m:z.2f} m, {_LEAST_M2:g} m2 at "
@@ -62,9 +61,3 @@ def find_floor(points_m: Float64[ndarray, "n 3"], below_m: float = math.inf) -> 
             f"cloud, or {_GIVE_IT}"
         )
     return float(np.median(layer[:, 2]))
-
-
-def _inner(squares: Int64[ndarray, "n 2"]) -> int:
-    """Squares whose four neighbours are there too; each of them is once in `squares`, shape (n, 2)."""
-    there = {(int(x), int(y)) for x, y in squares}
-    return sum({(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)} <= there for x, y in there)

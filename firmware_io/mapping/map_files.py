@@ -1,4 +1,4 @@
-"""`scanwright map`: files of clouds become a map to drive by. Input that cannot be used raises RecordingError."""
+"""`scanwright map`: clouds become an occupancy grid. Unusable input raises RecordingError."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from scanwright.firmware_io.mapping.occupancy import (
 from scanwright.firmware_io.mapping.seen_through import Stand, seen_through
 from scanwright.firmware_io.registration.poses import cloud_names, read_poses
 
-_COUNT = "count"  # of points in a voxel, as `merge` of the registration writes it
+_COUNT = "count"  # of points in a voxel, as written by `merge` of the registration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapSummary:
-    """What became of `map_files`.
+    """Result of `map_files`.
 
     Attributes:
         grid: the map.
-        heights: between which things are in the way.
-        points: of all clouds that are in it.
-        moved: left out, as another cloud was seen through them.
+        heights: of the layer of obstacles.
+        points: of all clouds in the map.
+        moved: points dropped by ray conflicts with another cloud.
         wrote: YAML and image.
-        notes: what a person should know, one sentence each.
+        notes: one sentence each.
     """
 
     grid: OccupancyGrid
@@ -52,7 +52,7 @@ class MapSummary:
     notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Format the result."""
         grid, heights = self.grid, self.heights
         rows, columns = grid.cells.shape
         kinds = (("occupied", OCCUPIED), ("free", FREE))
@@ -83,14 +83,14 @@ def map_files(
     Args:
         paths: files of clouds, z up.
         out: YAML file to write; the image goes into the same folder.
-        scanner: angle set that all clouds were assembled with: they were seen from its optical centre.
-        poses: TUM file, a line for each cloud, by the names in its comments or in the order of the clouds; without it
+        scanner: angle set of all clouds, for the position of the scanner.
+        poses: TUM file, a line for each cloud, by the names in its comments or in the order of the clouds; None for
             the poses in the files.
-        floor_m: height of the floor in the map; None to find it.
-        from_m: above the floor; what is lower is driven over.
-        to_m: above the floor; what is higher is driven under.
+        floor_m: height of the floor in the map; None to detect it.
+        from_m: lower bound of obstacles above the floor.
+        to_m: upper bound of obstacles above the floor.
         resolution_m: edge of a cell.
-        seen_through_m: leave out points that another cloud was seen through, by more than this; None for none.
+        seen_through_m: drop points behind which another cloud was seen, by more than this; None to keep all.
         progress: callback.
     """
     check_map_place(out)
@@ -101,8 +101,8 @@ def map_files(
     if seen_through_m is not None:
         progress("searching for moving objects")
         moving = seen_through(positions, seen_through_m)
-        moved = sum(int(one.sum()) for one in moving)
-        positions = [Stand(stand.points_m[~one], stand.eye_m) for stand, one in zip(positions, moving, strict=True)]
+        moved = sum(int(mask.sum()) for mask in moving)
+        positions = [Stand(stand.points_m[~mask], stand.eye_m) for stand, mask in zip(positions, moving, strict=True)]
     points_m = np.concatenate([stand.points_m for stand in positions])
     eyes_m = np.repeat([stand.eye_m for stand in positions], [len(stand.points_m) for stand in positions], axis=0)
     if floor_m is None:
@@ -117,7 +117,7 @@ def map_files(
 def _positions(
     paths: Sequence[Path], scanner: AngleSet | None, poses: Path | None, progress: Progress
 ) -> tuple[list[Stand], list[str]]:
-    """All clouds of all files in the frame of the map, and lines about what was not read."""
+    """Return all clouds of all files in the frame of the map, and notes about dropped data."""
     named: list[tuple[Path, Cloud]] = []
     counts, notes = [], []
     for path in paths:
@@ -139,7 +139,7 @@ def _positions(
 
 
 def _eye(path: Path, cloud: Cloud, scanner: AngleSet | None, *, placed: bool) -> Vector:
-    """Where the scanner stood in the frame of its cloud."""
+    """Return the position of the scanner in the frame of its cloud."""
     if _COUNT in cloud.columns and (scanner is not None or placed):
         raise RecordingError(
             f"{path}: merged from several clouds (column {_COUNT}): pass those clouds and the poses that register wrote"

@@ -1,7 +1,4 @@
-"""Points and the beams that led to them as an occupancy grid: occupied, free, unknown.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Occupancy grid of points and their beams: occupied, free, unknown. Unusable input raises RecordingError."""
 
 from __future__ import annotations
 
@@ -18,23 +15,19 @@ from scanwright.design.arrays import Floats
 from scanwright.design.errors import RecordingError
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
-"""Values of a cell, as nav_msgs/OccupancyGrid has them."""
+"""Values of a cell, as in nav_msgs/OccupancyGrid."""
 _MOST_CELLS = 1 << 26  # 400 x 400 m at 0.05 m
 _FINEST_M, _COARSEST_M = 1e-3, 10.0
-_HIGHEST_M = 100.0  # no robot is as high: a value beyond is a mistake
+_HIGHEST_M = 100.0  # above any robot
 
 
 @dataclass(frozen=True, slots=True)
 class Heights:
-    """Which layer of the world is in the way of a robot.
-
-    Raises:
-        RecordingError: they are not in that order.
-    """
+    """Layer of obstacles of a robot; RecordingError if the heights are not in order."""
 
     floor_m: float  # height of the floor in the frame of the points
-    from_m: float = 0.1  # above the floor; what is lower is driven over
-    to_m: float = 1.8  # above the floor; what is higher is driven under
+    from_m: float = 0.1  # lower bound of obstacles above the floor
+    to_m: float = 1.8  # upper bound of obstacles above the floor
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.floor_m):
@@ -47,27 +40,23 @@ class Heights:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OccupancyGrid:
-    """A level world in squares.
+    """Horizontal grid of square cells."""
 
-    Attributes:
-        cells: `UNKNOWN`, `FREE` or `OCCUPIED`, shape (rows, columns); rows go with y, columns with x.
-    """
-
-    cells: Int8[ndarray, "rows columns"]
+    cells: Int8[ndarray, "rows columns"]  # `UNKNOWN`, `FREE` or `OCCUPIED`; rows along y, columns along x
     resolution_m: float  # edge of a cell
-    origin_m: Float64[ndarray, " 2"]  # corner of cell (0, 0) where x and y are smallest, shape (2,); whole cells from 0
+    origin_m: Float64[ndarray, " 2"]  # corner of cell (0, 0) with the smallest x and y, a multiple of the resolution
 
     def count(self, value: int) -> int:
-        """How many cells have a value."""
+        """Return the number of cells of a value."""
         return int(np.count_nonzero(self.cells == value))
 
     def area_m2(self, value: int) -> float:
-        """Area of all cells of a value."""
+        """Return the area of all cells of a value."""
         return self.count(value) * self.resolution_m**2
 
 
 def check_resolution(resolution_m: float) -> None:
-    """Refuse cells that no map has."""
+    """Raise RecordingError if the edge of a cell is out of range."""
     if not _FINEST_M <= resolution_m <= _COARSEST_M:
         raise RecordingError(f"resolution_m = {resolution_m}: allowed {_FINEST_M:g} to {_COARSEST_M:g}")
 
@@ -78,26 +67,25 @@ def occupancy_grid(
     heights: Heights,
     resolution_m: float = 0.05,
 ) -> OccupancyGrid:
-    """Cells with a point between two heights, and cells that beams crossed below without meeting anything.
+    """Return the grid of occupied, free and unknown cells.
 
-    A cell is occupied where a point lies in it between the two heights. It is free where it is not occupied and a beam
-    crossed it below the lower height: one that passes higher is no evidence of free space under it, as a table whose
-    top few beams meet. A beam counts up to a cell before its point, so that its noise frees nothing behind a wall. All
-    other cells are unknown.
+    A cell is occupied if it has a point between the two heights. It is free if it is not occupied and a beam crossed it
+    below the lower height: a higher beam is no evidence of free space under it, as above a table. A beam counts until
+    one cell before its point, so that its noise frees no cell behind a wall. All other cells are unknown.
 
-    The walk from cell to cell is that of J. Amanatides and A. Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing"
+    Cells are traversed as in J. Amanatides and A. Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing"
     (Eurographics 1987).
 
     Args:
         points_m: shape (n, 3), finite, z up.
-        eyes_m: where each point was seen from, shape (n, 3); NaN if unknown: such a point frees nothing.
-        heights: of what is in the way.
+        eyes_m: position of the scanner for each point, shape (n, 3); NaN if unknown: such a point frees no cell.
+        heights: of the layer of obstacles.
         resolution_m: edge of a cell.
     """
     check_resolution(resolution_m)
     low_m, high_m = heights.floor_m + heights.from_m, heights.floor_m + heights.to_m
     hits_m = points_m[(points_m[:, 2] >= low_m) & (points_m[:, 2] <= high_m), :2]
-    # half the lower height at most: what looks straight down has its last piece below it left
+    # at most half the lower height, so that a vertical beam has a part below it
     short_m = min(resolution_m, heights.from_m / 2)
     paths_m = _paths_within(points_m, eyes_m, heights.floor_m - heights.from_m, low_m, short_m)
     ends_m = np.concatenate([hits_m, paths_m[:, :2], paths_m[:, 2:]])
@@ -122,14 +110,14 @@ def occupancy_grid(
 
 @njit(cache=True)
 def _paths_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float, short_m: float) -> Floats:
-    """Part of each beam between two heights that ends `short_m` before its point: (m, 4), x y from and x y to."""
+    """Return the part of each beam between two heights until `short_m` before its point: (m, 4) from x y, to x y."""
     paths = np.empty((points_m.shape[0], 4))
     count = 0
     for i in range(points_m.shape[0]):
         x, y, z = eyes_m[i, 0], eyes_m[i, 1], eyes_m[i, 2]
         dx, dy, dz = points_m[i, 0] - x, points_m[i, 1] - y, points_m[i, 2] - z
         length = np.sqrt(dx * dx + dy * dy + dz * dz)
-        if not length > short_m:  # an unknown eye, too
+        if not length > short_m:  # also for an unknown eye
             continue
         begin, end = 0.0, 1.0 - short_m / length
         if dz == 0.0:
@@ -147,7 +135,7 @@ def _paths_within(points_m: Floats, eyes_m: Floats, low_m: float, high_m: float,
 
 @njit(cache=True)
 def _free(cells: NDArray[np.int8], paths: Floats) -> None:
-    """Free every cell that a way crosses; ways of shape (m, 4) in cells, x y from and x y to."""
+    """Free all cells that a path crosses; paths of shape (m, 4) in cells, x y from and x y to."""
     for i in range(paths.shape[0]):
         x, y = int(np.floor(paths[i, 0])), int(np.floor(paths[i, 1]))
         dx, dy = paths[i, 2] - paths[i, 0], paths[i, 3] - paths[i, 1]

@@ -1,1 +1,1 @@
-"""Poses of the platform over time, from files and topics, with a gyro between them."""
+"""Trajectory of the platform from files and topics, with a gyro between poses."""

@@ -1,12 +1,9 @@
 """Orientation between two poses, from a gyro.
 
-From each pose on the rates are integrated (the mean of two neighbouring samples turns from the one to the other). What
-that misses the next pose by is the gyro's bias, its noise and the error of the two poses; it is spread over the time
-between them, so that every pose keeps its orientation. Positions still go straight.
-
-Source: the strapdown integral of D. Titterton, J. Weston, Strapdown Inertial Navigation Technology (2nd ed.), ch. 11.
-
-Input that cannot be used raises RecordingError.
+The rates are integrated from each pose to the next (mean of neighbouring samples). The difference to the next pose, by
+bias, noise and the error of the poses, is distributed over the time, so that all poses keep their orientation.
+Positions are interpolated linearly. Source: the strapdown integral of D. Titterton, J. Weston, Strapdown Inertial
+Navigation Technology (2nd ed.), ch. 11. Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -23,23 +20,19 @@ from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.poses.trajectory import Trajectory
 
-_LONG_GAP = 5.0  # this many usual gaps between two rates, and the motion between is unknown
-_NOISE_RAD = math.radians(0.2)  # what poses may be off without a word about the gyro
-_WORSE = 1.1  # times the turn without the gyro: it must not add to it, but for noise
+_LONG_GAP = 5.0  # times the median gap between two rates, beyond which the motion is unknown
+_NOISE_RAD = math.radians(0.2)  # error of poses
+_WORSE = 1.1  # largest error with the gyro relative to the rotation between poses, except for noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gyro:
-    """Rates of turn over time.
-
-    Raises:
-        RecordingError: fewer than two samples.
-    """
+    """Angular rates over time; RecordingError for fewer than two samples."""
 
     time_ns: Int64[ndarray, " n"]  # shape (n,), n >= 2, strictly increasing
     rate_rad_s: Float64[ndarray, "n 3"]  # about the axes of the IMU, shape (n, 3)
-    frame: str = ""  # name of those axes; "" if unknown
-    left_out: int = 0  # samples that are no numbers, or of the time of another
+    frame: str = ""  # of the IMU; "" if unknown
+    left_out: int = 0  # dropped samples: not finite, or of the time of another
 
     def __post_init__(self) -> None:
         if self.time_ns.size < 2:
@@ -47,16 +40,15 @@ class Gyro:
 
 
 def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 3"]) -> tuple[Trajectory, list[str]]:
-    """Put the orientations of a gyro between the poses.
+    """Insert the orientations of a gyro between the poses.
 
     Args:
         poses: of the platform.
         gyro: of an IMU fixed to it.
-        R_platform_imu: its orientation there.
+        R_platform_imu: orientation of the IMU.
 
     Returns:
-        The same poses and what lies between them, and what a person should know of it. Between poses without gyro the
-        orientation goes about one axis as before.
+        The poses with orientations between them, and notes. Poses without gyro between them are unchanged.
     """
     rate_rad_s = gyro.rate_rad_s @ R_platform_imu.T
     informative = _informative(poses.time_ns, gyro.time_ns)
@@ -73,7 +65,9 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
         )
     time_ns = np.union1d(poses.time_ns, gyro.time_ns[known])
     at = np.searchsorted(time_ns, poses.time_ns)
-    turned = _integrated(time_ns, _at(time_ns, gyro.time_ns, rate_rad_s))
+    after_s = (time_ns - time_ns[0]) / 1e9
+    rates = [np.interp(after_s, (gyro.time_ns - time_ns[0]) / 1e9, column) for column in rate_rad_s.T]
+    turned = _integrated(time_ns, np.stack(rates, axis=1))
     pose = Rotation.from_quat(poses.quaternion)
     between = turned[at[:-1]].inv() * turned[at[1:]]
     step = pose[:-1].inv() * pose[1:]
@@ -86,7 +80,7 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
     since = turned[at[behind]].inv() * turned
     quaternion = (pose[behind] * since * Rotation.from_rotvec(part[:, None] * miss[behind])).as_quat()
     quaternion[at] = poses.quaternion
-    after_s, known_s = (time_ns - time_ns[0]) / 1e9, (poses.time_ns - time_ns[0]) / 1e9
+    known_s = (poses.time_ns - time_ns[0]) / 1e9
     position_m = np.stack([np.interp(after_s, known_s, column) for column in poses.position_m.T], axis=1)
     if not informative.all():
         fits.append(
@@ -99,7 +93,7 @@ def oriented(poses: Trajectory, gyro: Gyro, R_platform_imu: Float64[ndarray, "3 
 
 
 def _informative(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
-    """Whether the gyro covers the time from each pose to the next one."""
+    """Return whether the gyro covers the time from each pose to the next one."""
     gap_ns = np.diff(gyro_ns)
     long = np.append(0, np.cumsum(gap_ns > _LONG_GAP * np.median(gap_ns)))
     first = np.searchsorted(gyro_ns, pose_ns[:-1], side="right") - 1
@@ -108,43 +102,37 @@ def _informative(pose_ns: Times, gyro_ns: Times) -> Bool[ndarray, " k"]:
     return inside & (long[first.clip(0)] == long[last.clip(max=gyro_ns.size - 1)])
 
 
-def _at(time_ns: Times, gyro_ns: Times, rate_rad_s: Floats) -> Floats:
-    """Rates at each time, straight between samples, shape (n, 3)."""
-    query_s, known_s = (time_ns - time_ns[0]) / 1e9, (gyro_ns - time_ns[0]) / 1e9
-    return np.stack([np.interp(query_s, known_s, column) for column in rate_rad_s.T], axis=1)
-
-
 def _integrated(time_ns: Times, rate_rad_s: Floats) -> Rotation:
-    """How far the platform has turned since the first time, one rotation for each."""
+    """Return the rotation of the platform since the first time, for each time."""
     mean_rad_s = (rate_rad_s[1:] + rate_rad_s[:-1]) / 2
     steps = Rotation.from_rotvec(mean_rad_s * (np.diff(time_ns) / 1e9)[:, None])
     turned = Rotation.concatenate([Rotation.identity(), steps]).as_quat()
     reach = 1
-    while reach < len(turned):  # products of 2, 4, 8 ... neighbours: all the running products in log2(n) passes
+    while reach < len(turned):  # cumulative product in log2(n) passes
         turned[reach:] = (Rotation.from_quat(turned[:-reach]) * Rotation.from_quat(turned[reach:])).as_quat()
         reach *= 2
     return Rotation.from_quat(turned)
 
 
 def _fits(gyro_rad: Floats, pose_rad: Floats, gap_s: Floats) -> list[str]:
-    """What the gyro misses the poses by, in words; all shape (k, 3) rotation vectors, `gap_s` apart."""
+    """Describe the difference of gyro and poses, rotation vectors of shape (k, 3) over `gap_s`."""
     bias_rad_s = np.median((gyro_rad - pose_rad) / gap_s[:, None], axis=0)
     left_rad = gyro_rad - bias_rad_s * gap_s[:, None] - pose_rad
     missed_rad, turned_rad = _rms(left_rad), _rms(pose_rad)
     if missed_rad > _WORSE * turned_rad + _NOISE_RAD:
         raise RecordingError(
-            f"gyro: turns otherwise than the poses, from one to the next by {math.degrees(missed_rad):.2g} deg (rms), "
-            f"where the poses turn by {math.degrees(turned_rad):.2g}{_hint(gyro_rad, pose_rad)}"
+            f"gyro: differs from the turns between poses by {math.degrees(missed_rad):.2g} deg (rms), "
+            f"while the poses turn by {math.degrees(turned_rad):.2g}{_hint(gyro_rad, pose_rad)}"
         )
     return [
-        f"gyro: orientation between poses; bias {math.degrees(float(np.linalg.norm(bias_rad_s))):.2g} deg/s, beside it "
-        f"{math.degrees(missed_rad):.2g} deg (rms) off at the next pose, where the poses turn by "
+        f"gyro: orientation between poses; bias {math.degrees(float(np.linalg.norm(bias_rad_s))):.2g} deg/s, residual "
+        f"{math.degrees(missed_rad):.2g} deg (rms) at the next pose, while the poses turn by "
         f"{math.degrees(turned_rad):.2g}"
     ]
 
 
 def _hint(gyro_rad: Floats, pose_rad: Floats) -> str:
-    """The orientation of the IMU, or the unit of its rates, that would make its rates those of the poses."""
+    """Return a hint of the orientation of the IMU, or the unit of its rates, that fits the poses."""
     faster = _rms(gyro_rad) / max(_rms(pose_rad), 1e-12)
     if faster > 30:
         return f"; its rates are {faster:.0f} times as fast: deg/s?"

@@ -1,7 +1,4 @@
-"""The rates of a gyro, from a topic of the recording or from CSV, and the orientation of its IMU on the platform.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Reading of gyro rates from a topic or CSV, and of the orientation of the IMU; errors raise RecordingError."""
 
 from __future__ import annotations
 
@@ -31,12 +28,7 @@ _COLUMNS = {
 
 
 def load_gyro(spec: str, recording: Path) -> Gyro:
-    """Read the rates that `spec` names.
-
-    Args:
-        spec: a `.csv` file with a header (time, wx wy wz [rad/s]), or a topic of `sensor_msgs/Imu` in the recording.
-        recording: where topics are.
-    """
+    """Read the rates of a `.csv` file (time, wx wy wz [rad/s]), or of a `sensor_msgs/Imu` topic of the recording."""
     path = Path(spec)
     if path.is_file():
         return _sorted(spec, list(csv_rows(path, _COLUMNS)), "")
@@ -62,13 +54,13 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
 def imu_mount(
     rpy_deg: tuple[float, float, float] | None, gyro: Gyro, platform: str, recording: Path
 ) -> Float64[ndarray, "3 3"]:
-    """The orientation of an IMU on the platform: `R_platform_imu`.
+    """Return the orientation of an IMU on the platform: `R_platform_imu`.
 
     Args:
-        rpy_deg: its roll, pitch and yaw, fixed axes of the platform; None to take it from the frames.
-        gyro: names the IMU's frame.
-        platform: the frame that the poses are of.
-        recording: whose /tf_static joins the two, if they differ.
+        rpy_deg: roll, pitch and yaw, fixed axes of the platform; None for that of the frames.
+        gyro: with the IMU's frame.
+        platform: frame of the poses.
+        recording: whose /tf_static connects both frames.
     """
     if rpy_deg is not None:
         if not all(map(math.isfinite, rpy_deg)):
@@ -100,16 +92,16 @@ def _sorted(what: str, rows: list[tuple[int, Any]], frame: str) -> Gyro:
 
 
 def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
-    """Parent -> child -> `R_parent_child` of fixed frames, and the other way round."""
+    """Return parent -> child -> `R_parent_child` of fixed frames, and the inverse."""
     topics: dict[str, dict[str, Rotation]] = {}
     if read_topics(recording).get(STATIC) != ros_messages.TRANSFORMS:
         return topics
     for _, data in read_messages(recording, {STATIC}):
         what = f"{recording}: a message of {STATIC}"
         message = foreign(what, ros_messages.decode_message, data, ros_messages.TRANSFORMS)
-        for one in message.transforms:
-            q = one.transform.rotation
-            parent, child = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
+        for entry in message.transforms:
+            q = entry.transform.rotation
+            parent, child = entry.header.frame_id.lstrip("/"), entry.child_frame_id.lstrip("/")
             R = foreign(f"{recording}: {STATIC}: {child}", Rotation.from_quat, [q.x, q.y, q.z, q.w])
             topics.setdefault(parent, {})[child] = R
             topics.setdefault(child, {})[parent] = R.inv()
@@ -117,7 +109,7 @@ def _static(recording: Path) -> dict[str, dict[str, Rotation]]:
 
 
 def _path(frames: dict[str, dict[str, Rotation]], begin: str, end: str) -> Rotation | None:
-    """`R_begin_end` along the frames between; None if none lead there."""
+    """Return `R_begin_end` along the frames between; None if they are not connected."""
     reached = {begin: Rotation.identity()}
     waiting = deque([begin])
     while waiting:

@@ -1,7 +1,4 @@
-"""Platform poses from a file (TUM, CSV) or from a topic of the recording.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Reading of platform poses from a file (TUM, CSV) or a topic; unusable input raises RecordingError."""
 
 from __future__ import annotations
 
@@ -28,12 +25,12 @@ _COLUMNS = {
 
 
 def load_trajectory(spec: str, recording: Path) -> Trajectory:
-    """Read the poses that `spec` names.
+    """Read the poses of a file or topic.
 
     Args:
-        spec: a file, `.csv` with a header or else TUM (`t x y z qx qy qz qw` in each line, s and m); or
-            TOPIC[:PARENT:CHILD] of the recording, the frames if the topic has several (/tf).
-        recording: where topics are.
+        spec: a file, `.csv` with a header or TUM (`t x y z qx qy qz qw` in each line, s and m); or
+            TOPIC[:PARENT:CHILD] of the recording, with frames if the topic has several (/tf).
+        recording: with the topic.
     """
     path = Path(spec)
     if path.is_file():
@@ -74,8 +71,8 @@ def _tum(path: Path) -> Iterator[Row]:
 
 
 def _of_tf(message: Any) -> Iterator[tuple[Any, str, Any, Any]]:
-    for one in message.transforms:
-        yield from _of_transform(one)
+    for transform in message.transforms:
+        yield from _of_transform(transform)
 
 
 def _of_transform(message: Any) -> Iterator[tuple[Any, str, Any, Any]]:
@@ -103,7 +100,7 @@ _POSES: dict[str, Callable[[Any], Iterator[tuple[Any, str, Any, Any]]]] = {
 def _topic(
     recording: Path, topic: str, kind: str, frames: tuple[str, ...], seen: set[tuple[str, str]]
 ) -> Iterator[Row]:
-    """The poses of a pair of frames; `seen` gets every pair that the topic has."""
+    """Yield the poses of a pair of frames; add all pairs of the topic to `seen`."""
     for _, data in read_messages(recording, {topic}):
         message = foreign(f"{recording}: a message of {topic}", ros_messages.decode_message, data, kind)
         for header, child, p, q in _POSES[kind](message):

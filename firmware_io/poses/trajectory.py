@@ -1,9 +1,7 @@
-"""Where the platform was: poses of the `world` frame (the robot that carries the scanner) on a map, over time.
+"""Trajectory of the platform: poses of the `world` frame (the robot with the scanner) on a map, over time.
 
-Between two poses the position goes straight and the orientation about one axis at constant speed (slerp); that is off
-by what the platform accelerates meanwhile, at most a h^2 / 8 for poses h apart. Outside the poses: NaN.
-
-Input that cannot be used raises RecordingError.
+Between two poses the position is interpolated linearly and the orientation by slerp; the error by an acceleration a is
+at most a h^2 / 8 for poses h apart. Outside the poses: NaN. Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -21,19 +19,17 @@ from scanwright.design import frames
 from scanwright.design.arrays import Floats, Pose, Times
 from scanwright.design.errors import RecordingError
 
-_NORM_ERROR = 1e-2  # a quaternion printed with three digits is this well normalised
-_FARTHEST_M = 1e8  # from 0: maps of the Earth's coordinates are 6.4e6 m from its centre
+_NORM_ERROR = 1e-2  # of a quaternion printed with three digits
+_FARTHEST_M = 1e8  # geocentric maps are 6.4e6 m from the Earth's centre
 _EVER_NS = 2**62  # half of an int64: differences of two times still fit
 
 
 class PosePieces(NamedTuple):
-    """Poses taken apart for the kernel.
+    """Poses factored for the kernel.
 
-    Between two of them, u in [0, 1] of the way:
-
+    Between two of them, at the fraction u in [0, 1]:
         p_map = R_then Rz(u turn) (R_first p + t_first) + t_then + u shift
-
-    where p is turned by the joint already; where `moves` is false, p_map = R_first p + t_first.
+    with p rotated by the joint; if `moves` is false, p_map = R_first p + t_first.
     """
 
     time_ns: Times  # (k + 1,)
@@ -48,21 +44,13 @@ class PosePieces(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Poses over time.
+    """Poses over time."""
 
-    Attributes:
-        time_ns: shape (n,), n >= 2, strictly increasing.
-        position_m: shape (n, 3).
-        quaternion: x y z w, unit length, shape (n, 4).
-        platform: name of the frame that moves; "" if the poses do not name it.
-        measured: the poses alone, where a gyro put more orientations between them; None where these are they.
-    """
-
-    time_ns: Int64[ndarray, " n"]
+    time_ns: Int64[ndarray, " n"]  # n >= 2, strictly increasing
     position_m: Float64[ndarray, "n 3"]
-    quaternion: Float64[ndarray, "n 4"]
-    platform: str = ""
-    measured: Trajectory | None = None
+    quaternion: Float64[ndarray, "n 4"]  # x y z w, unit length
+    platform: str = ""  # name of the moving frame; "" if unknown
+    measured: Trajectory | None = None  # poses without the orientations of a gyro; None without a gyro
 
     def __post_init__(self) -> None:
         count = self.time_ns.size
@@ -90,11 +78,11 @@ class Trajectory:
             )
 
     def T_map_world(self, time_ns: Int64[ndarray, " k"]) -> Float64[ndarray, "k 4 4"]:
-        """Pose at each time, shape (n, 4, 4), NaN outside."""
-        from scipy.spatial.transform import Rotation, Slerp  # a heavy import that a platform at rest does without
+        """Return the pose at each time, shape (n, 4, 4), NaN outside."""
+        from scipy.spatial.transform import Rotation, Slerp  # heavy, and not needed for a platform at rest
 
         inside = (time_ns >= self.time_ns[0]) & (time_ns <= self.time_ns[-1])
-        # epoch nanoseconds do not fit a float64, differences do
+        # float64 rounds nanoseconds since 1970, but not differences
         origin_ns = self.time_ns[0]
         known_s = (self.time_ns - origin_ns) / 1e9
         query_s = (np.where(inside, time_ns, origin_ns) - origin_ns) / 1e9
@@ -106,7 +94,7 @@ class Trajectory:
         return T
 
     def pieces(self, first_ns: int, last_ns: int, T_world_rot: Pose) -> PosePieces:
-        """The poses from one time to another, behind the constant `T_world_rot`."""
+        """Return the poses between two times, combined with the constant `T_world_rot`."""
         from scipy.spatial.transform import Rotation
 
         begin, end = np.searchsorted(self.time_ns, [first_ns, last_ns], side="right")
@@ -133,11 +121,10 @@ class Trajectory:
         )
 
     def error(self) -> tuple[float, float]:
-        """Largest error of going straight between the poses, in m and rad, as the poses themselves tell.
+        """Estimate the largest interpolation error, in m and rad, from the poses; NaN for two poses.
 
-        Each pose is left out and predicted from its two neighbours. They are twice as far apart as poses are, so the
-        miss is four times the error (a h^2 / 8). What the platform does between two poses without trace in them
-        (vibration) is not in it. NaN for two poses.
+        Each pose is predicted from its two neighbours. They are twice as far apart as poses, so the difference is four
+        times the error (a h^2 / 8). Vibration between poses is not included.
         """
         from scipy.spatial.transform import Rotation
 
@@ -154,10 +141,7 @@ class Trajectory:
 
 
 def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]], platform: str = "") -> Trajectory:
-    """Poses as files and messages have them: x y z qx qy qz qw each, the quaternion printed with a few digits.
-
-    `platform` names the frame that moves.
-    """
+    """Return the trajectory of poses x y z qx qy qz qw with rounded quaternions; `platform`: the moving frame."""
     values = np.array(poses, float).reshape(-1, 7)
     quaternion = values[:, 3:]
     with np.errstate(over="ignore"):
@@ -172,7 +156,7 @@ def trajectory_of(time_ns: Sequence[int], poses: Sequence[Sequence[float]], plat
 
 
 def at_rest(T_world_rot: Pose) -> PosePieces:
-    """A platform that never moves."""
+    """Return the pieces of a platform at rest."""
     none = np.zeros((1, 3))
     return PosePieces(
         time_ns=np.array([-_EVER_NS, _EVER_NS]),
@@ -187,7 +171,7 @@ def at_rest(T_world_rot: Pose) -> PosePieces:
 
 
 def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"], Float64[ndarray, " k"]]:
-    """Axis (z if there is none) and angle [rad] from each orientation to the next, the short way round."""
+    """Return axis (z without a rotation) and smallest angle [rad] from each orientation to the next."""
     v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
     after, last = [1, 2, 0], [2, 0, 1]
     vector = w0 * v1 - w1 * v0 - (v0[:, after] * v1[:, last] - v0[:, last] * v1[:, after])
@@ -199,7 +183,7 @@ def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"]
 
 
 def _with_z(axis: Floats) -> Floats:
-    """Rotations whose third column is each unit vector, shape (n, 3, 3)."""
+    """Return rotations whose third columns are the unit vectors, shape (n, 3, 3)."""
     # T. Duff and others, "Building an Orthonormal Basis, Revisited" (2017)
     x, y, z = axis.T
     side = np.copysign(1.0, z)

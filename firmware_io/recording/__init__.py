@@ -1,1 +1,1 @@
-"""Recordings: MCAP, bags in and out, repair."""
+"""Recordings: reading and writing of MCAP, import and export of bags, repair."""

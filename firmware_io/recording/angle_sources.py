@@ -25,15 +25,15 @@ from scanwright.firmware_io.tables import csv_rows
 
 TF = "tf2_msgs/msg/TFMessage"
 ANGLES = {"angle", "angle_deg", "angle_rad", "position", "position_rad"}
-ACROSS_RAD = math.radians(0.5)  # what an axis may wander: more is no turning about one
+ACROSS_RAD = math.radians(0.5)  # largest tilt of the axis
 MOST_ANGLE = 1e9  # years of turns
-STILL_RAD = math.radians(1.0)  # what has turned less shows no axis
-WRAP, WRAP_LEAST, WRAP_ERROR = 5.0, 3.0, 0.05  # a wrap: so many usual steps, at least so much, a turn to 5 %
-FEWEST_COUNTS = 512  # of an encoder turn: of fewer, degrees are as likely
-FASTEST_RPM = 120.0  # the fastest servo of the catalogue turns at 103 rpm without a load
+STILL_RAD = math.radians(1.0)  # smaller rotations determine no axis
+WRAP, WRAP_LEAST, WRAP_ERROR = 5.0, 3.0, 0.05  # of a wrap: times the median step, smallest step, relative error
+FEWEST_COUNTS = 512  # of an encoder turn; fewer are probably degrees
+FASTEST_RPM = 120.0  # the fastest servo of the catalogue turns at 103 rpm without load
 SWEEP_RAD = 4 * math.pi  # two turns: cables of a sweeping axis allow less
-BACK_RAD = 1.0  # farther than an axis that turns on for ever swings
-LEAST_RAD = math.radians(7.0)  # about 2 pi deg: a turn in rad that is taken for deg
+BACK_RAD = 1.0  # more than the reverse motion of a spinning axis
+LEAST_RAD = math.radians(7.0)  # about 2 pi deg: a turn in rad read as deg
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,35 +49,35 @@ class FrameSource:
 
 
 def is_table(text: str) -> bool:
-    """Whether an angle is named that stands in a file of its own: `FILE.csv[:COLUMN]`."""
+    """Whether an angle source is a table, `FILE.csv[:COLUMN]`."""
     return Path(text.partition(":")[0]).suffix == ".csv"
 
 
 def parse_frames(text: str) -> FrameSource | None:
-    """Read `TOPIC:PARENT:CHILD`; None if it is not of that kind."""
+    """Read `TOPIC:PARENT:CHILD`; None for another format."""
     parts = text.split(":")
     return FrameSource(*parts) if len(parts) == 3 and all(parts) else None
 
 
 def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[tuple[float, ...], int]]:
-    """Values of a message and their stamps [ns] (0: none): a number, or the quaternion x y z w of a pair of frames."""
+    """Return values and stamps [ns] (0: none) of a message: a number, or the quaternion x y z w of a pair of frames."""
     if isinstance(source, Source):
         numbers, stamp_ns = numbers_at(body, source, bag)
         return [(numbers, stamp_ns)] if numbers else []
     if getattr(body, "__msgtype__", "") != TF:
         raise RecordingError(f"{bag}: {source}: {source.topic} holds no transforms; write TOPIC or TOPIC:FIELD")
     values: list[tuple[tuple[float, ...], int]] = []
-    for one in body.transforms:
-        if (one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")) == (source.parent, source.child):
-            q = one.transform.rotation
-            values.append(((q.x, q.y, q.z, q.w), ros_messages.stamp_ns(one.header.stamp)))
+    for entry in body.transforms:
+        if (entry.header.frame_id.lstrip("/"), entry.child_frame_id.lstrip("/")) == (source.parent, source.child):
+            q = entry.transform.rotation
+            values.append(((q.x, q.y, q.z, q.w), ros_messages.stamp_ns(entry.header.stamp)))
     return values
 
 
 def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source) -> tuple[Floats, str]:
-    """Return how far a frame has turned about its one axis, shape (n,), and a note for the user.
+    """Return the rotation of a frame about its axis, shape (n,), and a note for the user.
 
-    Counted from where the frames agree, else from the first one. `source`: for errors.
+    Zero is where the frames agree, if they ever do, or the first quaternion. `source`: for errors.
     """
     turned = Rotation.from_quat(quaternions)
     since = (turned[0].inv() * turned).as_quat()
@@ -100,7 +100,7 @@ def turned_rad(quaternions: Float[ndarray, "n 4"], source: FrameSource | Source)
 
 
 def read_table(text: str) -> tuple[Times, Floats]:
-    """Times [ns] and angles, shape (n,) each, of `FILE.csv[:COLUMN]`, whose first line names its columns."""
+    """Return times [ns] and angles, shape (n,) each, of `FILE.csv[:COLUMN]`, whose first line names its columns."""
     name, _, column = text.partition(":")
     path = Path(name)
     rows = list(csv_rows(path, {"angle": {column.lower()} if column else ANGLES}))
@@ -113,7 +113,7 @@ def read_table(text: str) -> tuple[Times, Floats]:
 
 
 def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[str]:
-    """Return evidence for the other unit: wraps, speed, range, whole numbers; `log`: `angle` unwrapped."""
+    """Yield evidence for another unit: wraps, speed, range, integers; `log`: `angle` unwrapped."""
     counts = _counts_of_turn(angle)
     if counts and angle_unit in ("deg", "rad"):
         yield f"angles are integers from 0 to nearly {counts}: is the unit {counts}/turn?"
@@ -128,12 +128,12 @@ def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -
     else:
         yield (
             "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
-            "to 9 mm per metre of range, the way from command to motion comes on top"
+            "to 9 mm per metre of range, in addition to the delay from command to motion"
         )
 
 
 def _counts_of_turn(angle: Floats) -> int:
-    """Return the counts of an encoder turn if angles are integers that fill 0 to a power of two; 0 else."""
+    """Return the counts of an encoder turn if angles are integers from 0 to a power of two; 0 otherwise."""
     if angle.min() < 0 or np.any(angle != np.round(angle)):
         return 0
     counts = 2 ** math.ceil(math.log2(max(float(angle.max()), 1.0)))
@@ -160,7 +160,7 @@ def _unlikely_motion(time_ns: Times, angle: Floats, log: JointLog, angle_unit: s
 
 
 def _return_rad(position_rad: Floats) -> float:
-    """How far the axis ever was behind where it had been, on the way that it goes on the whole; none if empty."""
+    """Return the largest motion against the overall direction of the axis; 0 if empty."""
     if not position_rad.size:
         return 0.0
     onward = position_rad if position_rad[-1] >= position_rad[0] else -position_rad

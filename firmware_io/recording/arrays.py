@@ -1,7 +1,4 @@
-"""A recording as arrays: every scan a row, every beam a column. For notebooks; commands read recordings as streams.
-
-Input that cannot be used raises RecordingError.
-"""
+"""A recording as arrays, for notebooks: each scan a row, each beam a column."""
 
 from __future__ import annotations
 
@@ -18,14 +15,14 @@ from scanwright.firmware_io.samples import JointLog, Scan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingArrays:
-    """What lidar and servo said; beam i of scan k is at [k, i].
+    """All scans and angles; beam i of scan k is at [k, i].
 
     Attributes:
         time_ns: of each beam, shape (scans, beams).
-        bearing_rad: of each beam in the scan plane, shape (scans, beams); NaN behind the last beam of a short scan.
-        range_m: shape (scans, beams); NaN, inf or 0 if nothing returned.
-        intensity: shape (scans, beams), or (scans, 0) where the sensor measures none.
-        joint_log: the servo's angle over time.
+        bearing_rad: in the scan plane, shape (scans, beams); NaN after the last beam of a short scan.
+        range_m: shape (scans, beams); NaN, inf or 0 without a return.
+        intensity: shape (scans, beams), or (scans, 0) if the sensor measures none.
+        joint_log: angle of the servo.
     """
 
     time_ns: Times
@@ -36,12 +33,12 @@ class RecordingArrays:
 
     @property
     def joint_rad(self) -> Floats:
-        """Servo angle at the time of each beam, straight between samples, shape (scans, beams); NaN outside the log."""
+        """Servo angle at the time of each beam by linear interpolation, shape (scans, beams); NaN outside the log."""
         return self.joint_log.angle_at(self.time_ns.ravel()).reshape(self.time_ns.shape)
 
 
 def arrays_of(scans: Sequence[Scan], joint_log: JointLog) -> RecordingArrays:
-    """All scans at once; short ones are filled up."""
+    """Return all scans, short ones padded; RecordingError without a scan."""
     if not scans:
         raise RecordingError("no scan: there is nothing to put into arrays")
     shape = len(scans), max(scan.range_m.size for scan in scans)

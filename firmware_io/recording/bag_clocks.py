@@ -16,12 +16,10 @@ from numpy import ndarray
 from scanwright.design.arrays import Times
 from scanwright.firmware_io.samples import JointLog
 
-_SAME_CLOCK_NS = (
-    1_000_000_000  # a message that is received later than this after its stamp was stamped by another clock
-)
-_AHEAD_S = 0.05  # stamps that lie so much after their receipt are worse than the times of receipt
+_SAME_CLOCK_NS = 1_000_000_000  # largest delay of a message stamped by the receiver's clock
+_AHEAD_S = 0.05  # stamps later than this after their receipt are worse than receive times
 _RECEIPT = ": both take the time they were received; a scan is received after its last beam, so expect a lag"
-_LONG_GAP = 10.0  # this many usual gaps between angle samples are worth a word
+_LONG_GAP = 10.0  # times the median gap between angles, to warn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,18 +30,18 @@ class Stamps:
     receive_ns: Int64[ndarray, " n"]
 
     def complete(self) -> bool:
-        """Whether every message has a stamp."""
+        """Whether all messages have a stamp."""
         return bool((self.stamp_ns > 0).all())
 
     def on_host_clock(self) -> bool:
-        """Whether the stamps could come from the clock of the receiver."""
+        """Whether the stamps can be of the receiver's clock."""
         delay_ns = self.receive_ns - self.stamp_ns
         return self.complete() and bool((np.abs(delay_ns) < _SAME_CLOCK_NS).all())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OneClock:
-    """Scan and angle times on one clock; `note` is "" where both are header stamps, else what a person should know."""
+    """Scan and angle times on one clock; `note` is "" if both are header stamps, or a warning."""
 
     scan_ns: Int64[ndarray, " scans"]
     angle_ns: Int64[ndarray, " angles"]
@@ -53,8 +51,8 @@ class OneClock:
 def one_clock(scans: Stamps, angles: Stamps, arc_ns: Int64[ndarray, " scans"]) -> OneClock:
     """Choose the times of scans and angles, each shape (n,).
 
-    Stamps after their receipt are of another clock. If both sources share that clock, their stamps agree and stay; else
-    the receipt decides, minus `arc_ns` for scans: the time from first to last beam.
+    Stamps after their receipt are of another clock. If both sources share that clock, their stamps are used; otherwise
+    the receive times, minus `arc_ns` for scans: the time from first to last beam.
     """
     ahead_s = [_ahead_s(stamps) if stamps.complete() else 0.0 for stamps in (scans, angles)]
     after_arc_s = ahead_s[0] + 1e-9 * float(np.median(arc_ns)) if len(arc_ns) else ahead_s[0]
@@ -87,8 +85,8 @@ def log_at_rest(
 ) -> tuple[JointLog, int]:
     """Return a log with one angle during each scan, and the number of scans cut short by the next one.
 
-    The angle is the last one of `log` at or before the first beam; a scan before `log` gets no sample. `arc_ns`: time
-    from first to last beam.
+    The angle is the last one of `log` until the first beam; a scan before `log` gets no sample. `arc_ns`: time from
+    first to last beam.
     """
     begin_ns, first = np.unique(begin_ns, return_index=True)
     known = (begin_ns >= log.time_ns[0]) & (begin_ns <= log.time_ns[-1])
@@ -96,17 +94,17 @@ def log_at_rest(
     angle_rad = log.position_rad[np.searchsorted(log.time_ns, begin_ns, side="right") - 1]
     latest_ns = np.append(begin_ns[1:] - 1, end_ns[-1:])
     both_ns = np.stack([begin_ns, np.minimum(end_ns, latest_ns)], axis=1).ravel()
-    distinct = np.append(True, np.diff(both_ns) > 0)  # a scan without time_increment begins and ends at once
+    distinct = np.append(True, np.diff(both_ns) > 0)  # a scan without time_increment has no duration
     return JointLog(both_ns[distinct], np.repeat(angle_rad, 2)[distinct]), int(np.sum(end_ns > latest_ns))
 
 
 def times(values: Sequence[int]) -> Int64[ndarray, " n"]:
-    """Integer nanoseconds as an array."""
+    """Return integer nanoseconds as an array."""
     return np.array(values, dtype=np.int64)
 
 
 def _ahead_s(stamps: Stamps) -> float:
-    """Return how long stamps lie after their receipt, but for the latest twentieth; negative for good ones."""
+    """Return the time by which stamps exceed their receipt, at the 5 % quantile of the delay; normally negative."""
     return -float(np.quantile(stamps.receive_ns - stamps.stamp_ns, 0.05)) / 1e9
 
 
@@ -115,7 +113,7 @@ def _overlap(a_ns: Times, b_ns: Times) -> bool:
 
 
 def gap_warnings(log: JointLog) -> Iterator[str]:
-    """What a person should know of the times between two angles."""
+    """Yield a warning of a long gap between two angles."""
     gaps_s = np.diff(log.time_ns) / 1e9
     if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
         usual = f"usually {np.median(gaps_s):.3f} s"

@@ -1,4 +1,4 @@
-"""Recordings for those who use ROS: a ROS 1 bag, or a ROS 2 bag in sqlite3. MCAP is what ROS 2 reads as it is."""
+"""Export of recordings to ROS 1 bags, or ROS 2 bags in sqlite3; ROS 2 reads MCAP without export."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.bags import Bag, Message, open_bag
 from scanwright.firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
 
-_VERSION: Final = 8  # of the metadata of ROS 2 bags: Humble and later read it
+_VERSION: Final = 8  # of the metadata of ROS 2 bags, for Humble and later
 _FOREVER: Final = QosTime(9223372036, 854775807)
 _LATCHED: Final = Qos(
     history=QosHistory.KEEP_LAST,
@@ -40,21 +40,21 @@ _LATCHED: Final = Qos(
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Exported:
-    """What became of a recording's messages: topic -> how many were written, topic -> type that ROS does not know."""
+    """Result of an export."""
 
-    written: dict[str, int]
-    unknown: dict[str, str]
+    written: dict[str, int]  # topic -> number of messages
+    unknown: dict[str, str]  # topic -> type that ROS does not have
 
 
 def export_bag(recording: Path, out: Path) -> Exported:
-    """Write all messages of a recording as a bag, each at the time at which it was recorded, and its note as a topic.
+    """Write all messages of a recording as a bag, with their log times, and its note as a topic.
 
     Args:
         recording: MCAP.
-        out: `.bag` for ROS 1 (Noetic's types), else the name of a folder for ROS 2 (Humble's types, sqlite3).
+        out: `.bag` for ROS 1 (Noetic's types), or the name of a folder for ROS 2 (Humble's types, sqlite3).
 
     Raises:
-        RecordingError: the recording is unreadable, or the bag cannot be written. Nothing is left then.
+        RecordingError: the recording is unreadable, or the bag cannot be written; nothing is left.
     """
     if out.suffix not in ("", ".bag"):
         raise RecordingError(
@@ -90,26 +90,24 @@ def _ros2(recording: Path, out: Path) -> Exported:
 def _copied(
     bag: Bag, writer: Any, store: Typestore, serialize: Callable[[Any, str], Any], latched: Mapping[str, Any]
 ) -> Exported:
-    """All messages of a recording to a writer of either kind; `latched` are the options of a topic for late comers."""
-    known, unknown = _known(bag.topics, store)
+    """Copy all messages of a recording; `latched` are the options of a latched topic."""
+    known = {topic: kind for topic, kind in bag.topics.items() if kind in store.types}
+    unknown = {topic: kind for topic, kind in bag.topics.items() if topic not in known}
+    note_topic = {NOTE_TOPIC: NOTE_TYPE} if note_in(bag) else {}
     connections = {
         topic: writer.add_connection(topic, kind, typestore=store, **(latched if topic == NOTE_TOPIC else {}))
-        for topic, kind in (_note_topic(bag) | known).items()
+        for topic, kind in (note_topic | known).items()
     }
     written: Counter[str] = Counter()
     for message in _noted(bag, set(known), store):
-        to = connections[message.topic]
-        writer.write(to, message.receive_ns, serialize(_of_store(message.body, store), to.msgtype))
+        connection = connections[message.topic]
+        writer.write(connection, message.receive_ns, serialize(_of_store(message.body, store), connection.msgtype))
         written[message.topic] += 1
     return Exported(dict(written), unknown)
 
 
-def _note_topic(bag: Bag) -> dict[str, str]:
-    return {NOTE_TOPIC: NOTE_TYPE} if note_in(bag) else {}
-
-
 def _noted(bag: Bag, topics: set[str], store: Typestore) -> Iterator[Message]:
-    """The messages, and before them, at the time of the first one, the note where it is none of them yet."""
+    """Yield the note at the time of the first message, unless it is one of them, and then the messages."""
     note = {} if NOTE_TOPIC in topics else note_in(bag)
     for k, message in enumerate(bag.messages(topics)):
         if note and k == 0:
@@ -118,19 +116,13 @@ def _noted(bag: Bag, topics: set[str], store: Typestore) -> Iterator[Message]:
         yield message
 
 
-def _known(topics: Mapping[str, str], store: Typestore) -> tuple[dict[str, str], dict[str, str]]:
-    """Topics whose type the store has, and those whose type it has not."""
-    known = {topic: kind for topic, kind in topics.items() if kind in store.types}
-    return known, {topic: kind for topic, kind in topics.items() if topic not in known}
-
-
 def _of_store(value: Any, store: Typestore) -> Any:
-    """The same message in the store's own classes; what only they have (`seq` of ROS 1) is 0."""
+    """Convert a message to the classes of the store; fields that only these have (`seq` of ROS 1) are 0."""
     if dataclasses.is_dataclass(value):
         message: Any = value
         kind: Any = store.types[message.__msgtype__]
         names = [field.name for field in dataclasses.fields(kind) if field.name != "__msgtype__"]
         return kind(**{name: _of_store(getattr(value, name, 0), store) for name in names})
     if isinstance(value, list):
-        return [_of_store(one, store) for one in value]
+        return [_of_store(item, store) for item in value]
     return value

@@ -33,7 +33,7 @@ _SUFFIXES = (".bag", ".mcap", ".db3")
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A value in a bag: its topic, and the path inside the message ("" is the message itself)."""
+    """Topic of a value in a bag, and its path inside the message ("": the message itself)."""
 
     topic: str
     field: str
@@ -44,10 +44,10 @@ class Source:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Message:
-    """One decoded message and the time [ns] at which it was recorded."""
+    """One decoded message."""
 
     topic: str
-    receive_ns: int
+    receive_ns: int  # log time
     body: Any
 
 
@@ -65,7 +65,6 @@ class Bag:
     """An open bag; made by `open_bag`."""
 
     def __init__(self, path: Path, reader: AnyReader) -> None:
-        """Wrap a reader that is open already."""
         self.path = path
         self._reader = reader
 
@@ -75,7 +74,7 @@ class Bag:
         return {connection.topic: connection.msgtype for connection in self._reader.connections}
 
     def check(self, topics: set[str]) -> None:
-        """That the bag has these topics, all of them, and knows their types."""
+        """Raise RecordingError if the bag lacks one of these topics or its type."""
         missing = [f"no topic '{name}'{suggest(name, self.topics)}" for name in sorted(topics - self.topics.keys())]
         if missing:
             raise RecordingError(f"{self.path}: {'; '.join(missing)}")
@@ -87,12 +86,12 @@ class Bag:
                 )
 
     def messages(self, topics: set[str]) -> Iterator[Message]:
-        """The messages of these topics, decoded, in the order of their recording."""
+        """Yield the decoded messages of these topics in the order of recording."""
         self.check(topics)
-        wanted = [connection for connection in self._reader.connections if connection.topic in topics]
-        raw_messages: Iterable[tuple[Any, int, bytes]] = self._reader.messages(connections=wanted)
+        connections = [connection for connection in self._reader.connections if connection.topic in topics]
+        raw_messages: Iterable[tuple[Any, int, bytes]] = self._reader.messages(connections=connections)
         if self.path.suffix == ".mcap" and (unchunked := unchunked_messages(self.path, topics)) is not None:
-            by_topic = {connection.topic: connection for connection in wanted}
+            by_topic = {connection.topic: connection for connection in connections}
             raw_messages = [(by_topic[topic], log_ns, data) for log_ns, topic, data in unchunked]
         for connection, receive_ns, raw in foreign_items(f"{self.path}: damaged bag", raw_messages):
             what = f"{self.path}: {connection.topic}: a message that is not a {connection.msgtype}"
@@ -102,7 +101,7 @@ class Bag:
 
 @contextmanager
 def open_bag(path: Path, *more: Path) -> Iterator[Bag]:
-    """Open a bag: a `.bag`, `.mcap` or `.db3` file, or a folder of one; the parts of a split bag as one."""
+    """Open a `.bag`, `.mcap` or `.db3` file, a folder with one, or the parts of a split bag."""
     paths = [_bag_file(part) for part in (path, *more)]
     reader = foreign(_unreadable(path), AnyReader, paths, default_typestore=get_typestore(Stores.ROS2_JAZZY))
     foreign(_unreadable(path), reader.open)
@@ -119,7 +118,7 @@ def topics_in(paths: Sequence[Path]) -> str:
 
 
 def _bag_file(path: Path) -> Path:
-    """Return what the reader opens; refuse what is no bag."""
+    """Return the path for the reader; RecordingError if it is not a bag."""
     if not path.exists():
         raise RecordingError(
             f"{path}: no such bag: a ROS 1 bag is a file .bag, a ROS 2 bag a file or a folder with metadata.yaml"
@@ -147,7 +146,7 @@ def _bag_file(path: Path) -> Path:
 
 
 def _database_fault(path: Path) -> str:
-    """Return what is wrong with a database, or "": SQLite from 3.46 on reads the rest of a cut one without an error."""
+    """Return the fault of a database, or "": SQLite from 3.46 on reads the rest of a cut one without an error."""
     with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as database:
         (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
     return "" if verdict == "ok" else " ".join(verdict.split())
@@ -162,7 +161,7 @@ def _unreadable(path: Path) -> str:
 
 
 def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
-    """What `source` names inside a message, and the stamp [ns] of the nearest header around it (0: there is none)."""
+    """Return the value at `source` in a message, and the stamp [ns] of the nearest header around it (0: none)."""
     value, stamp_ns = body, _stamp(body)
     for step in source.field.split(".") if source.field else []:
         name, index = _STEP.fullmatch(step).groups()  # type: ignore[union-attr]  # parse_source has checked it
@@ -181,7 +180,7 @@ def value_at(body: Any, source: Source, bag: Path) -> tuple[Any, int]:
 
 
 def laser_scan_at(body: Any, source: Source, bag: Path, echo: str = "first") -> tuple[Any, int]:
-    """Return the LaserScan that a source names and its stamp [ns] (0: none); of all echoes the first."""
+    """Return the LaserScan at `source` and its stamp [ns] (0: none); of all echoes the first."""
     value, stamp_ns = value_at(body, source, bag)
     if _kind(value) == ros_messages.MULTI_ECHO:
         return ros_messages.single_echo(value, echo), stamp_ns
@@ -195,7 +194,7 @@ def laser_scan_at(body: Any, source: Source, bag: Path, echo: str = "first") -> 
 
 
 def scan_fault(laser_scan: Any) -> str:
-    """Why a LaserScan cannot be used, or ""."""
+    """Return the reason why a LaserScan is unusable, or ""."""
     if not len(laser_scan.ranges):
         return "empty_scan"
     if not (math.isfinite(laser_scan.angle_min) and math.isfinite(laser_scan.angle_increment)):
@@ -209,13 +208,14 @@ def numbers_at(body: Any, source: Source, bag: Path) -> tuple[tuple[float, ...],
     """Return the number at `source`, or the x y z w of a quaternion, and its stamp [ns] (0: none).
 
     Default field: the only joint of a JointState, `data` of std_msgs. A field can be a joint name; a JointState without
-    it has no numbers, as other programs publish there too.
+    it, as of another publisher, has no numbers.
     """
     if not source.field:
         if _kind(body) == ros_messages.JOINT_STATE:
             if len(body.name) > 1:
-                one = f"{source.topic}:{body.name[-1]}"
-                raise RecordingError(f"{bag}: {source.topic}: joints {', '.join(body.name)}: name one, such as {one}")
+                example = f"{source.topic}:{body.name[-1]}"
+                joints = ", ".join(body.name)
+                raise RecordingError(f"{bag}: {source.topic}: joints {joints}: name one, such as {example}")
             source = Source(source.topic, body.name[0] if len(body.name) else "position[0]")
         else:
             source = Source(source.topic, "data" if "data" in _fields(body) else "")
@@ -237,7 +237,7 @@ def numbers_at(body: Any, source: Source, bag: Path) -> tuple[tuple[float, ...],
 
 
 def _joint(field: str, body: Any) -> bool:
-    """Whether a path of one step names no field of a JointState, and so one of its joints."""
+    """Whether a path is a joint name and not a field of a JointState."""
     return field in body.name or ("[" not in field and "." not in field and field not in _fields(body))
 
 
@@ -248,7 +248,7 @@ def _fields(value: Any) -> list[str]:
 
 
 def _kind(value: Any) -> str:
-    """Name of the type, as a person who knows ROS would say it."""
+    """Return the name of the type for messages."""
     if dataclasses.is_dataclass(value):
         message: Any = value  # every message class of rosbags has a __msgtype__
         return str(message.__msgtype__)

@@ -1,4 +1,4 @@
-"""Files of one kind into files of another: clouds among each other, recordings into other people's bags."""
+"""Conversion of clouds to other formats, and of recordings to bags."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from scanwright.firmware_io.recording.bag_export import export_bag
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """A converted cloud or recording.
+    """Result of a conversion.
 
     Attributes:
-        files: files or folder that were written.
-        rows: rows of the clouds; None for a recording.
-        messages: topic -> messages that were written; None for a cloud.
+        files: written files or folder.
+        rows: of the clouds; None for a recording.
+        messages: topic -> number; None for a cloud.
         notes: data that the format cannot store, one sentence each.
     """
 
@@ -29,7 +29,7 @@ class Converted:
     notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """Return the same as lines."""
+        """Format the result."""
         rows = f"{self.rows:,} rows" if self.rows is not None else ""
         messages = ", ".join(f"{count:,} of {topic}" for topic, count in (self.messages or {}).items())
         return [
@@ -46,12 +46,12 @@ def convert(source: Path, target: Path, *, organised: bool = False, decimal_comm
     Args:
         source: a cloud, or a recording (`.mcap`).
         target: a cloud; or a bag, `.bag` for ROS 1, otherwise a new folder for ROS 2.
-        organised: keep the rows without a point of an organised cloud, in formats that do not define them too.
-        decimal_comma: the numbers of the source are text with decimal commas.
+        organised: keep the rows without a point of an organised cloud, also in formats that do not define them.
+        decimal_comma: the source is text with decimal commas.
 
     Raises:
-        InstallError: a format needs the extra `clouds`, which is not installed.
-        RecordingError: `source` is unreadable, its form is not known, or `target` cannot be written.
+        InstallError: a format requires the extra `clouds`, which is not installed.
+        RecordingError: `source` is unreadable, its format is unknown, or `target` cannot be written.
     """
     if source.suffix == ".mcap":
         exported = export_bag(source, target)

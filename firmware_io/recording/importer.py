@@ -34,7 +34,6 @@ from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, op
 from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
 from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, without_far
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
-from scanwright.firmware_io.recording.import_checks.headers import Headers
 from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
 from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
@@ -52,16 +51,16 @@ _AS_IT_IS = Corrections()
 
 @dataclass(frozen=True, slots=True)
 class ImportSummary:
-    """What an import wrote, what it dropped and why, and what a person should know.
+    """Result of an import.
 
     Attributes:
         out: the recording.
-        scans: scans written.
-        beams: beams in them, returns or not.
-        joint_samples: samples of the spin joint written.
+        scans: written.
+        beams: in them, with or without a return.
+        joint_samples: written.
         duration_s: from the first to the last scan.
         angle_deg: smallest and largest angle of the joint log.
-        left_out: reason -> number of scans or angles.
+        left_out: dropped scans or angles, reason -> count.
         findings: of the checks.
     """
 
@@ -80,7 +79,7 @@ class ImportSummary:
         return tuple(finding.message for finding in self.findings if finding.severity == "warning")
 
     def lines(self) -> list[str]:
-        """Return the summary as lines of text."""
+        """Format the summary."""
         low, high = self.angle_deg
         texts = [
             line
@@ -115,18 +114,17 @@ def import_bag(
         bag: ROS 1 or ROS 2 bag; several are the parts of a split one.
         out: the recording to write, `.mcap`.
         scan: TOPIC[:FIELD] of a LaserScan.
-        angle: source of the axis angle: TOPIC[:FIELD] of a number or quaternion, which may lie in the same message as
-            the scan, TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
+        angle: source of the axis angle: TOPIC[:FIELD] of a number or quaternion, possibly in the same message as the
+            scan, TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
         angle_unit: deg, rad, or counts such as 4096/turn; None for transforms and quaternions, which have none.
-        hold: the motor stands still during each scan: the angle of the scan's own message, or the last one before
-            the scan, holds from its first to its last beam. A bag made from a recording of which this is known says
-            so itself, and its log stays as it is.
+        hold: the motor rests during each scan, at the angle of the scan's message or the last one before it. Not needed
+            for a bag exported from such a recording, which has a note of it.
         also: topics that are copied unchanged, such as poses and an IMU for `assemble`.
         corrections: of the recording.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
-            have no time in common. Nothing is written then.
+            have no time in common; nothing is written.
     """
     parts = [bag] if isinstance(bag, Path) else list(bag)
     _check_target(out, parts)
@@ -144,7 +142,8 @@ def import_bag(
         if unit_rad is None or angle_unit is None:
             raise RecordingError("angle_unit: write deg or rad, as the bag has it, or counts such as 4096/turn")
         headers = survey.headers.corrected(None, corrections)
-        increment_s = _time_increment_s(headers, corrections)
+        increment_s = corrections.time_increment  # None for that of each scan
+        increment_s = headers.time_increment_from_turn_s if increment_s == "auto" else increment_s
         stated_s = headers.time_increment_s if increment_s is None else increment_s
         arc_ns = np.rint(1e9 * stated_s * (headers.beams - 1)).astype(np.int64)
         clock = _corrected(one_clock(survey.scan_stamps, survey.angle_stamps, arc_ns), survey, arc_ns, corrections)
@@ -218,7 +217,7 @@ def _check_target(out: Path, bags: Sequence[Path]) -> None:
 def _joint_log(
     clock: OneClock, survey: BagSurvey, unit_rad: float, corrections: Corrections
 ) -> tuple[JointLog, Counter[str]]:
-    """Return the joint positions in the order of their times, and what was left out of the bag."""
+    """Return the joint positions in the order of their times, and the counts of dropped messages."""
     order = np.argsort(clock.angle_ns, kind="stable")
     time_ns, angle = clock.angle_ns[order], survey.angle[order]
     wrong = outliers(time_ns, angle * unit_rad)[0] & corrections.drop_outliers
@@ -228,13 +227,6 @@ def _joint_log(
     doubled = order.size - dropped - unique_ns.size
     left_out = survey.left_out + Counter({"angle_at_the_time_of_another": doubled, "angle_outlier": dropped})
     return JointLog(unique_ns, corrections.angle_scale * turned_rad), left_out
-
-
-def _time_increment_s(headers: Headers, corrections: Corrections) -> float | None:
-    """Return the time increment to use; None for that of each scan."""
-    if corrections.time_increment == "auto":
-        return headers.time_increment_from_turn_s
-    return corrections.time_increment
 
 
 def _corrected(clock: OneClock, survey: BagSurvey, arc_ns: Times, corrections: Corrections) -> OneClock:
@@ -274,7 +266,7 @@ def _write(
     time_increment_s: float | None,
     echoes: int,
 ) -> None:
-    """Second pass: copy the scans, with the joint samples between them by time, and what comes along as received."""
+    """Write the scans and joint samples in the order of time, and copy other topics."""
     samples = list(zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
     written = 0
     scan_times = iter(clock.scan_ns.tolist())
@@ -300,12 +292,12 @@ def _write(
     beams_topic = f"{source.topic}{BEAMS_TOPIC.removeprefix(SCAN_TOPIC)}"
     own = {beams_topic} if bag.topics.get(beams_topic) == ros_messages.POINT_CLOUD else set[str]()
     beams: dict[int, ros_messages.Beams] = {}  # by the stamp of their scan
-    waiting: list[tuple[Any, int]] = []  # scans whose beams may come next: at one time bags have no order
+    waiting: list[tuple[Any, int]] = []  # scans whose beams may be next, as messages of one time have no order
     for message in bag.messages({source.topic, *own, *also}):
         if message.topic in also:
             writer.other(message.topic, bag.topics[message.topic], message.receive_ns, message.body)
         if message.topic in own:
-            with suppress(ValueError):  # somebody else's cloud
+            with suppress(ValueError):  # another cloud
                 stamp_ns, beams_of_one = ros_messages.beams_in(message.body)
                 beams[stamp_ns] = beams_of_one
         elif message.topic == source.topic:

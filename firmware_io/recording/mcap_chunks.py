@@ -1,7 +1,7 @@
 """Messages of an MCAP file (https://mcap.dev/spec), read and written a chunk at a time.
 
-The `mcap` package reads the summary and unpacks chunks; records inside a chunk are cut here, because its reader makes
-an object of each, which takes most of the time. Unusable input raises RecordingError.
+The `mcap` package reads the summary and unpacks chunks; records inside a chunk are split here, because its reader is
+slow. Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ from scanwright.design.concurrency.ahead import ahead
 from scanwright.design.errors import RecordingError, made_by
 from scanwright.firmware_io.foreign import foreign
 
-CHUNK_S = 0.25
-"""What damage may cost: a chunk holds no more."""
-_RUN_BYTES = 1_000_000  # unpacked: smaller chunks are handed over together
+CHUNK_S = 0.25  # duration of a chunk, the largest loss of one damage
+_RUN_BYTES = 1_000_000  # unpacked; smaller chunks are unpacked together
 _MAGIC = b"\x89MCAP"
 _MESSAGE = 0x05  # opcode of a message (MCAP specification, Message)
 _RECORD = struct.Struct("<BQ")  # opcode, length
@@ -39,7 +38,7 @@ _Timed = tuple[int, int, str, bytes]  # log time [ns], place of the chunk, topic
 
 
 class TimedChunks(Writer):
-    """Ends a chunk when the next message of a topic is `CHUNK_S` after its first, or before it; per topic."""
+    """Writer that ends a chunk if a message is `CHUNK_S` before or after the first one of its topic."""
 
     def __init__(self, stream: Any) -> None:
         super().__init__(stream)
@@ -55,14 +54,14 @@ class TimedChunks(Writer):
 
 
 def read_topics(path: Path) -> dict[str, str]:
-    """Message type of each topic in a file."""
+    """Return the message type of each topic in a file."""
     with _opened(path) as stream:
         summary = _summary(path, stream)
     return {channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()}
 
 
 def read_note(path: Path, name: str) -> dict[str, str]:
-    """The metadata record of a name; empty if the file has none."""
+    """Return the metadata record of a name; empty if the file has none."""
     with _opened(path) as stream:
         records = foreign(f"{path}: damaged", lambda: list(SeekingReader(stream).iter_metadata()))
     return next((record.metadata for record in records if record.name == name), {})
@@ -71,26 +70,26 @@ def read_note(path: Path, name: str) -> dict[str, str]:
 def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -> Iterator[tuple[str, bytes]]:
     """Yield topic and bytes of each message in the order of log times.
 
-    Holds only chunks that overlap in time, and unpacks the next ones meanwhile. `summed`: verify checksums.
+    Only chunks that overlap in time are in memory; the next ones are unpacked meanwhile. `summed`: verify checksums.
     """
     with _opened(path) as stream:
         summary = _summary(path, stream)
-        wanted = {key: channel.topic for key, channel in summary.channels.items() if channel.topic in topics}
+        selected = {key: channel.topic for key, channel in summary.channels.items() if channel.topic in topics}
         chunks = sorted(
-            (chunk for chunk in summary.chunk_indexes if not wanted.keys().isdisjoint(chunk.message_index_offsets)),
+            (chunk for chunk in summary.chunk_indexes if not selected.keys().isdisjoint(chunk.message_index_offsets)),
             key=lambda chunk: (chunk.message_start_time, chunk.chunk_start_offset),
         )
         waiting = [] if summary.chunk_indexes else foreign(f"{path}: damaged", _unchunked, stream, topics)
 
         def unpack(run: list[ChunkIndex]) -> list[list[_Timed]]:
-            return [foreign(f"{path}: damaged", _chunk, stream, chunk, wanted, summed) for chunk in run]
+            return [foreign(f"{path}: damaged", _chunk, stream, chunk, selected, summed) for chunk in run]
 
         with closing(ahead(unpack, _runs(chunks))) as unpacked:
             for chunk, messages in zip(chunks, chain.from_iterable(unpacked), strict=True):
                 ready = [message for message in waiting if message[0] < chunk.message_start_time]
                 yield from (message[2:] for message in ready)
                 waiting = waiting[len(ready) :] + messages
-                waiting.sort(key=itemgetter(0, 1))  # stable: the order within a chunk remains
+                waiting.sort(key=itemgetter(0, 1))  # stable: keeps the order in a chunk
         yield from (message[2:] for message in waiting)
 
 
@@ -112,7 +111,7 @@ def _summary(path: Path, stream: BinaryIO) -> Summary:
     return _summary_of(path, status.st_size, status.st_mtime_ns)
 
 
-@lru_cache(maxsize=1)  # of ten minutes it lists 2,400 chunks, and whoever opens a recording asks four times
+@lru_cache(maxsize=1)  # 2,400 chunks in ten minutes, and opening a recording needs them four times
 def _summary_of(path: Path, _size: int, _changed_ns: int) -> Summary:
     what = f"{path}: the recording was cut off (`scanwright repair` mends it)"
     with _opened(path) as stream:
@@ -126,7 +125,7 @@ def _summary_of(path: Path, _size: int, _changed_ns: int) -> Summary:
 
 
 def _runs(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
-    """Small chunks in runs: to hand one over to another thread takes as long as to unpack it."""
+    """Group small chunks, since passing one to another thread takes as long as unpacking it."""
     run: list[ChunkIndex] = []
     for chunk in chunks:
         run.append(chunk)
@@ -137,7 +136,7 @@ def _runs(chunks: list[ChunkIndex]) -> Iterator[list[ChunkIndex]]:
         yield run
 
 
-def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: bool) -> list[_Timed]:
+def _chunk(stream: BinaryIO, index: ChunkIndex, selected: dict[int, str], summed: bool) -> list[_Timed]:
     stream.seek(index.chunk_start_offset + _RECORD.size)
     unpacked, size = get_chunk_data_stream(Chunk.read(ReadDataStream(stream)), validate_crc=summed)
     data = unpacked.read(size)
@@ -148,15 +147,15 @@ def _chunk(stream: BinaryIO, index: ChunkIndex, wanted: dict[int, str], summed: 
         at += _RECORD.size
         if opcode == _MESSAGE:
             channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, at)
-            if channel in wanted:
+            if channel in selected:
                 body = data[at + _MESSAGE_HEAD.size : at + length]
-                messages.append((log_ns, index.chunk_start_offset, wanted[channel], body))
+                messages.append((log_ns, index.chunk_start_offset, selected[channel], body))
         at += length
     return messages
 
 
 def _unchunked(stream: BinaryIO, topics: Collection[str]) -> list[_Timed]:
-    """The messages of a file without chunks; such a file has no index, so all of it is held."""
+    """Read all messages of a file without chunks, which has no index."""
     stream.seek(0)
     messages = NonSeekingReader(stream).iter_messages(topics=list(topics), log_time_order=True)
     return [(message.log_time, 0, channel.topic, message.data) for _, channel, message in messages]

@@ -1,4 +1,4 @@
-"""Many messages of a topic as arrays: those that differ only in time and measurement are one block of bytes.
+"""Batches of messages as arrays: those that differ only in time and measurement are one block of bytes.
 
 The layout (byte order, lengths, shared numbers) is read from the first message and compared in the others.
 """
@@ -14,19 +14,19 @@ from scanwright.design.arrays import Bytes, Floats, Ints, Times
 from scanwright.firmware_io.recording.ros_messages import JointPlaces, ScanPlaces, decode_joint, decode_scan
 from scanwright.firmware_io.samples import Block, Scan
 
-_STAMP = 4  # seconds and nanoseconds, behind the encapsulation
+_STAMP = 4  # seconds and nanoseconds, after the encapsulation
 
 
 class ScanOutline(NamedTuple):
-    """What alike LaserScan messages are, but for the measurements: times [ns], beams of each, whether they are lit."""
+    """A batch of LaserScan messages without their measurements."""
 
     stamp_ns: Times
-    beams: int
+    beams: int  # of each
     has_intensity: bool
 
 
 def outlines_in(messages: Sequence[bytes]) -> Iterator[ScanOutline]:
-    """As `blocks_in`, for those who need no ranges yet."""
+    """As `blocks_in`, without ranges."""
     for scan, places, rows in _alike_scans(messages):
         yield ScanOutline(_stamps(rows, places.order), scan.range_m.size, bool(scan.intensity.size))
 
@@ -43,7 +43,7 @@ def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
 
 
 def _alike_scans(messages: Sequence[bytes]) -> Iterator[tuple[Scan, ScanPlaces, Bytes]]:
-    """Scans that differ in nothing else: the first of them, where its numbers are, and the bytes of each, a row."""
+    """Yield the first scan, its layout and the bytes of each scan (rows) of batches with one layout."""
     for same_length in _runs(_lengths(messages)):
         rows = _rows(messages[same_length])
         done = 0
@@ -65,7 +65,7 @@ def joints_in(messages: Sequence[bytes]) -> tuple[Times, Floats]:
         if places is not None and _alike(rows, places.shared) == len(rows):
             time_ns[which] = _stamps(rows, places.order)
             position_rad[which] = _numbers(rows, places.position, f"{places.order}f8")[:, 0]
-        else:  # several publishers, whose messages happen to be of one length
+        else:  # messages of several publishers with the same length
             for i in which:
                 time_ns[i], position_rad[i] = decode_joint(messages[i])
     return time_ns, position_rad
@@ -80,13 +80,13 @@ def _lengths(messages: Sequence[bytes]) -> Ints:
 
 
 def _runs(values: Ints) -> Iterator[slice]:
-    """Where equal ones stand behind each other."""
+    """Yield the slices of equal consecutive values."""
     ends = [*(np.flatnonzero(np.diff(values)) + 1).tolist(), values.size]
     yield from (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True) if a < b)
 
 
 def _alike(rows: Bytes, shared: Sequence[slice]) -> int:
-    """How many rows from the first one on have its bytes in some places."""
+    """Return the number of first rows with equal bytes in some places."""
     differs = np.zeros(len(rows), bool)
     for place in shared:
         differs |= (rows[:, place] != rows[0, place]).any(axis=1)

@@ -1,6 +1,5 @@
-"""Metadata of a recording, and its way through bags, which hold messages only.
+"""Metadata of a recording: a metadata record of MCAP, or a latched text message of JSON in a bag.
 
-MCAP: a metadata record. Bag: a latched text message of JSON, so that `import` knows whether the axis rested.
 Unusable input raises RecordingError.
 """
 
@@ -22,12 +21,12 @@ NOTE_TYPE: Final = "std_msgs/msg/String"
 
 
 def rests_in_scans(note: dict[str, str]) -> bool:
-    """Whether the motor stood still during each scan."""
+    """Whether the motor rested during each scan."""
     return note.get("hold") == "true"
 
 
 def note_in(bag: Bag) -> dict[str, str]:
-    """The note of a recording of ours, or of a bag that was made from one; empty for others."""
+    """Return the note of a recording, or of a bag exported from one; empty for others."""
     if bag.path.suffix == ".mcap" and bag.path.is_file() and (note := read_note(bag.path, NOTE)):
         return note
     if bag.topics.get(NOTE_TOPIC) != NOTE_TYPE:

@@ -1,16 +1,13 @@
-"""The project's recording: an MCAP file of ROS 2 messages that Foxglove and every ROS 2 reader opens.
+"""Recording: an MCAP file of ROS 2 messages.
 
-    /scan          sensor_msgs/msg/LaserScan    stamp = first beam; the rest as the sensor gave it
+    /scan          sensor_msgs/msg/LaserScan    stamp = first beam; the rest as sent by the sensor
     /joint_states  sensor_msgs/msg/JointState   `spin_joint`, radians, unwrapped
-    /scan_beams    sensor_msgs/msg/PointCloud2  of a sensor whose speed wanders, before its /scan and with the same
-                                                stamp, a row a beam: `bearing` [rad, float64], `offset` [ns, uint32]
+    /scan_beams    sensor_msgs/msg/PointCloud2  of a sensor with varying speed, before its /scan and with the same
+                                                stamp, a row per beam: `bearing` [rad, float64], `offset` [ns, uint32]
 
-Where there is a /scan_beams, the even grid of /scan is rounded for those who know no other: its first and last bearing
-and time are true. Reading takes the true ones.
-
-`log_time` is the stamp. A metadata record named `scanwright` says where the recording comes from.
-
-Input that cannot be used raises RecordingError.
+With a /scan_beams, the even grid of /scan is an approximation for other readers: only its first and last bearing and
+time are exact. `log_time` is the stamp. A metadata record named `scanwright` contains the origin of the recording.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -42,13 +39,13 @@ from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
 SCAN_TOPIC = "/scan"
 JOINT_TOPIC = "/joint_states"
 BEAMS_TOPIC = "/scan_beams"
-_AT_ONCE = 256  # messages that are held
+_AT_ONCE = 256  # messages in memory
 _BLOCK = 128  # scans, at most
 _TYPES = {SCAN_TOPIC: ros_messages.LASER_SCAN, JOINT_TOPIC: ros_messages.JOINT_STATE}
 
 
 class Sink(Protocol):
-    """What a recording is written to; files are."""
+    """Target of a recording, such as a file."""
 
     def write(self, data: bytes, /) -> int: ...  # noqa: D102
 
@@ -58,12 +55,9 @@ class Sink(Protocol):
 
 
 class MessageWriter:
-    """Scans and joint samples as messages on an open stream; `finish` closes the format, not the stream.
+    """Writer of scans and joint samples to an open stream, in the order of their times.
 
-    Write scans and joint samples in the order of their times, so that replaying needs no sorting.
-
-    Raises:
-        RecordingError: a time is one that ROS cannot hold (before 1970, after 2038).
+    RecordingError if a time does not fit a ROS time (before 1970, after 2038).
     """
 
     def __init__(
@@ -74,12 +68,9 @@ class MessageWriter:
         attached: Mapping[str, str],
         writer: type[Writer] = TimedChunks,
     ) -> None:
-        """Args as for `recording_writer`; `attached` holds files (name -> text) that explain the messages.
-
-        Chunks end by the messages' times; `writer` is a plain one where `flush` ends them.
-        """
+        """`attached`: files (name -> text); `writer`: `TimedChunks`, or a plain one if only `flush` ends chunks."""
         self._path = path
-        self._writer = writer(cast(Any, stream))  # it asks for no more than a Sink
+        self._writer = writer(cast(Any, stream))  # it requires only a Sink
         self._writer.start(profile="ros2", library="scanwright")
         self._writer.add_metadata(NOTE, dict(note))
         for name, text in attached.items():
@@ -101,7 +92,7 @@ class MessageWriter:
         self._add(JOINT_TOPIC, time_ns, ros_messages.encode_joint(time_ns, position_rad))
 
     def other(self, topic: str, message_type: str, time_ns: int, message: object) -> None:
-        """Append a message of another topic, of a type that comes with ROS 2."""
+        """Append a message of another topic, of a type of ROS 2."""
         self._check(time_ns)
         if topic not in self._channels:
             what = f"{self._path}: {topic}: {message_type} is no type that comes with ROS 2"
@@ -110,11 +101,11 @@ class MessageWriter:
         self._add(topic, time_ns, foreign(what, ros_messages.encode_message, message, message_type))
 
     def flush(self) -> None:
-        """Hand everything so far to the stream, in whole chunks."""
+        """Write all messages so far to the stream as a chunk."""
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def finish(self) -> None:
-        """Write the index: without it the recording counts as cut off."""
+        """Write the index, but do not close the stream."""
         self._writer.finish()  # type: ignore[no-untyped-call]
 
     def _channel(self, topic: str, message_type: str) -> int:
@@ -131,10 +122,7 @@ class MessageWriter:
 
 @contextmanager
 def recording_writer(path: Path, note: Mapping[str, str]) -> Iterator[MessageWriter]:
-    """Write a recording; the file appears under its name only when the body ends well.
-
-    `note` is kept with the recording: where it comes from, in words.
-    """
+    """Write a recording with a note of its origin; the file gets its name after the body ends without an error."""
     with atomic_write(path, RecordingError) as part, foreign(f"{path}: cannot write", part.open, "wb") as stream:
         messages = MessageWriter(stream, path, note, {})
         yield messages
@@ -143,15 +131,15 @@ def recording_writer(path: Path, note: Mapping[str, str]) -> Iterator[MessageWri
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """What one pass over a recording tells; the scans themselves stay in the file.
+    """An open recording; its scans stay in the file.
 
     Attributes:
-        path: the file.
-        joint_log: every sample of the spin joint.
-        beams: shape (scans,), number of beams in each scan.
-        stamp_ns: shape (scans,), time of the first beam of each scan.
-        has_intensity: whether any scan carries intensities.
-        at_rest: whether the motor stood still during each scan (`scanwright import --hold`).
+        path: of the file.
+        joint_log: all samples of the spin joint.
+        beams: number of beams of each scan.
+        stamp_ns: time of the first beam of each scan.
+        has_intensity: of any scan.
+        at_rest: whether the motor rested during each scan (`scanwright import --hold`).
     """
 
     path: Path
@@ -167,36 +155,36 @@ class Recording:
         return int(self.stamp_ns[0])
 
     def scans(self) -> Iterator[Scan]:
-        """The scans in the order of their times, one at a time."""
+        """Yield the scans in the order of their times."""
         beams: tuple[int, Beams] | None = None
         for topic, data in read_messages(self.path, {SCAN_TOPIC, BEAMS_TOPIC}):
             if topic == BEAMS_TOPIC:
                 beams = foreign(f"{self.path}: a message of {BEAMS_TOPIC}", ros_messages.decode_beams, data)
                 continue
-            scan = _decoded_scan(self.path, data)
+            scan = foreign(f"{self.path}: a message of {SCAN_TOPIC}", ros_messages.decode_scan, data)
             if beams is not None and beams[0] == scan.stamp_ns:
                 scan = replace(scan, beam_bearing_rad=beams[1][0], beam_offset_ns=beams[1][1])
             yield scan
 
     def blocks(self) -> Iterator[Block]:
-        """The same scans, many at once: a tenth of the time where they differ in nothing else."""
+        """Yield the same scans in blocks, ten times faster if they have one layout."""
         if BEAMS_TOPIC in read_topics(self.path):
             yield from blocks(self.scans(), _BLOCK)
             return
         messages = (data for _, data in read_messages(self.path, {SCAN_TOPIC}, summed=False))
         while some := list(islice(messages, _BLOCK)):
-            yield from _blocks_in(self.path, some)
+            yield from foreign(f"{self.path}: a message of {SCAN_TOPIC}", list[Block], blocks_in(some))
 
     def arrays(self) -> RecordingArrays:
-        """All of it in memory."""
+        """Read the entire recording."""
         return arrays_of(list(self.scans()), self.joint_log)
 
 
 def open_recording(path: Path) -> Recording:
-    """Read the joint log and the outline of the scans.
+    """Read the joint log and the outlines of the scans.
 
     Raises:
-        RecordingError: the file is missing, cut off, not MCAP, not of our topics and types, or empty.
+        RecordingError: the file is missing, cut off, not MCAP, empty, or has other topics or types.
     """
     _check_topics(path)
     logs: list[tuple[Times, Floats]] = []
@@ -206,7 +194,8 @@ def open_recording(path: Path) -> Recording:
     messages = read_messages(path, set(_TYPES))
     while some := list(islice(messages, _AT_ONCE)):
         logs.append(_joints_in(path, [data for topic, data in some if topic == JOINT_TOPIC]))
-        for outline in _outlines_in(path, [data for topic, data in some if topic == SCAN_TOPIC]):
+        outlines = outlines_in([data for topic, data in some if topic == SCAN_TOPIC])
+        for outline in foreign(f"{path}: a message of {SCAN_TOPIC}", list[ScanOutline], outlines):
             has_intensity |= outline.has_intensity
             stamps.append(outline.stamp_ns)
             beams += [outline.beams] * outline.stamp_ns.size
@@ -239,18 +228,6 @@ def _check_topics(path: Path) -> None:
             raise RecordingError(f"{path}: no topic {topic}{suggest(topic, types)} (`scanwright import` converts bags)")
         if types[topic] != message_type:
             raise RecordingError(f"{path}: {topic} is {types[topic]}, not {message_type}")
-
-
-def _decoded_scan(path: Path, data: bytes) -> Scan:
-    return foreign(f"{path}: a message of {SCAN_TOPIC}", ros_messages.decode_scan, data)
-
-
-def _blocks_in(path: Path, messages: list[bytes]) -> list[Block]:
-    return foreign(f"{path}: a message of {SCAN_TOPIC}", lambda: list(blocks_in(messages)))
-
-
-def _outlines_in(path: Path, messages: list[bytes]) -> list[ScanOutline]:
-    return foreign(f"{path}: a message of {SCAN_TOPIC}", lambda: list(outlines_in(messages)))
 
 
 def _joints_in(path: Path, messages: list[bytes]) -> tuple[Times, Floats]:

@@ -1,9 +1,4 @@
-"""Scans and joint samples as ROS 2 messages: pure bytes -> value functions for the two types that we record.
-
-And value -> bytes for what is made of them: points, frames, the description of the scanner.
-
-The layout is CDR as ROS 2 writes it; `rosbags` holds the message definitions of the ROS 2 releases.
-"""
+"""Encoding and decoding of ROS 2 messages in CDR; `rosbags` has the message definitions of the ROS 2 releases."""
 
 from __future__ import annotations
 
@@ -20,7 +15,7 @@ from numpy import ndarray
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
-from scanwright.design.arrays import Float32s, Floats, Pose, Times
+from scanwright.design.arrays import Floats, Pose, Times
 from scanwright.firmware_io.clouds.cloud import pose_numbers
 from scanwright.firmware_io.samples import Scan, chosen_echo
 
@@ -48,13 +43,13 @@ def _store() -> Any:
 
 
 def definition(message_type: str) -> str:
-    """Text of a message type with every type inside it, as MCAP's `ros2msg` schemas want it."""
+    """Return the text of a message type with all nested types, for a `ros2msg` schema of MCAP."""
     text: str = _store().generate_msgdef(message_type, ros_version=2)[0]
     return text
 
 
 def encode_scan(scan: Scan) -> bytes:
-    """One `sensor_msgs/msg/LaserScan` in CDR."""
+    """Encode a `sensor_msgs/msg/LaserScan`."""
     beams = scan.range_m.size
     message = _store().types[LASER_SCAN](
         header=_header(scan.stamp_ns, LASER_FRAME),
@@ -72,21 +67,21 @@ def encode_scan(scan: Scan) -> bytes:
 
 
 class ScanPlaces(NamedTuple):
-    """Where a LaserScan in CDR has its numbers."""
+    """Places of the numbers of a LaserScan."""
 
     order: str  # of the bytes, for `struct`
-    numbers: slice  # the seven that all beams share
+    numbers: slice  # the seven of all beams
     ranges: slice  # float32 each
-    intensities: slice  # the same; empty if they do not match the ranges one by one and say nothing about a beam
-    shared: tuple[slice, ...]  # what messages have in common that differ in time and measurement only
+    intensities: slice  # the same; empty if their number differs from that of the ranges
+    shared: tuple[slice, ...]  # equal bytes of messages that differ in time and measurement only
 
     @classmethod
     def of(cls, data: bytes) -> ScanPlaces:
-        """Those of a message; ValueError, or that of `struct`, where it is cut off."""
+        """Find them in a message; ValueError or `struct.error` if it is cut off."""
         order, _, at = _cdr_header(data)
         ranges = _floats(data, order, at + 28)
         intensities = _floats(data, order, ranges.stop)
-        # of the seven the largest bearing says nothing new, and the time from scan to scan may wander
+        # of the seven, the largest bearing is redundant, and the time between scans may vary
         shared = slice(1, 2), slice(12, at + 4), slice(at + 8, at + 16), slice(at + 20, ranges.start)
         lit = slice(intensities.start - 4, intensities.start)
         if intensities.stop - intensities.start != ranges.stop - ranges.start:
@@ -95,7 +90,7 @@ class ScanPlaces(NamedTuple):
 
 
 def decode_scan(data: bytes) -> Scan:
-    """Inverse of `encode_scan`, for any CDR LaserScan."""
+    """Decode any LaserScan."""
     places = ScanPlaces.of(data)
     numbers = struct.unpack_from(f"{places.order}7f", data, places.numbers.start)
     return Scan(
@@ -112,10 +107,7 @@ def decode_scan(data: bytes) -> Scan:
 
 
 def scan_from_message(message: Any, first_beam_ns: int) -> Scan:
-    """The scan inside a decoded LaserScan of any ROS version.
-
-    Intensities that do not match the ranges one by one say nothing about a beam and are not taken.
-    """
+    """Convert a decoded LaserScan of any ROS version; intensities are dropped if their number differs."""
     ranges = np.asarray(message.ranges, np.float32)
     intensities = np.asarray(message.intensities, np.float32)
     return Scan(
@@ -127,7 +119,7 @@ def scan_from_message(message: Any, first_beam_ns: int) -> Scan:
         range_min_m=float(message.range_min),
         range_max_m=float(message.range_max),
         range_m=ranges,
-        intensity=_one_by_one(intensities, ranges),
+        intensity=intensities if intensities.size == ranges.size else np.empty(0, np.float32),
     )
 
 
@@ -144,9 +136,9 @@ def echo_arrays(message: Any) -> tuple[Float[ndarray, "rays echoes"], Float[ndar
 
 
 def single_echo(message: Any, echo: str) -> Any:
-    """Return a MultiEchoLaserScan as a LaserScan of its first, last or strongest echoes.
+    """Convert a MultiEchoLaserScan to a LaserScan of its first, last or strongest echoes.
 
-    Of all it has the first, and `echo_arrays` as a further field `echoes`.
+    With `all` it has the first ones, and `echo_arrays` as a further field `echoes`.
     """
     range_m, intensity = echo_arrays(message)
     which = chosen_echo(range_m, intensity, echo)[:, np.newaxis]
@@ -160,7 +152,7 @@ def single_echo(message: Any, echo: str) -> Any:
 
 
 def encode_joint(time_ns: int, position_rad: float) -> bytes:
-    """One `sensor_msgs/msg/JointState` of the spin joint in CDR."""
+    """Encode a `sensor_msgs/msg/JointState` of the spin joint."""
     message = _store().types[JOINT_STATE](
         header=_header(time_ns, ""),
         name=[SPIN_JOINT],
@@ -172,7 +164,7 @@ def encode_joint(time_ns: int, position_rad: float) -> bytes:
 
 
 def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
-    """One `sensor_msgs/msg/PointCloud2` in CDR, a row of the cloud for each row of the structured array."""
+    """Encode a `sensor_msgs/msg/PointCloud2` of a structured array."""
     types = _store().types
     fields = [
         types["sensor_msgs/msg/PointField"](
@@ -195,23 +187,19 @@ def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
 
 
 def encode_beams(scan: Scan) -> bytes:
-    """Bearings and times of the beams of a scan that has its own, as a `sensor_msgs/msg/PointCloud2` in CDR."""
+    """Encode the bearings and times of the beams of a scan as a `sensor_msgs/msg/PointCloud2`."""
     rows = np.zeros(scan.range_m.size, _BEAM)
     rows["bearing"], rows["offset"] = scan.bearing_rad, scan.time_ns - scan.stamp_ns
     return encode_points(rows, LASER_FRAME, scan.stamp_ns)
 
 
 def decode_beams(data: bytes) -> tuple[int, Beams]:
-    """Stamp [ns], bearings [rad] and times after the stamp [ns] in what `encode_beams` writes.
-
-    Raises:
-        ValueError: its rows are of something else.
-    """
+    """Return stamp [ns] and beams of a message of `encode_beams`; ValueError if it has other fields."""
     return beams_in(decode_message(data, POINT_CLOUD))
 
 
 def beams_in(message: Any) -> tuple[int, Beams]:
-    """The same of a message that is decoded already; raises as `decode_beams`."""
+    """Return stamp [ns] and beams of a decoded message; raises as `decode_beams`."""
     if [(field.name, field.offset, field.datatype) for field in message.fields] != _BEAM_FIELDS:
         raise ValueError("rows that are no beams")
     rows = np.frombuffer(message.data.tobytes(), _BEAM)
@@ -219,7 +207,7 @@ def beams_in(message: Any) -> tuple[int, Beams]:
 
 
 def encode_transforms(poses: Iterable[tuple[str, str, Pose]], time_ns: int) -> bytes:
-    """One `tf2_msgs/msg/TFMessage` in CDR of parent, child and `T_parent_child`, shape (4, 4)."""
+    """Encode a `tf2_msgs/msg/TFMessage` of parent, child and `T_parent_child`, shape (4, 4)."""
     types = _store().types
     shared = []
     for parent, child, T in poses:
@@ -237,20 +225,20 @@ def encode_transforms(poses: Iterable[tuple[str, str, Pose]], time_ns: int) -> b
 
 
 def encode_text(text: str) -> bytes:
-    """One `std_msgs/msg/String` in CDR."""
+    """Encode a `std_msgs/msg/String`."""
     return bytes(_store().serialize_cdr(_store().types[TEXT](data=text), TEXT))
 
 
 class JointPlaces(NamedTuple):
-    """Where a JointState in CDR has the position of the spin joint."""
+    """Place of the position of the spin joint in a JointState."""
 
     order: str  # of the bytes, for `struct`
     position: slice  # float64
-    shared: tuple[slice, ...]  # what messages have in common that name the same joints
+    shared: tuple[slice, ...]  # equal bytes of messages with the same joints
 
     @classmethod
     def of(cls, data: bytes) -> JointPlaces | None:
-        """Those of a message, None if it tells no position of the joint; errors as of `ScanPlaces`."""
+        """Find it in a message; None without a position of the joint; raises as `ScanPlaces.of`."""
         order, _, at = _cdr_header(data)
         (count,) = struct.unpack_from(f"{order}I", data, at)
         at += 4
@@ -270,7 +258,7 @@ class JointPlaces(NamedTuple):
 
 
 def decode_joint(data: bytes) -> tuple[int, float]:
-    """Time [ns] and position [rad] of the spin joint in a CDR JointState; NaN if it does not name the joint."""
+    """Return time [ns] and position [rad] of the spin joint in a JointState; NaN without it."""
     places, time_ns = JointPlaces.of(data), _cdr_header(data)[1]
     if places is None:
         return time_ns, math.nan
@@ -278,17 +266,17 @@ def decode_joint(data: bytes) -> tuple[int, float]:
 
 
 def decode_message(data: bytes, message_type: str) -> Any:
-    """Any message of a type that comes with ROS 2, from CDR."""
+    """Decode a message of any type of ROS 2."""
     return _store().deserialize_cdr(data, message_type)
 
 
 def encode_message(message: object, message_type: str) -> bytes:
-    """Inverse of `decode_message`, for a message of any ROS version."""
+    """Encode a decoded message of any ROS version."""
     return bytes(_store().serialize_cdr(message, message_type))
 
 
 def stamp_ns(stamp: Any) -> int:
-    """A ROS time as integer nanoseconds."""
+    """Return a ROS time as integer nanoseconds."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
@@ -299,9 +287,9 @@ def _header(time_ns: int, frame_id: str) -> Any:
 
 
 def _cdr_header(data: bytes) -> tuple[str, int, int]:
-    """Byte order of a message for `struct`, time [ns] of the std_msgs/Header it begins with, and where that ends."""
-    # 4 bytes of encapsulation (the second one tells the byte order); alignment counts from behind them, so does not
-    # change modulo 4, and modulo 8 only by `_aligned`
+    """Return the byte order of a message for `struct`, and time [ns] and end of its std_msgs/Header."""
+    # 4 bytes of encapsulation (the second one has the byte order); alignment counts from their end, which is the same
+    # modulo 4, but not modulo 8: see `_aligned`
     order = "<" if data[1] & 1 else ">"
     seconds, nanoseconds = struct.unpack_from(f"{order}iI", data, 4)
     _, at = _cdr_string(data, order, 12)
@@ -309,7 +297,7 @@ def _cdr_header(data: bytes) -> tuple[str, int, int]:
 
 
 def _cdr_string(data: bytes, order: str, at: int) -> tuple[bytes, int]:
-    """A string without its closing zero, and where it ends."""
+    """Return a string without its closing zero, and its end."""
     at = _aligned(at, 4)
     (size,) = struct.unpack_from(f"{order}I", data, at)
     if at + 4 + size > len(data):
@@ -318,7 +306,7 @@ def _cdr_string(data: bytes, order: str, at: int) -> tuple[bytes, int]:
 
 
 def _floats(data: bytes, order: str, at: int) -> slice:
-    """Where the numbers of a sequence of float32 stand."""
+    """Return the place of the numbers of a sequence of float32."""
     (count,) = struct.unpack_from(f"{order}I", data, at)
     if at + 4 + 4 * count > len(data):
         raise ValueError(f"{count} numbers in a message of {len(data)} bytes")
@@ -327,7 +315,3 @@ def _floats(data: bytes, order: str, at: int) -> slice:
 
 def _aligned(at: int, size: int) -> int:
     return at + (4 - at) % size
-
-
-def _one_by_one(intensities: Float32s, ranges: Float32s) -> Float32s:
-    return intensities if intensities.size == ranges.size else np.empty(0, np.float32)

@@ -1,1 +1,1 @@
-"""Clouds of several stands become one map: thin, start, align, graph, merge, picture."""
+"""Registration of clouds from several scan positions to one map."""

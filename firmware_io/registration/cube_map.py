@@ -1,4 +1,4 @@
-"""Directions sorted into the cells of a cube map: what a scanner saw where, looked up in constant time.
+"""Cube map of directions, to look up in constant time what a scanner measured in a direction.
 
 The faces are cut evenly in angle (the tangent warp), so that the solid angles of the cells differ by a third at most.
 """
@@ -18,7 +18,7 @@ from scanwright.design.arrays import Floats
 
 @njit(cache=True)
 def cells_of(points_m: Floats, side: int) -> NDArray[np.int32]:
-    """Cell of each point as seen from the origin, shape (n,); the map has `6 * side * side` cells."""
+    """Return the cell of the direction from the origin to each point, (n,), of `6 * side * side` cells."""
     cells = np.empty(points_m.shape[0], np.int32)
     for i in range(points_m.shape[0]):
         x, y, z = points_m[i, 0], points_m[i, 1], points_m[i, 2]
@@ -36,7 +36,7 @@ def cells_of(points_m: Floats, side: int) -> NDArray[np.int32]:
 
 
 def solid_angles_sr(side: int) -> Float64[ndarray, " cells"]:
-    """Solid angle of every cell, shape (6 * side * side,): exact, from the four corners."""
+    """Return the exact solid angle of every cell, shape (6 * side * side,)."""
     edge = np.tan(np.linspace(-np.pi / 4, np.pi / 4, side + 1))
     u, v = np.meshgrid(edge, edge)
     corner = np.arctan2(u * v, np.sqrt(u**2 + v**2 + 1))
@@ -46,7 +46,7 @@ def solid_angles_sr(side: int) -> Float64[ndarray, " cells"]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthMap:
-    """The nearest and the farthest surface that a scanner saw, in maps of shape (6 * side * side,)."""
+    """Ranges to the nearest and the farthest surface that a scanner measured, shape (6 * side * side,) each."""
 
     side: int  # cells along an edge of the cube
     # of a cell and its neighbours, since the range changes much within a cell on a slanted surface; +inf if none
@@ -55,7 +55,7 @@ class DepthMap:
 
 
 def depth_map(points_m: Float64[ndarray, "n 3"], side: int) -> DepthMap:
-    """What the scanner at the origin saw of points of shape (n, 3)."""
+    """Return the depth map of points, shape (n, 3), as measured by a scanner at the origin."""
     near, far = _extremes(points_m, cells_of(points_m, side), 6 * side * side)
     step = np.pi / 2 / side
     shifts = [(du, dv) for du in (-step, 0.0, step) for dv in (-step, 0.0, step)]
@@ -63,7 +63,7 @@ def depth_map(points_m: Float64[ndarray, "n 3"], side: int) -> DepthMap:
 
 
 def _centres(side: int, du_rad: float, dv_rad: float) -> Float64[ndarray, "cells 3"]:
-    """A point in the direction of the centre of every cell, moved along its face; past the edge, on the next face."""
+    """Return a point in the direction of every cell's centre, moved along its face, beyond an edge on the next face."""
     middle = (np.arange(side) + 0.5) / side * np.pi / 2 - np.pi / 4
     u, v = np.meshgrid(np.tan(middle + du_rad), np.tan(middle + dv_rad))
     faces = [np.roll([np.full_like(u, end), u, v], axis, 0) for axis in range(3) for end in (1.0, -1.0)]

@@ -1,8 +1,8 @@
-"""Poses of all stands from the pairs between them: least squares on SE(3), with the covariance of every pose.
+"""Pose graph of all scan positions: least squares on SE(3), with the covariance of every pose.
 
 A small motion (rotation vector w, translation v) acts on the right: T + (w, v) = (R exp(w), t + R v). The stated
-covariances of the pairs are those of their noise; where pairs contradict each other by more, all are scaled up by the
-same factor, and an outlier is left out.
+covariances of the pairs are those of their noise; if pairs contradict each other by more, all are scaled up by the
+same factor, and outliers are left out.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from scipy.spatial.transform import Rotation
 from scanwright.design import frames
 from scanwright.design.arrays import Pose
 
-_MAX_STEPS = 30  # of Gauss-Newton: an end to a graph that does not settle
+_MAX_STEPS = 30  # of Gauss-Newton
 _SETTLED = 1e-9  # rad and m: far below the noise of any pose
-_OUTLIER = 36.0  # times the median of what the edges are off by, in squared sigmas: 6 sigma
+_OUTLIER = 36.0  # times the median squared error of the edges, in squared sigmas: 6 sigma
 _MEDIAN_CHI2 = 5.35  # of six degrees of freedom
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edge:
-    """Pose `j` seen from pose `i`, `T_i_j`, and the covariance (6, 6) of a small motion on its right."""
+    """Pose `j` in the frame of pose `i`, `T_i_j`, and the covariance (6, 6) of a small motion on its right."""
 
     i: int
     j: int
@@ -41,11 +41,11 @@ class Graph:
     T_world: Float64[ndarray, "n 4 4"]  # shape (n, 4, 4)
     covariance: Float64[ndarray, "n 6 6"]  # shape (n, 6, 6), zero for the first, which is held
     left_out: tuple[Edge, ...]  # edges that contradict all others
-    scale: float  # by how much the stated sigmas of the edges had to grow, at least 1
+    scale: float  # factor on the stated sigmas of the edges for them to agree, at least 1
 
 
 def solve_graph(T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]) -> Graph:
-    """Least squares from a start of shape (n, 4, 4); the first pose is held.
+    """Return the least-squares poses from start poses of shape (n, 4, 4); the first pose is held.
 
     Raises:
         ValueError: the edges do not connect all poses.
@@ -78,7 +78,7 @@ def connected(count: int, edges: Sequence[Edge]) -> bool:
 def _least_squares(
     T_world: Float64[ndarray, "n 4 4"], edges: Sequence[Edge]
 ) -> tuple[Float64[ndarray, "n 4 4"], Float64[ndarray, "n 6 6"], Float64[ndarray, " edges"]]:
-    """Gauss-Newton; poses, their covariances, and the squared residual of each edge in sigmas."""
+    """Return poses by Gauss-Newton, their covariances, and the squared residual of each edge in sigmas."""
     poses, n = T_world.copy(), len(T_world)
     information = [np.linalg.inv(edge.covariance) for edge in edges]
     for _ in range(_MAX_STEPS):
@@ -108,7 +108,7 @@ def _least_squares(
 def _residual(
     T_i: Pose, T_j: Pose, T_i_j: Pose
 ) -> tuple[Float64[ndarray, " 6"], Float64[ndarray, "6 6"], Float64[ndarray, "6 6"]]:
-    """What edge and poses differ by, shape (6,), and its derivatives by small motions of both poses, shape (6, 6)."""
+    """Return the difference of edge and poses, (6,), and its derivatives by small motions of both, (6, 6) each."""
     seen = np.linalg.inv(T_i) @ T_j
     R, u = T_i_j[:3, :3].T, seen[:3, 3]
     turned = R @ seen[:3, :3]

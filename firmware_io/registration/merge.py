@@ -1,4 +1,4 @@
-"""Registered clouds as one map: every voxel one point, the mean of all that fell into it."""
+"""Merging of registered clouds to one map: the mean point of each voxel."""
 
 from __future__ import annotations
 
@@ -16,14 +16,9 @@ _SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 
 
 def merge(clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"], spacing_m: float) -> Cloud:
-    """The map in the world.
+    """Return the map in the world frame: one point for each voxel with an edge of `spacing_m`.
 
-    Its columns: `count`, the number of points in a row, and the mean `intensity` if every cloud has one.
-
-    Args:
-        clouds: at least one point in all.
-        T_world: their poses, shape (n, 4, 4).
-        spacing_m: edge of the voxels.
+    Its columns are `count`, the number of points of the voxel, and the mean `intensity` if every cloud has one.
     """
     bright = all("intensity" in cloud.columns for cloud in clouds)
     means, counts = [], []

@@ -1,4 +1,4 @@
-"""What overlaps what: the map from above, a colour for each cloud, and the table of pairs."""
+"""Picture of a registration: the map from above, a colour for each cloud, and the overlap of all pairs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SHOWN_PERCENT = (0.5, 99.5)
 
 
 def overlap_picture(png: Path, views: Sequence[SensorView], registration: Registration) -> None:
-    """Draw a session that found all its poses."""
+    """Draw a complete registration."""
     colours = colormaps["turbo"](np.linspace(0.05, 0.95, len(views)))
     figure = Figure(figsize=(12, 6.5), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
@@ -34,7 +34,7 @@ def overlap_picture(png: Path, views: Sequence[SensorView], registration: Regist
     low, high = np.percentile(np.concatenate(placed)[:, :2], _SHOWN_PERCENT, axis=0)
     margin = 0.05 * (high - low).max()
     above.set(
-        title="from above, circles are the stands",
+        title="from above, circles are the scan positions",
         xlabel="x [m]",
         ylabel="y [m]",
         aspect="equal",

@@ -1,6 +1,6 @@
-"""Poses of clouds as TUM lines (`time x y z qx qy qz qw`, s and m), their covariances as a table beside them.
+"""Files of the poses of clouds: TUM lines (`time x y z qx qy qz qw`, s and m), and a table of their covariances.
 
-Input that cannot be used raises RecordingError.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _AXES = ("rx", "ry", "rz", "x", "y", "z")
 
 
 def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"]) -> None:
-    """One line for each cloud, in their order; the time is the cloud's start, or its number where that is unknown."""
+    """Write one line for each cloud, in order; its time is the cloud's start, or its number if that is unknown."""
     lines = ["# time x y z qx qy qz qw"]
     for number, (name, cloud, T) in enumerate(zip(names, clouds, T_world, strict=True)):
         time = str(number) if cloud.start_ns is None else f"{cloud.start_ns // 10**9}.{cloud.start_ns % 10**9:09d}"
@@ -33,7 +33,7 @@ def write_poses(path: Path, names: Sequence[str], clouds: Sequence[Cloud], T_wor
 
 
 def write_covariances(path: Path, names: Sequence[str], covariance: Float64[ndarray, "n 6 6"]) -> None:
-    """One row for each cloud: the upper triangle for a small motion (rotation vector w [rad], translation v [m]).
+    """Write the upper triangle for each cloud, for a small motion (rotation vector w [rad], translation v [m]).
 
     It is in the frame of the cloud, on the right of its pose: T + (w, v) = (R exp(w), t + R v).
     """
@@ -46,7 +46,7 @@ def write_covariances(path: Path, names: Sequence[str], covariance: Float64[ndar
 
 
 def cloud_names(clouds: Sequence[tuple[Path, int]]) -> list[str]:
-    """What clouds are called, by their files and how many each of these holds: no name is two clouds'."""
+    """Return unique names of clouds from their files and the number of clouds in each."""
     names = []
     for path, count in clouds:
         names += [path.stem] if count == 1 else [f"{path.stem}_{k}" for k in range(1, count + 1)]
@@ -56,7 +56,7 @@ def cloud_names(clouds: Sequence[tuple[Path, int]]) -> list[str]:
 
 
 def read_poses(path: Path, names: Sequence[str]) -> list[Pose]:
-    """Poses of clouds, one TUM line for each: by the names in the comments above the lines, or in the clouds' order."""
+    """Read one TUM line for each cloud: by the names in the comments above the lines, else in the clouds' order."""
     text = foreign(f"{path}: cannot read", read_text, path)
     lines, notes = [], []
     above = ""

@@ -1,4 +1,4 @@
-"""All stands of a session in one frame: a first chain of pairs, then every pair that overlaps, then the graph."""
+"""All scan positions of a session in one frame: a chain of pairs, then all overlapping pairs, then the graph."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from scanwright.firmware_io.registration.sensor_view import SensorView
 from scanwright.firmware_io.registration.start import find_start
 
 _LOG = logging.getLogger(__name__)
-_WORTH = 0.35  # near share of a pair worth a try: it counts neighbours within a metre, so it is well above the overlap
+_WORTH = 0.35  # near share of a pair worth a try: with neighbours within 1 m, well above the overlap
 _ROUNDS = 3  # a closed loop moves poses, which may bring more pairs into reach
-_START_OFF_M, _START_OFF_SHARE = 2.0, 0.3  # of the way between two starts: more than wheels and compass are off by
+_START_OFF_M, _START_OFF_SHARE = 2.0, 0.3  # of the distance of two starts: above the error of odometry and compass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """What became of a session.
+    """Result of the registration of a session.
 
     Attributes:
         T_world: pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined.
         covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (n, 6, 6).
-        pairs: every pair that was tried, the believed ones first.
-        conflicts: pairs that the poses lay on each other although one of the two scanners looked through the other's
-            points, if some cloud has more of them than half its believed pairs; else empty.
-        scale: by how much the stated sigmas of the pairs had to grow for them to agree, at least 1.
+        pairs: all tried pairs, the accepted ones first.
+        conflicts: pairs that overlap although one of the two scanners measured the space of the other's points to be
+            free, if some cloud has more of them than half its accepted pairs; else empty.
+        scale: factor on the stated sigmas of the pairs for them to agree, at least 1.
     """
 
     T_world: Float64[ndarray, "n 4 4"]
@@ -53,7 +53,7 @@ class Registration:
 
     @property
     def complete(self) -> bool:
-        """Whether every cloud found its place, and no two places contradict each other."""
+        """Whether every cloud has a pose, and no two poses contradict each other."""
         return bool(np.isfinite(self.T_world).all()) and not self.conflicts
 
 
@@ -62,7 +62,7 @@ def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Prog
 
     Args:
         views: the clouds; the frame of the first one becomes the world, unless its pose is given.
-        starts: start poses in the world, one for each view, shape (4, 4) each; empty if unknown.
+        starts: start poses in the world, one for each view; empty if unknown.
         progress: callback.
     """
     pairs: dict[tuple[int, int], Pair] = {}
@@ -91,9 +91,9 @@ def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Prog
 def _conflicts(
     views: Sequence[SensorView], poses: dict[int, Floats], pairs: dict[tuple[int, int], Pair]
 ) -> tuple[Pair, ...]:
-    """Places that look alike join to a chain in which every link is good; what gives it away is who sees through whom.
+    """Find clouds at a wrong place that looks alike, by contradictions outside the chain of good pairs.
 
-    People and doors move, so one pair proves nothing: the pairs of a cloud vote.
+    People and doors move, so one pair is no proof: the pairs of a cloud vote.
     """
     conflicts, votes = [], np.zeros(len(views), int)
     for i, j in combinations(sorted(poses), 2):
@@ -113,7 +113,7 @@ def _chain(
     pairs: dict[tuple[int, int], Pair],
     progress: Progress,
 ) -> dict[int, Floats]:
-    """A first pose for every cloud that can be joined to one that has a pose; neighbours in the row are tried first."""
+    """Return a first pose for every cloud that can be joined to the first; neighbours in the list are tried first."""
     poses = {0: starts[0] if starts else np.eye(4)}
     while joined := _next_joined(views, starts, poses, pairs, progress):
         poses.update(joined)
@@ -127,7 +127,7 @@ def _next_joined(
     pairs: dict[tuple[int, int], Pair],
     progress: Progress,
 ) -> dict[int, Floats]:
-    """One more cloud and its pose; nothing when no pair is left to try."""
+    """Return the index and pose of one more cloud; empty if all pairs were tried."""
     missing = [k for k in range(len(views)) if k not in poses]
     untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
     for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
@@ -142,7 +142,7 @@ def _next_joined(
 
 
 def _pair(a: SensorView, b: SensorView, starts: Sequence[Floats]) -> Pair:
-    """From the given poses if they lead anywhere, else from none; never far from what the given poses say."""
+    """Align from the given poses, else without a start; a result far from the given poses is refused."""
     if not starts:
         return find_start(a, b)
     T_a_b = np.linalg.inv(starts[0]) @ starts[1]
@@ -151,25 +151,25 @@ def _pair(a: SensorView, b: SensorView, starts: Sequence[Floats]) -> Pair:
 
 
 def _near_start(pair: Pair, T_a_b: Pose) -> Pair:
-    """The pair, refused if it is far from its start: another room, or another door of a corridor, may fit as well."""
-    way_m = float(np.linalg.norm(T_a_b[:3, 3]))
+    """Refuse the pair if it is far from its start: another room, or another door of a corridor, may fit as well."""
+    distance_m = float(np.linalg.norm(T_a_b[:3, 3]))
     off_m = float(np.linalg.norm(pair.T_a_b[:3, 3] - T_a_b[:3, 3]))
-    if pair.why_not or way_m == 0 or off_m <= _START_OFF_M + _START_OFF_SHARE * way_m:
-        return pair  # clouds at the same start have none: the files of many programs hold (0, 0, 0)
+    if pair.why_not or distance_m == 0 or off_m <= _START_OFF_M + _START_OFF_SHARE * distance_m:
+        return pair  # equal starts are unknown ones: the files of many programs hold (0, 0, 0)
     return refused(pair, f"it lies {off_m:.1f} m from the start that was given")
 
 
 def _in_reach(views: Sequence[SensorView], poses: dict[int, Floats], i: int, j: int) -> bool:
-    """Whether enough of both clouds may lie on each other to be worth a try."""
+    """Whether the two clouds may overlap enough to be aligned."""
     return near_share(views[i], views[j], np.linalg.inv(poses[i]) @ poses[j]) > _WORTH
 
 
 def _solve(order: Sequence[int], poses: dict[int, Floats], pairs: dict[tuple[int, int], Pair]) -> Graph:
-    """Solve the graph of the believed pairs; those that it throws out are marked in `pairs`."""
+    """Solve the graph of the accepted pairs; outliers are refused in `pairs`."""
     row = {k: position for position, k in enumerate(order)}
     edges = [Edge(row[i], row[j], pair.T_a_b, pair.covariance) for (i, j), pair in pairs.items() if not pair.why_not]
     graph = solve_graph(np.array([poses[k] for k in order]), edges)
     for edge in graph.left_out:
         i, j = order[edge.i], order[edge.j]
-        pairs[i, j] = refused(pairs[i, j], "it contradicts what all other pairs say")
+        pairs[i, j] = refused(pairs[i, j], "it contradicts all other pairs")
     return graph

@@ -1,4 +1,4 @@
-"""`scanwright register`: files of clouds become poses, a map and a picture, or the word why they do not."""
+"""`scanwright register`: poses, a map and a picture from files of clouds, or the reasons why there are none."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from scanwright.firmware_io.registration.sensor_view import make_view
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegisteredFiles:
-    """What became of `register_files`.
+    """Result of `register_files`.
 
     Attributes:
         names: of the clouds.
         registration: their poses and pairs.
-        points: of the map; 0 if there is none, since a cloud found no place.
+        points: of the map; 0 if there is none, since the registration is not complete.
         wrote: all files.
-        notes: what the files could not hold, or what was not read.
+        notes: data that the files cannot hold, or that were not read.
     """
 
     names: tuple[str, ...]
@@ -41,16 +41,16 @@ class RegisteredFiles:
 
     @property
     def complete(self) -> bool:
-        """Whether every cloud found its place; else nothing was written."""
+        """Whether every cloud has a consistent pose; else nothing was written."""
         return self.registration.complete
 
     @property
     def refused(self) -> list[Pair]:
-        """The pairs that were not believed."""
+        """The pairs that are not used."""
         return [pair for pair in self.registration.pairs if pair.why_not]
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Return the result as lines of text."""
         lines = [f"note: {line}" for line in self.notes]
         for pair in self.registration.pairs:
             if not pair.why_not:
@@ -62,9 +62,9 @@ class RegisteredFiles:
             if lost:
                 return [*lines, f"no place was found for {', '.join(lost)}: nothing is written"]
             for pair in self.registration.conflicts:
-                through = f"{pair.contradiction:.0%} of the points hang where the other scanner looked through"
                 lines.append(
-                    f"{pair.a} - {pair.b}: would lie on each other ({pair.overlap:.0%} overlap), but {through}"
+                    f"{pair.a} - {pair.b}: overlap by {pair.overlap:.0%}, but {pair.contradiction:.0%} of the points "
+                    "are in space that the other scanner measured to be free"
                 )
             remedy = "places look alike here: give initial poses, or clouds from places in between"
             return [*lines, f"the poses contradict each other: nothing is written; {remedy}"]
@@ -87,7 +87,7 @@ def register_files(
     scanner: AngleSet | None,
     progress: Progress = no_progress,
 ) -> RegisteredFiles:
-    """Register clouds, write map, poses, covariances and picture; nothing at all unless every cloud found its place.
+    """Register clouds; write map, poses, covariances and picture if the registration is complete.
 
     Args:
         paths: files of clouds, at least two clouds in all.
@@ -97,8 +97,8 @@ def register_files(
             in the files, if there are any, are the start.
         spacing_m: between the points that are registered.
         map_spacing_m: edge of the voxels of the map.
-        scanner: angle set that all clouds were assembled with: what its covariance means for the poses is part of
-            theirs. None takes the calibration to be right.
+        scanner: angle set that all clouds were assembled with, whose covariance enters those of the poses. None takes
+            the calibration as exact.
         progress: callback.
 
     Raises:

@@ -1,6 +1,6 @@
-"""A cloud made ready to be registered: thinned at two scales, with normals, and what its scanner saw where.
+"""A cloud prepared for registration: thinned at two scales, with normals and the depth map of its scanner.
 
-Input that cannot be used raises RecordingError.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from scanwright.firmware_io.registration.thin import beam_step_rad, thin, voxel_
 THREADS = os.cpu_count() or 1  # all processors
 _NEIGHBOURS = 10  # more of them round off corners: benchmarks/firmware_io/registration.py
 _COARSE = 4  # times the spacing
-_MIN_POINTS = 200  # fewer make no surfaces to register
-_DEPTH_SIDE = 30  # cells of 3 deg: finer ones take mixed pixels at edges, and gaps between lines, for contradictions
+_MIN_POINTS = 200  # too few for surfaces below
+_DEPTH_SIDE = 30  # cells of 3 deg: in finer ones mixed pixels at edges, and gaps between lines, become contradictions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Level:
-    """Points at one scale, as small_gicp takes them."""
+    """Points at one scale, for small_gicp."""
 
     points_m: Float64[ndarray, "n 3"]  # shape (n, 3)
     normals: Float64[ndarray, "n 3"]  # unit, towards the scanner, shape (n, 3); zero if the neighbours give none
@@ -38,14 +38,14 @@ class Level:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorView:
-    """The view of one stand, in the frame of its scanner, whose optical centre is the origin."""
+    """The data of one scan position, in the frame of its scanner, with the origin in the optical centre."""
 
     name: str  # for messages
     spacing_m: float  # edge of the finest voxels
     fine: Level  # points about `spacing_m` apart
     coarse: Level  # points about four times as far apart
-    depth: DepthMap  # how far the scanner saw in each direction
-    beams: Beams  # everything, as it was measured
+    depth: DepthMap
+    beams: Beams  # all measurements
 
 
 def make_view(
@@ -55,14 +55,14 @@ def make_view(
     scanner: AngleSet | None = None,
     joint_rad: Float64[ndarray, " n"] | None = None,
 ) -> SensorView:
-    """Make a cloud ready.
+    """Prepare a cloud for registration.
 
     Args:
         name: for messages.
         points_m: shape (n, 3), in the order in which they were measured; rows with NaN are left out.
         spacing_m: edge of the finest voxels.
-        scanner: angle set that the cloud was assembled with, if its covariance is to count.
-        joint_rad: angle of the axis at each point, shape (n,), where `scanner` is given.
+        scanner: angle set that the cloud was assembled with, if its covariance is used.
+        joint_rad: angle of the axis at each point, shape (n,), if `scanner` is given.
     """
     points_m = np.ascontiguousarray(points_m, float)
     finite = np.isfinite(points_m).all(axis=1)
@@ -73,7 +73,7 @@ def make_view(
     thinned = thin(voxels_m, counts, spacing_m, beam_step_rad(points_m)) if len(points_m) > 1 else points_m
     if len(thinned) < _MIN_POINTS:
         raise RecordingError(
-            f"{name}: {len(thinned)} points {spacing_m:g} m apart: registering takes {_MIN_POINTS} at least"
+            f"{name}: {len(thinned)} points {spacing_m:g} m apart: register needs at least {_MIN_POINTS}"
         )
     coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m)
     beams = _beams(points_m, voxels_m, counts, joint_rad, scanner)
@@ -81,7 +81,7 @@ def make_view(
 
 
 def make_level(points_m: Float64[ndarray, "n 3"]) -> Level:
-    """Points of one view with their normals."""
+    """Return points with normals and a search tree."""
     cloud = small_gicp.PointCloud(points_m)
     tree = small_gicp.KdTree(cloud, num_threads=THREADS)
     small_gicp.estimate_normals_covariances(cloud, tree, _NEIGHBOURS, THREADS)
@@ -96,11 +96,11 @@ def _joints(
     if scanner is None:
         return np.empty(0)
     if scanner.covariance is None:
-        raise RecordingError("the angle set states no covariance: `scanwright calibrate` makes one that does")
+        raise RecordingError("the angle set has no covariance: `scanwright calibrate` writes one that has it")
     if joint_rad is None:
         raise RecordingError(
-            f"{name}: no column joint_rad, without which it is unknown what an error of the calibration does to a "
-            "point: assemble the cloud with it, or register without the angle set"
+            f"{name}: no column joint_rad, which the effect of calibration errors on a point depends on: "
+            "assemble the cloud with it, or register without the angle set"
         )
     return joint_rad
 

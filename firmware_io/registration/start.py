@@ -1,9 +1,9 @@
-"""Pose of one stand relative to another without a first guess: their floor plans are laid over each other.
+"""Pose of one scan position relative to another without a start pose, by correlation of their floor plans.
 
-Both clouds are levelled by their floors and ceilings. Every vertical surface then becomes an arrow on a grid seen from
-above, pointing to its scanner: a complex number, so that turning the plan multiplies it by a phase, and
-the correlation of two plans (one FFT for all shifts) counts walls that lie on walls and face the same way. All headings
-are tried. The height comes from the floors, ceilings and table tops in the same way.
+Both clouds are levelled by their floors and ceilings. The normals of all vertical surfaces are entered in a grid seen
+from above as complex numbers, so that turning the plan multiplies it by a phase, and the correlation of two plans (one
+FFT for all shifts) counts walls that lie on walls with the same normal. All headings are tried. The height comes from
+the floors, ceilings and table tops likewise.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from scanwright.design.arrays import Floats, Pose
 from scanwright.firmware_io.registration.pairwise import Pair, align, align_coarsely, coarse_merit, refused
 from scanwright.firmware_io.registration.sensor_view import SensorView
 
-_CELL_M = 0.25  # of the map that is correlated: wider than an error of heading moves near walls
+_CELL_M = 0.25  # of the map that is correlated: wider than the shift of near walls by an error of heading
 _HEADINGS = 120  # 3 deg apart: within a cell of the truth up to 10 m
 _MAX_CELLS = 512  # of a plan's edge: larger halls get larger cells
-_PEAKS = 30  # looked at for each heading; neighbouring cells count
+_PEAKS = 30  # for each heading, neighbouring cells included
 _POINTS = 20_000  # of a view: more do not change the map of cells
-_WALL = np.sin(np.radians(30))  # a normal may point up or down by this
-_FLOOR = np.cos(np.radians([30, 15, 7, 7]))  # how far a floor's normal may be off, as the guess gets better
+_WALL = np.sin(np.radians(30))  # largest vertical part of a wall's normal
+_FLOOR = np.cos(np.radians([30, 15, 7, 7]))  # largest tilt of a floor's normal in each refinement
 _MIN_FLOOR = 0.05  # share of the points; with less of it a cloud is used unlevelled
 _HEIGHT_M = 0.05  # of a bin: finer than a step of a stair
 _HEIGHTS = 1200  # bins: 30 m up and down
-_STARTS = 60  # a corridor fits itself at every metre, better than it does where there is more to disagree about
+_STARTS = 60  # a corridor fits itself at every metre
 _SETTLED = 10  # guesses that are refined
 _APART_M = 0.8  # starts nearer than this settle at one place
 _APART_RAD = np.radians(8)  # the same for the heading
-_WORTH = 0.5  # of the best one's merit, at the coarse scale; others are not aligned finely
+_WORTH = 0.5  # of the best merit, at the coarse scale; others are not aligned finely
 _TRIED = 3  # of the refined guesses: each costs a whole alignment
-_RIVAL = 0.7  # a second pose of this share of the best one's merit leaves it open which is right
+_RIVAL = 0.7  # of the best merit: with a second pose above it the result is ambiguous
 
 Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """A guess."""
+    """A start pose."""
 
     T_a_b: Pose  # shape (4, 4)
     score: float  # cosine of the angle between the two plans as vectors: 1 if they are equal
@@ -59,7 +59,7 @@ class _Plan:
 
 
 def starts(a: SensorView, b: SensorView, count: int) -> list[Start]:
-    """The best distinct guesses of where b is in the frame of a, best first; none without an upright surface."""
+    """Return the best distinct guesses of the pose of b in the frame of a, best first; empty without walls."""
     plans = _plan(a), _plan(b)
     if not all(len(plan.points_m) for plan in plans):
         return []
@@ -90,10 +90,10 @@ def starts(a: SensorView, b: SensorView, count: int) -> list[Start]:
 
 
 def find_start(a: SensorView, b: SensorView) -> Pair:
-    """Register b to a from no start at all: the best of several guesses, refused where two of them are as good."""
+    """Register b to a without a start: the best of several guesses, refused if a second one is as good."""
     guesses = sorted(starts(a, b, _STARTS), key=lambda start: coarse_merit(a, b, start.T_a_b), reverse=True)
     if not guesses:
-        why = "neither walls nor other upright surfaces to find a start by: give one"
+        why = "no walls or other upright surfaces to find a start from: give a start pose"
         return Pair(a.name, b.name, np.full((4, 4), np.nan), np.full((6, 6), np.nan), 0.0, 0.0, (why,))
     settled: list[tuple[float, Floats]] = []
     for guess in guesses[:_SETTLED]:
@@ -106,7 +106,7 @@ def find_start(a: SensorView, b: SensorView) -> Pair:
     for rival in rivals:
         if rival.merit > _RIVAL * best.merit and _distinct(rival.T_a_b, best.T_a_b):
             apart_m = float(np.linalg.norm(rival.T_a_b[:3, 3] - best.T_a_b[:3, 3]))
-            return refused(best, f"another pose {apart_m:.1f} m away fits as well: the place looks alike from both")
+            return refused(best, f"another pose {apart_m:.1f} m away fits as well: the place looks alike there")
     return best
 
 
@@ -123,7 +123,7 @@ def _plan(view: SensorView) -> _Plan:
 
 
 def _level(normals: Float64[ndarray, "n 3"]) -> Pose:
-    """Transform that makes the floors horizontal: the direction most normals share, if it is within 30 deg of up."""
+    """Return the transform that makes the floors horizontal; identity if there is no floor within 30 deg of level."""
     up = np.array([0.0, 0.0, 1.0])
     for cosine in _FLOOR:
         floor = normals[np.abs(normals @ up) > cosine]
@@ -137,7 +137,10 @@ def _level(normals: Float64[ndarray, "n 3"]) -> Pose:
 
 
 def _raster(points_m: Floats, arrows: Complexes, cell_m: float, size: int) -> Complexes:
-    """Sum of the arrows in each cell, shape (size, size), periodic; its square root, or one long wall outvotes all."""
+    """Return the sum of the arrows in each cell, scaled to its square root, or one long wall would outweigh the rest.
+
+    The shape is (size, size), periodic.
+    """
     cells = np.floor(points_m / cell_m).astype(int) % size
     flat = cells[:, 0] * size + cells[:, 1]
     plan = np.bincount(flat, arrows.real, size * size).astype(complex)
@@ -151,7 +154,7 @@ def _energy(plan: Complexes) -> float:
 
 
 def _height_m(a: _Plan, b: _Plan) -> float:
-    """How much higher b's scanner stood, by floors on floors and ceilings on ceilings."""
+    """Return the height of b's scanner over a's, by floors on floors and ceilings on ceilings."""
     # Blurred over 10 cm: the levelling is not that good
     wide = np.convolve(a.floors, np.ones(5), "same")
     match = np.correlate(wide, b.floors, "full")

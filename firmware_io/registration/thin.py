@@ -1,12 +1,11 @@
-"""Resampling that undoes what the scanner's own density does to a cloud.
+"""Resampling of a cloud to an even density.
 
-A rotating 2D lidar sees some directions a hundred times more densely than others, near surfaces more densely than far
-ones, and along a line more densely than across. Handed over as it is, such a cloud registers its own pattern: the
-twenty nearest neighbours of a point lie on one scan line, and the lines of one scan align with those of the other.
+A rotating 2D lidar measures some directions a hundred times more densely than others, near surfaces more densely than
+far ones, and along a line more densely than across. Such a cloud would register its own pattern: the twenty nearest
+neighbours of a point lie on one scan line, and the lines of one scan align with those of the other.
 
-How densely the scanner looked into each direction is counted in the cells of a cube map, which also knows what a model
-of the beams does not: shadows, dropped beams, more than one turn. With the step between neighbouring beams that gives
-the gap between the lines there, and a voxel is taken no finer than that gap on its surface.
+The number of points in each cell of a cube map, which includes shadows, dropped beams and repeated turns, and the step
+between neighbouring beams give the gap between the lines there; no voxel is finer than that gap on its surface.
 """
 
 from __future__ import annotations
@@ -21,17 +20,13 @@ from scanwright.firmware_io.clouds.voxels import voxel_of, voxel_sums
 from scanwright.firmware_io.registration.cube_map import cells_of, solid_angles_sr
 
 _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds
-_LEVELS = 3  # voxels grow up to 2**3 times; where lines are still farther apart nothing is known between them
+_LEVELS = 3  # voxels grow up to 2**3 times
 
 
 def thin(means: Floats, counts: NDArray[np.int64], spacing_m: float, step_rad: float) -> Float64[ndarray, "kept 3"]:
-    """Mean points of voxels, shape (m, 3), evenly spread over the surfaces that the scanner at the origin saw.
+    """Return mean points of voxels, evenly spread over the surfaces that a scanner at the origin measured.
 
-    Args:
-        means: of the finest voxels, as `voxel_means` has them, like `counts`.
-        counts: how many points each of them holds.
-        spacing_m: their edge.
-        step_rad: as `beam_step_rad` has it.
+    `means` and `counts` are those of the finest voxels, with an edge of `spacing_m`; `step_rad` is `beam_step_rad`.
     """
     gap_m = np.linalg.norm(means, axis=1) * line_gaps_rad(means, counts, step_rad)
     level = np.clip(np.ceil(np.log2(np.maximum(gap_m, spacing_m) / spacing_m)), 0, _LEVELS).astype(np.uint8)
@@ -42,14 +37,10 @@ def thin(means: Floats, counts: NDArray[np.int64], spacing_m: float, step_rad: f
 def line_gaps_rad(
     points_m: Float64[ndarray, "n 3"], counts: Int64[ndarray, " n"], step_rad: float
 ) -> Float64[ndarray, " n"]:
-    """Angle between neighbouring scan lines in the direction of each point, shape (n,).
+    """Return the angle between neighbouring scan lines in the direction of each point, from the beams in each.
 
-    In a cloud without lines (of another scanner, or shuffled) it is the mean distance of neighbours.
-
-    Args:
-        points_m: shape (n, 3).
-        counts: beams in each of them, shape (n,).
-        step_rad: angle between neighbouring beams of one line.
+    In a cloud without lines (of another scanner, or shuffled) it is the mean angle between neighbours. `step_rad` is
+    the angle between neighbouring beams of one line.
     """
     cells = cells_of(points_m, _SIDE)
     count = np.bincount(cells, counts, 6 * _SIDE**2)
@@ -59,7 +50,7 @@ def line_gaps_rad(
 
 
 def beam_step_rad(points_m: Float64[ndarray, "n 3"]) -> float:
-    """Angle between beams that were measured one after the other: the median, as the rest are gaps and line ends."""
+    """Return the median angle between consecutive beams; larger ones are gaps and line ends."""
     some = np.unique(np.linspace(0, len(points_m) - 2, min(len(points_m) - 1, 20_011)).astype(int))
     here, there = points_m[some], points_m[some + 1]
     sine, cosine = np.linalg.norm(np.cross(here, there), axis=1), np.einsum("ij,ij->i", here, there)

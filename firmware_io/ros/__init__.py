@@ -1,1 +1,1 @@
-"""For robots: the frames of a calibrated scanner, and the node of ROS 2."""
+"""ROS 2 node, and the frames of a calibrated scanner for robots."""

@@ -1,4 +1,4 @@
-"""Scans until it is ended, for a node: devices that fail are tried again, parameters stop and start them."""
+"""Endless scans for a node: failed devices are restarted, parameters stop and start them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from scanwright.design.errors import DeviceError
-from scanwright.design.motion import Motion, Spin
+from scanwright.design.motion import Spin
 from scanwright.design.progress import Progress
 from scanwright.firmware_io.scan.acquire import acquire
 from scanwright.firmware_io.scan.live_feed import UNWATCHED, Both, Watch
@@ -16,48 +16,47 @@ from scanwright.firmware_io.scan.plan import ScanPlan
 from scanwright.firmware_io.servo.fitness import ServoSetupError
 
 _log = logging.getLogger(__name__)
-
-AGAIN_S = 3.0  # a device that was unplugged is there again after some seconds
-_MOST_TRIES, _WELL_S = 100, 60.0  # in a row: some minutes; a run of a minute begins a new row
+AGAIN_S = 3.0  # before a failed device is restarted
+_MOST_TRIES, _WELL_S = 100, 60.0  # consecutive failures; a run of a minute resets their count
 _POLL_S = 1.0  # for a parameter that starts the scanner
 
 
-class Interrupted(Exception):  # noqa: N818 - it is no error
-    """Raised by a steered watch: the devices are stopped, and what it wants next is asked."""
+class Interrupted(Exception):  # noqa: N818 - not an error
+    """Raised by a `Steered` watch to stop the devices after a change of its parameters."""
 
 
 class Steered(Watch, Protocol):
-    """A watch that also says what shall happen. Any of its `Watch` methods may raise `Interrupted`."""
+    """A watch with parameters. Its `Watch` methods can raise `Interrupted`."""
 
     @property
     def running(self) -> bool:
-        """Whether the scanner shall turn."""
+        """Whether the scanner must turn."""
 
     @property
     def period_s(self) -> float:
-        """Time of one turn; 0 for the motion of the angle set."""
+        """Duration of one turn; 0 for the motion of the angle set."""
 
     def begin(self) -> None:
-        """The devices start anew."""
+        """Prepare for a start of the devices."""
 
     def failed(self, line: str) -> None:
-        """A device failed; it is tried again."""
+        """Report that a device failed and is restarted."""
 
     def wait(self, seconds: float) -> None:
-        """Until something else is wanted, at most so long."""
+        """Wait for a change of the parameters, at most `seconds`."""
 
 
 def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = UNWATCHED) -> None:
-    """Scan until something else than a device ends it, such as Ctrl-C; the devices are stopped on every way out.
+    """Scan until Ctrl-C or an exception other than of a device; the devices are stopped on every exit.
 
     Args:
         plan: endless.
-        steered: is told of the scan, and says what shall happen.
-        progress: gets each step.
-        viewer: gets the scan too.
+        steered: receives the scan, and has the parameters.
+        progress: called with each step.
+        viewer: receives the scan too.
 
     Raises:
-        ServoSetupError: settings of the servo that outlast the power must change first.
+        ServoSetupError: permanent settings of the servo must change first.
         DeviceError: devices have failed a hundred times in a row.
     """
     watch, tries = Both(steered, viewer), 0
@@ -68,10 +67,13 @@ def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = 
         steered.begin()
         began_s = time.monotonic()
         try:
-            acquire(replace(plan, motion=_motion(plan.motion, steered.period_s)), progress, watch)
+            period_s, motion = steered.period_s, plan.motion
+            if period_s and isinstance(motion, Spin):
+                motion = Spin(mode="spin", period_s=period_s)
+            acquire(replace(plan, motion=motion), progress, watch)
         except Interrupted:
             progress("stopped by a parameter")
-        except ServoSetupError:  # trying again would not help: somebody must agree
+        except ServoSetupError:  # requires consent, so a restart does not help
             raise
         except DeviceError as error:
             tries = 1 if time.monotonic() - began_s > _WELL_S else tries + 1
@@ -81,7 +83,3 @@ def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = 
             steered.failed(line)
             _log.error("%s", line)
             steered.wait(AGAIN_S)
-
-
-def _motion(motion: Motion, period_s: float) -> Motion:
-    return Spin(mode="spin", period_s=period_s) if period_s and isinstance(motion, Spin) else motion

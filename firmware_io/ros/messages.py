@@ -1,4 +1,4 @@
-"""What the node says, as messages of ROS 2. Needs the robot's ROS 2, or the wheels of the extra `ros`."""
+"""ROS 2 messages of the node. Requires the robot's ROS 2, or the wheels of the extra `ros`."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from scanwright.firmware_io.samples import Scan
 
 
 def time_of(time_ns: int) -> Any:
-    """A time since 1970."""
+    """Return a `builtin_interfaces/Time` of nanoseconds since 1970."""
     seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
     return Time(sec=seconds, nanosec=nanoseconds)
 
 
 def laser_scan(scan: Scan, stamp_ns: int) -> Any:
-    """`sensor_msgs/LaserScan` in the laser frame; the stamp is the time of the first beam."""
+    """Return a `sensor_msgs/LaserScan` in the laser frame; the stamp is the time of the first beam."""
     message = LaserScan()
     message.header.stamp, message.header.frame_id = time_of(stamp_ns), LASER_FRAME
     message.angle_min = scan.angle_min_rad
@@ -33,21 +33,21 @@ def laser_scan(scan: Scan, stamp_ns: int) -> Any:
     message.angle_increment = scan.angle_increment_rad
     message.time_increment, message.scan_time = scan.time_increment_s, scan.scan_time_s
     message.range_min, message.range_max = scan.range_min_m, scan.range_max_m
-    # an array of the right kind is taken as it is; of anything else every number is looked at
+    # an array of this kind is used unchanged; rclpy checks each number of other sequences
     message.ranges = array("f", scan.range_m.astype(np.float32).tobytes())
     message.intensities = array("f", scan.intensity.astype(np.float32).tobytes())
     return message
 
 
 def joint_state(position_rad: float, stamp_ns: int) -> Any:
-    """`sensor_msgs/JointState` of the spin joint."""
+    """Return a `sensor_msgs/JointState` of the spin joint."""
     message = JointState(name=[SPIN_JOINT], position=array("d", [position_rad]))
     message.header.stamp = time_of(stamp_ns)
     return message
 
 
 def point_cloud(rows: NDArray[np.void], frame: str, stamp_ns: int) -> Any:
-    """`sensor_msgs/PointCloud2` of structured rows, shape (height, width)."""
+    """Return a `sensor_msgs/PointCloud2` of structured rows, shape (height, width)."""
     height, width = rows.shape
     fields = [
         PointField(name=name, offset=place[1], datatype=POINT_FIELD_TYPES[place[0].str], count=1)
@@ -61,7 +61,7 @@ def point_cloud(rows: NDArray[np.void], frame: str, stamp_ns: int) -> Any:
 
 
 def transform(parent: str, child: str, T_parent_child: Pose, stamp_ns: int) -> Any:
-    """`geometry_msgs/TransformStamped`, what `tf2_msgs/TFMessage` holds."""
+    """Return a `geometry_msgs/TransformStamped` for a `tf2_msgs/TFMessage`."""
     message = TransformStamped()
     message.header.stamp, message.header.frame_id, message.child_frame_id = time_of(stamp_ns), parent, child
     at, turned = message.transform.translation, message.transform.rotation
@@ -71,7 +71,7 @@ def transform(parent: str, child: str, T_parent_child: Pose, stamp_ns: int) -> A
 
 
 def diagnostics(level: int, message: str, values: Mapping[str, object], stamp_ns: int) -> Any:
-    """`diagnostic_msgs/DiagnosticArray` of the scanner; level 0 is good, 1 a warning, 2 an error, 3 stale."""
+    """Return a `diagnostic_msgs/DiagnosticArray`; level 0 is good, 1 a warning, 2 an error, 3 stale."""
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]

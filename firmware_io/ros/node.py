@@ -1,16 +1,16 @@
-"""The node of ROS 2: what a scan tells, published while it happens.
+"""ROS 2 node that publishes a scan in real time.
 
     scan               sensor_msgs/LaserScan      in `laser`; the stamp is the time of the first beam
-    joint_states       sensor_msgs/JointState     `spin_joint`, as the encoder said it
-    points             sensor_msgs/PointCloud2    one message a scan, in `world` or `rot`, or a turn, in `world`;
+    joint_states       sensor_msgs/JointState     `spin_joint`, as read from the encoder
+    points             sensor_msgs/PointCloud2    one message per scan, in `world` or `rot`, or per turn, in `world`;
                                                   de-skewed, a row for every beam
-    robot_description  std_msgs/String            the URDF with the frames in use, if the build has one; kept
-    tf, tf_static      tf2_msgs/TFMessage         world servo rot laser, where ROS 2 has tf2_msgs
-    diagnostics        diagnostic_msgs/DiagnosticArray    once a second, where ROS 2 has diagnostic_msgs
-    clock              rosgraph_msgs/Clock        of a recording that is replayed
+    robot_description  std_msgs/String            the URDF with the frames in use, if the build has one; latched
+    tf, tf_static      tf2_msgs/TFMessage         world servo rot laser, if ROS 2 has tf2_msgs
+    diagnostics        diagnostic_msgs/DiagnosticArray    once a second, if ROS 2 has diagnostic_msgs
+    clock              rosgraph_msgs/Clock        of a replayed recording
 
-Publishers are reliable: RViz asks for that, and who asks for best effort is served too. Parameters `running` and
-`period_s` start, stop and change the motion while the node runs. Needs the robot's ROS 2, or the wheels of the extra.
+Publishers are reliable, as RViz requires; this also serves subscribers with best effort. Parameters `running` and
+`period_s` start, stop and change the motion. Requires the robot's ROS 2, or the wheels of the extra.
 """
 
 from __future__ import annotations
@@ -48,38 +48,31 @@ from scanwright.firmware_io.ros.turns import Turns
 from scanwright.firmware_io.samples import JointSample, Scan
 
 PointsFrame = Literal["world", "rot"]
-_DIAGNOSED_S = 1.0  # between two messages: diagnostics are read at 1 Hz (REP 107)
-_SILENT_S = 2.0  # without a scan the diagnostics call the scanner stale
+_DIAGNOSED_S = 1.0  # between two messages (REP 107: 1 Hz)
+_SILENT_S = 2.0  # without a scan until the scanner is stale
 _SETTLED_S = 1.0  # without a further subscription
-_FLUSHED_S = 5.0  # for subscribers that are slow
+_FLUSHED_S = 5.0  # for slow subscribers
 _LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PublishedScanner:
-    """Whose scans are published."""
+    """The published scanner."""
 
     angles: AngleSet  # angle set in use
-    own_body: OwnBody | None  # beams that end on the scanner; None where that is not known
-    urdf: str | None  # its description with the frames of `angles`; None for none
+    own_body: OwnBody | None  # self-occlusion mask, if known
+    urdf: str | None  # its description with the frames of `angles`
     smooth: bool = True  # smooth the steps of the encoder in `points`
-    publish_tf: bool = True  # whether nobody else does
-    per_turn: bool = False  # one message of points a turn, not a scan
+    publish_tf: bool = True  # False if another node does
+    per_turn: bool = False  # one message of points per turn, not per scan
     points_frame: PointsFrame = "world"  # frame of the points; `rot` of single scans only
 
 
 class ScannerNode:
-    """A `Watch` that publishes. Its methods are called by the thread that drives; parameters come in another.
-
-    Attributes:
-        node: of rclpy.
-        running: what the parameter says.
-        period_s: what the parameter says; 0 for the motion of the angle set.
-        scans: published so far.
-    """
+    """A `Steered` watch that publishes. Its methods are called by the driving thread; another one sets parameters."""
 
     def __init__(self, scanner: PublishedScanner, *, replayed: bool) -> None:
-        """`replayed`: times are those of a recording; else those of this computer's monotonic clock."""
+        """`replayed`: times are those of a recording, not of this computer's monotonic clock."""
         self._scanner, self._replayed = scanner, replayed
         self._wall_minus_ns = 0 if replayed else time.time_ns() - time.monotonic_ns()
         self.node = rclpy.create_node("scanwright")
@@ -103,7 +96,7 @@ class ScannerNode:
         self.node.add_on_set_parameters_callback(self._set)
 
     def begin(self) -> None:
-        """A new run of the devices: nothing of an earlier one is assembled with it."""
+        """Reset the assembly before a new run of the devices."""
         self._assembler = Assembler(self._scanner.angles, own_body=self._scanner.own_body, smooth=self._scanner.smooth)
         self._turns = Turns()
         self._changed.clear()
@@ -135,18 +128,18 @@ class ScannerNode:
         self._status = line
 
     def failed(self, line: str) -> None:
-        """The devices failed; the diagnostics say so until the next scan."""
+        """Report a failure in the diagnostics until the next scan."""
         self._status, self._failed = line, True
         self.node.get_logger().error(line)
 
     def close(self) -> None:
-        """Publish the scans that still wait for their angles."""
+        """Publish the scans that wait for their angles."""
         for line in self._assembler.finish():
             self._place(line)
         self._publish_turns(self._turns.finish())
 
     def await_subscriber(self) -> None:
-        """Wait until somebody listens, and has found all the topics: what is published before is lost to them."""
+        """Wait for the first subscriber, until it has subscribed to all its topics."""
         count, since_s = 0, time.monotonic()
         while not count or time.monotonic() - since_s < _SETTLED_S:
             now = sum(publisher.get_subscription_count() for publisher in (self._scan, self._joint, self._points))
@@ -155,18 +148,18 @@ class ScannerNode:
             time.sleep(0.02)
 
     def flush(self) -> None:
-        """Wait until those who listen have all that was published."""
+        """Wait until the subscribers have received all messages."""
         for publisher in (self._scan, self._joint, self._points):
             publisher.wait_for_all_acked(Duration(seconds=_FLUSHED_S))
 
     def wait(self, seconds: float) -> None:
-        """Until a parameter is set, at most so long; what watches the diagnostics hears that it waits."""
+        """Publish the diagnostics, and wait for a change of the parameters, at most `seconds`."""
         self.diagnose()
         self._changed.wait(seconds)
         self._changed.clear()
 
     def diagnose(self) -> None:
-        """Say how it goes."""
+        """Publish the diagnostics."""
         now_s = time.monotonic()
         self._diagnosed_s = now_s
         if self._diagnostics is None:
@@ -205,23 +198,23 @@ class ScannerNode:
         self._points.publish(messages.point_cloud(rows, frame, stamp_ns + self._wall_minus_ns))
 
     def _set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
-        for one in parameters:
-            if one.name == "period_s" and not 0 <= one.value <= 3600:
-                return SetParametersResult(successful=False, reason=f"period_s = {one.value}: 0 to 3600")
-        for one in parameters:
-            if one.name in ("running", "period_s") and not self._replayed:
-                setattr(self, one.name, one.value)
+        for parameter in parameters:
+            if parameter.name == "period_s" and not 0 <= parameter.value <= 3600:
+                return SetParametersResult(successful=False, reason=f"period_s = {parameter.value}: 0 to 3600")
+        for parameter in parameters:
+            if parameter.name in ("running", "period_s") and not self._replayed:
+                setattr(self, parameter.name, parameter.value)
                 self._changed.set()
         return SetParametersResult(successful=True)
 
     def _tf_publisher(self) -> Callable[[int, float], None]:
-        """Publish the frames that stand still, and return what publishes the one that turns."""
+        """Publish the fixed frames, and return a function that publishes the rotating one."""
         from tf2_msgs.msg import TFMessage
 
         self._tf_static = self.node.create_publisher(TFMessage, "/tf_static", _LATCHED)
         stamp_ns = time.time_ns()
         fixed = fixed_frames(self._scanner.angles)
-        transforms = [messages.transform(one.parent, one.child, one.T_parent_child, stamp_ns) for one in fixed]
+        transforms = [messages.transform(f.parent, f.child, f.T_parent_child, stamp_ns) for f in fixed]
         self._tf_static.publish(TFMessage(transforms=transforms))
         turning = self.node.create_publisher(TFMessage, "/tf", 100)
 
@@ -239,7 +232,7 @@ class ScannerNode:
 
 @contextmanager
 def running_node(scanner: PublishedScanner, ros_args: Sequence[str], *, replayed: bool) -> Iterator[ScannerNode]:
-    """The node, with a thread that answers for its parameters, while the body runs."""
+    """Run the node during the body, with a thread for its parameters."""
     rclpy.init(args=["scanwright", *ros_args], signal_handler_options=SignalHandlerOptions.NO)
     node = ScannerNode(scanner, replayed=replayed)
     executor = SingleThreadedExecutor()

@@ -1,8 +1,8 @@
-"""Points as `sensor_msgs/PointCloud2` holds them: a row for every beam, NaN where it became no point.
+"""Rows of a `sensor_msgs/PointCloud2`: one per beam, NaN without a point.
 
-Fields are named as drivers of 3D lidars name them, so that what reads those reads this: x y z [m], intensity, ring (the
-beam's index), and the time after the stamp of the message, which is that of its first beam: `t` in nanoseconds of a
-scan, `time` in seconds of a turn, which lasts longer than 32 bits of nanoseconds.
+Fields are named as by drivers of 3D lidars: x y z [m], intensity, ring (index of the beam), and the time after the
+stamp of the message, which is that of its first beam: `t` in nanoseconds of a scan, `time` in seconds of a turn, which
+lasts longer than 32 bits of nanoseconds.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ TURN_POINT = np.dtype(
 
 
 def point_rows(line: ScanPoints) -> NDArray[np.void]:
-    """The rows of one scan, shape (beams,), of `POINT`; intensity is NaN from a sensor that measures none."""
+    """Return the rows of one scan, shape (beams,), of `POINT`; intensity is NaN if the sensor measures none."""
     rows = np.empty(line.scan.range_m.size, POINT)
     _fill(rows, line)
     rows["t"] = line.scan.time_ns - line.scan.stamp_ns
@@ -33,7 +33,7 @@ def point_rows(line: ScanPoints) -> NDArray[np.void]:
 
 
 def turn_rows(lines: Sequence[ScanPoints]) -> NDArray[np.void]:
-    """The rows of the scans of a turn, shape (scans, beams), of `TURN_POINT`; rows behind a last beam are NaN."""
+    """Return the rows of the scans of a turn, shape (scans, beams), of `TURN_POINT`; NaN after the last beam."""
     rows = np.empty((len(lines), max(line.scan.range_m.size for line in lines)), TURN_POINT)
     for name in ("x", "y", "z", "intensity", "time"):
         rows[name] = np.nan
@@ -46,7 +46,7 @@ def turn_rows(lines: Sequence[ScanPoints]) -> NDArray[np.void]:
 
 
 def in_rot(line: ScanPoints, angles: AngleSet) -> ScanPoints:
-    """The same scan in the frame `rot` as it stands at the first beam, the time of the stamp."""
+    """Return the scan in the frame `rot` at the time of the first beam, the stamp."""
     T_rot_world = np.linalg.inv(angles.T_world_rot(float(line.joint_rad[0])))
     points_m = line.points_m.astype(np.float64) @ T_rot_world[:3, :3].T + T_rot_world[:3, 3]
     return replace(line, points_m=points_m.astype(np.float32))

@@ -1,4 +1,4 @@
-"""A recording at its own pace, told to whoever would watch the scan itself."""
+"""Replay of a recording in real time to a `Watch`."""
 
 from __future__ import annotations
 
@@ -21,23 +21,24 @@ from scanwright.firmware_io.scan.reporter import Reporter
 def replay(
     path: Path, watch: Watch, *, rate: float = 1.0, wait_until: Callable[[float], None] | None = None
 ) -> tuple[int, int]:
-    """Play a recording as `acquire` does a scan: a scan when the angle after its last beam is known, and its checks.
+    """Replay a recording as `acquire` publishes a scan, after the angle after its last beam, with its checks.
 
     Args:
         path: the recording.
-        watch: gets scans, angles, and warnings of the checks; its `close` is not called.
-        rate: how many times as fast as it was recorded.
+        watch: receives scans, angles, and warnings of the checks; its `close` is not called.
+        rate: speed relative to the recording.
         wait_until: waits until so many seconds after the start; None for the clock of this computer.
 
     Returns:
         Number of scans and number of angles published.
 
     Raises:
-        RecordingError: the recording is unreadable, or the rate is none.
+        RecordingError: the recording is unreadable, or the rate is invalid.
     """
     if not 0 < rate < math.inf:
         raise RecordingError(f"rate = {rate}: must be above 0 and finite")
-    wait = wait_until or _clock()
+    began_s = time.monotonic()
+    wait = wait_until or (lambda after_s: time.sleep(max(began_s + after_s - time.monotonic(), 0.0)))
     waiting: deque[Scan] = deque()
     scans = angles = 0
     begin_ns: int | None = None
@@ -61,7 +62,7 @@ def replay(
         while waiting and waiting[0].time_ns[-1] <= thing.time_ns:
             hand_over(waiting.popleft())
             scans += 1
-    for scan in waiting:  # the servo was silent before the lidar was
+    for scan in waiting:  # after the last angle
         hand_over(scan)
         scans += 1
     for finding in checks.check():
@@ -70,12 +71,7 @@ def replay(
 
 
 def _in_order(source: Recording) -> Iterator[Scan | JointSample]:
-    """Scans by their stamps and angles by their times, one after the other."""
+    """Yield scans by their stamps and angles by their times, in order."""
     log = source.joint_log
     angles = (JointSample(*pair) for pair in zip(log.time_ns.tolist(), log.position_rad.tolist(), strict=True))
-    return merge(angles, source.scans(), key=lambda one: one.stamp_ns if isinstance(one, Scan) else one.time_ns)
-
-
-def _clock() -> Callable[[float], None]:
-    began_s = time.monotonic()
-    return lambda after_s: time.sleep(max(began_s + after_s - time.monotonic(), 0.0))
+    return merge(angles, source.scans(), key=lambda item: item.stamp_ns if isinstance(item, Scan) else item.time_ns)

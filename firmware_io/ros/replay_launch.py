@@ -1,7 +1,7 @@
-"""A recording and the scanner's frames in ROS 2: `ros2 launch replay_launch.py recording:=r.mcap urdf:=scanner.urdf`.
+"""Launch file for a recording in ROS 2: `ros2 launch replay_launch.py recording:=r.mcap urdf:=scanner.urdf`.
 
-The recording is played with its own clock; `robot_state_publisher` turns `/joint_states` and the URDF of the build into
-`/tf`, so that RViz or `laser_assembler` see every `/scan` where it was taken. Needs rosbag2_storage_mcap.
+The recording is played with its clock; `robot_state_publisher` converts `/joint_states` and the URDF of the build to
+`/tf`, so that RViz or `laser_assembler` place each `/scan`. Requires rosbag2_storage_mcap.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 
 def generate_launch_description() -> Any:
-    """What `ros2 launch` asks for."""
+    """Return the launch description for `ros2 launch`."""
     from launch import LaunchDescription
     from launch.actions import DeclareLaunchArgument, ExecuteProcess
     from launch.substitutions import Command, LaunchConfiguration

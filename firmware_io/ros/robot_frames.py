@@ -1,7 +1,8 @@
-"""What a calibration means to a robot: its URDF with the true frames, static transforms, and what changed in words.
+"""Frames of a calibrated scanner for robots: URDF, static transforms, and a description of the changes.
 
-A calibration moves one frame, `laser` in `rot`; where `servo` stands in `world` is told beside it, so that a robot
-without our URDF has the whole chain:
+A calibration changes one frame, `laser` in `rot`; `servo` in `world` is added, so that a robot without the URDF has the
+complete chain:
+
 
     world --servo_mount, fixed--> servo --spin_joint, about z--> rot --laser_mount, fixed--> laser
 """
@@ -25,42 +26,42 @@ from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.foreign import foreign
 
 URDF = "scanner.urdf"
-_RANGE_M = 10.0  # at which a difference of frames is stated
+_RANGE_M = 10.0  # at which the effect of a calibration is stated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixedFrame:
-    """A frame that stands still in its parent."""
+    """A frame that is fixed in its parent."""
 
-    joint: str  # its name in the URDF
-    parent: str  # frame
-    child: str  # frame
+    joint: str  # name in the URDF
+    parent: str
+    child: str
     T_parent_child: Pose  # shape (4, 4), m
 
     @property
     def xyz(self) -> str:
-        """Position [m], as URDF and launch files write it."""
+        """Position [m] for URDF and launch files."""
         return _row(self.T_parent_child[:3, 3])
 
     @property
     def rpy(self) -> str:
-        """Roll, pitch and yaw [rad], as URDF and launch files write it."""
+        """Roll, pitch and yaw [rad] for URDF and launch files."""
         return _row(frames.roll_pitch_yaw(self.T_parent_child[:3, :3]))
 
     def command(self) -> str:
-        """The command of ROS 2 that publishes it."""
+        """Return the command of ROS 2 that publishes it."""
         names = ("x", "y", "z", "roll", "pitch", "yaw")
         values = " ".join(f"--{name} {x}" for name, x in zip(names, f"{self.xyz} {self.rpy}".split(), strict=True))
         ends = f"--frame-id {self.parent} --child-frame-id {self.child}"
         return f"ros2 run tf2_ros static_transform_publisher {values} {ends}"
 
     def launch_parameters(self) -> str:
-        """The same as parameters of a launch file."""
+        """Format the frame as parameters of a launch file."""
         return f"{self.joint}_xyz:='{self.xyz}' {self.joint}_rpy:='{self.rpy}'"
 
 
 def fixed_frames(angles: AngleSet) -> tuple[FixedFrame, FixedFrame]:
-    """Servo and laser of a scanner."""
+    """Return the frames of servo and laser of a scanner."""
     return (
         FixedFrame("servo_mount", "world", "servo", angles.T_world_rot(0.0)),
         FixedFrame("laser_mount", "rot", "laser", angles.T_rot_laser()),
@@ -68,7 +69,7 @@ def fixed_frames(angles: AngleSet) -> tuple[FixedFrame, FixedFrame]:
 
 
 def what_changed(before: AngleSet, after: AngleSet) -> list[str]:
-    """What a calibration did to the frames, in words."""
+    """Describe the changes of the frames by a calibration."""
     T_before, T_after = before.T_rot_laser(), after.T_rot_laser()
     leans_rad = _rotation_vector(T_after[:3, :3] @ T_before[:3, :3].T)
     shift_m = T_after[:3, 3] - T_before[:3, 3]
@@ -88,10 +89,10 @@ def what_changed(before: AngleSet, after: AngleSet) -> list[str]:
 
 
 def with_frames(urdf: str, angles: AngleSet, what: str) -> ElementTree.Element:
-    """A URDF of ours, read, with the frames of an angle set in the place of its own.
+    """Parse the URDF of a build and replace its frames with those of an angle set.
 
     Raises:
-        RecordingError: it is no URDF, or has none of our joints; `what` names it.
+        RecordingError: it is not a URDF, or not of a build; `what` names it.
     """
     builder = ElementTree.TreeBuilder(insert_comments=True)
     try:
@@ -108,11 +109,7 @@ def with_frames(urdf: str, angles: AngleSet, what: str) -> ElementTree.Element:
 
 
 def write_calibrated_urdf(designed: Path, out: Path, angles: AngleSet) -> None:
-    """Write the URDF of a build again with calibrated frames; meshes are found from where it stands.
-
-    Raises:
-        RecordingError: `designed` cannot be read, or is no URDF of ours.
-    """
+    """Write the URDF of a build with calibrated frames and adapted paths of meshes; raises as `with_frames`."""
     robot = with_frames(read_urdf(designed), angles, str(designed))
     for mesh in robot.iter("mesh"):
         name = mesh.get("filename", "")
@@ -124,13 +121,7 @@ def write_calibrated_urdf(designed: Path, out: Path, angles: AngleSet) -> None:
 
 
 def description(folder: Path, angles: AngleSet) -> str | None:
-    """The URDF of a build folder with the frames of an angle set, its meshes where every program finds them.
-
-    None where the folder has no URDF.
-
-    Raises:
-        RecordingError: it has one that is none of ours.
-    """
+    """Return the URDF of a build folder with the frames of an angle set and URIs of meshes; None without a URDF."""
     path = folder / URDF
     if not path.is_file():
         return None
@@ -143,17 +134,17 @@ def description(folder: Path, angles: AngleSet) -> str | None:
 
 
 def read_urdf(path: Path) -> str:
-    """The text of a URDF; a RecordingError if it cannot be read."""
+    """Return the text of a URDF; RecordingError if it cannot be read."""
     return foreign(f"{path}: cannot read", read_text, path)
 
 
 def calibrated_urdf_place(out: Path) -> Path:
-    """Where the URDF of a calibrated angle set lies: angles.calibrated.json, scanner.calibrated.urdf."""
+    """Return the path of the URDF of an angle set: scanner.calibrated.urdf of angles.calibrated.json."""
     return out.with_name(out.stem.replace("angles", "scanner", 1) + ".urdf")
 
 
 def _rotation_vector(R: Array) -> Array:
-    """Axis times angle [rad] of a rotation by less than half a turn, shape (3,)."""
+    """Return axis times angle [rad] of a rotation by less than half a turn, shape (3,)."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
     sine = float(np.linalg.norm(vector))
     return vector * (math.atan2(sine, (float(np.trace(R)) - 1) / 2) / sine if sine else 1.0)

@@ -1,4 +1,4 @@
-"""`scanwright ros2`: a build folder's scanner, or a recording of it, as a node of ROS 2."""
+"""`scanwright ros2`: ROS 2 node of a build folder's scanner, or of a recording."""
 
 from __future__ import annotations
 
@@ -22,22 +22,12 @@ from scanwright.firmware_io.scan.plan import ScanPlan
 
 @dataclass(frozen=True, slots=True)
 class Publishing:
-    """How the node publishes.
+    """Options of the node."""
 
-    Attributes:
-        smooth: smooth the steps of the encoder in the points.
-        per_turn: one message of points a turn, not a scan.
-        frame: of the points.
-        publish_tf: publish the frames; not where `robot_state_publisher` does.
-
-    Raises:
-        RecordingError: the points of a turn have no place in a frame that turns.
-    """
-
-    smooth: bool = True
-    per_turn: bool = False
-    frame: PointsFrame = "world"
-    publish_tf: bool = True
+    smooth: bool = True  # smooth the steps of the encoder in the points
+    per_turn: bool = False  # one message of points per turn, not per scan
+    frame: PointsFrame = "world"  # of the points
+    publish_tf: bool = True  # publish the frames; False if `robot_state_publisher` does
 
     def __post_init__(self) -> None:
         if self.per_turn and self.frame == "rot":
@@ -54,19 +44,19 @@ def serve_devices(
     points: Publishing,
     viewer: Watch = UNWATCHED,
 ) -> None:
-    """Publish what the devices say until Ctrl-C; they are stopped on every way out.
+    """Publish a scan until Ctrl-C; the devices are stopped on every exit.
 
     Args:
         out: build folder.
         plan: endless.
-        ros_args: as nodes of ROS 2 take them, `--ros-args -r scan:=front/scan` and the like.
+        ros_args: of ROS 2, such as `--ros-args -r scan:=front/scan`.
         progress: callback.
-        points: how they are published.
-        viewer: gets the scan too.
+        points: options.
+        viewer: receives the scan too.
 
     Raises:
         TaskError: the folder has no angle set.
-        RecordingError: its URDF is none of ours.
+        RecordingError: its URDF is not of a build.
     """
     at_rest = plan.motion.mode == "stop_and_go"
     with running_node(_scanner(out, points, at_rest), ros_args, replayed=False) as node:
@@ -76,11 +66,7 @@ def serve_devices(
 def serve_recording(
     out: Path, recording: Path, ros_args: Sequence[str], progress: Progress, points: Publishing, *, rate: float = 1.0
 ) -> None:
-    """Publish a recording at its own pace, with its clock on /clock; the other arguments as for `serve_devices`.
-
-    Raises:
-        RecordingError: the recording is unreadable, or the rate is none.
-    """
+    """Publish a recording in real time, with its clock on /clock; arguments and errors as for `serve_devices`."""
     at_rest = rests_in_scans(read_note(recording, NOTE))
     with running_node(_scanner(out, points, at_rest), ros_args, replayed=True) as node:
         progress("waiting for a subscriber to scan, joint_states or points")

@@ -1,7 +1,7 @@
-"""Scans gathered to whole turns of the axis, while they come: the turns of `assemble --per turn`.
+"""Stream of scans grouped to turns of the axis, as by `assemble --per turn`.
 
-A turn ends when the axis has gone a further 360 deg, or where it turns back; a scan belongs where its first beam does.
-That an axis turns back is known a degree later, and the scans of that degree then open the next turn.
+A turn ends after a further 360 deg, or at a reversal; a scan belongs to the turn of its first beam. A reversal is
+detected a degree later, and the scans of that degree begin the next turn.
 """
 
 from __future__ import annotations
@@ -10,24 +10,22 @@ import math
 
 from scanwright.firmware_io.assembly.streaming import ScanPoints
 
-BACK_RAD = math.radians(1.0)  # turning back by less is noise or backlash
-MOST_BEAMS = 10_000_000
-"""A turn is given out before its end rather than that it holds more: an axis may stand for ever."""
+BACK_RAD = math.radians(1.0)  # smaller reversals are noise or backlash
+MOST_BEAMS = 10_000_000  # of a turn, which ends earlier if the axis is at rest
 
 
 class Turns:
-    """Gathers placed scans; none is lost, none is given out twice."""
+    """Groups placed scans; each is returned once."""
 
     def __init__(self) -> None:
-        """Begin with the first scan."""
         self._lines: list[ScanPoints] = []
         self._beams = 0
         self._sense = 0
         self._begin_rad = self._extreme_rad = math.nan
-        self._extreme = 0  # place in the turn of the scan that went farthest
+        self._extreme = 0  # index of the scan at the extreme angle
 
     def push(self, line: ScanPoints) -> list[list[ScanPoints]]:
-        """Take a scan in, and give out the turns that it ends."""
+        """Add a scan, and return the turns that it ends."""
         done = []
         joint_rad = float(line.joint_rad[0]) if line.joint_rad.size else math.nan
         if not math.isnan(joint_rad):
@@ -48,12 +46,12 @@ class Turns:
         return [turn for turn in done if turn]
 
     def finish(self) -> list[list[ScanPoints]]:
-        """The turn that has begun."""
+        """Return the incomplete turn."""
         turn = self._cut(len(self._lines), math.nan)
         return [turn] if turn else []
 
     def _turned_back(self, joint_rad: float) -> int:
-        """The way (1 or -1) that the axis went until it turned back, as this angle shows; 0 where it did not."""
+        """Return the direction (1 or -1) before a reversal that this angle shows; 0 without one."""
         return self._sense if self._sense and (self._extreme_rad - joint_rad) * self._sense > BACK_RAD else 0
 
     def _follow(self, joint_rad: float) -> None:
@@ -64,7 +62,7 @@ class Turns:
             self._extreme, self._extreme_rad = len(self._lines), joint_rad
 
     def _cut(self, count: int, begin_rad: float) -> list[ScanPoints]:
-        """Give out the first scans; the rest open a turn that begins at an angle."""
+        """Return the first `count` scans; the others begin a turn at an angle."""
         turn, self._lines = self._lines[:count], self._lines[count:]
         self._beams = sum(line.scan.range_m.size for line in self._lines)
         self._begin_rad, self._extreme = begin_rad, len(self._lines) - 1

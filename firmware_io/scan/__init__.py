@@ -1,1 +1,1 @@
-"""One scan: its plan, the devices at work, the recorder, the doctor."""
+"""Acquisition of a scan: plan, devices, recorder, diagnosis."""

@@ -2,7 +2,8 @@
 
 Order: open and check both devices; laser on until its clock is known; servo on until it turns steadily; record the
 requested turns. One thread reads the servo a hundred times a second, the other the scans.
-If the lidar was lost (`lidar_scans.py`), that full scan is recorded again.
+
+A full scan in which the lidar was lost (`lidar_scans.py`) is recorded again.
 """
 
 from __future__ import annotations
@@ -36,29 +37,27 @@ from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
 
-_STEADY_PATIENCE_S = 15.0  # a heavy head takes some seconds
-_MOST_SPEEDS = 3600  # an hour of them, for the mean
+_STEADY_PATIENCE_S = 15.0  # a heavy head needs some seconds
+_MOST_SPEEDS = 3600  # one hour, for the mean
 
 
 def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNWATCHED) -> ScanSummary:
     """Record a scan; stop both devices and close the recording on every exit.
 
-    An exception that ends it early has notes with the state that the devices reported when they were stopped.
+    An exception has notes with the state that the devices reported when they were stopped.
 
     Args:
         plan: of the scan.
-        progress: gets each step; the fraction is the share of the recording that is done.
-        watch: gets scans, angles and messages.
+        progress: called with each step; the fraction is the completed part of the recording.
+        watch: receives scans, angles and messages.
 
     Raises:
-        ServoSetupError: settings of the servo that are permanent must change first; nothing was moved.
-        DeviceError: a device is absent, another one than the angle set names, or fails.
+        ServoSetupError: permanent settings of the servo must change first; nothing was moved.
+        DeviceError: a device is absent, not the one of the angle set, or fails.
         RecordingError: the recording cannot be written.
     """
     reporter = Reporter(progress, watch)
-    ros_messages.definition(
-        ros_messages.LASER_SCAN
-    )  # loads the message types: half a second that must not fall into the recording
+    ros_messages.definition(ros_messages.LASER_SCAN)  # loads the message types for half a second, not while recording
     with _unturned_until_opened() as opened, ExitStack() as stack:
         lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
         lidar.set_filters(plan.echo, mean_filter_off=plan.mean_filter_off)
@@ -84,7 +83,7 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
 
 @contextmanager
 def _unturned_until_opened() -> Iterator[Event]:
-    """Note at a Ctrl-C that comes before the servo is opened (the event is set) that it was not turned."""
+    """Add a note to a Ctrl-C before the servo is opened (the event is set): it was not turned."""
     opened = Event()
     try:
         yield opened
@@ -110,14 +109,14 @@ def _wait_until_steady(
     """Read scans until the motion begins and a spin is even; return their number. `keep` gets the angles."""
     read = 0
 
-    def patience_s() -> float:  # begins anew with the motion, where the lidar is lost meanwhile
+    def patience_s() -> float:  # restarts with the motion after a loss of the lidar
         return axis.begins_ns / 1e9 + _STEADY_PATIENCE_S
 
     def wait() -> None:
         nonlocal read
         scans.next()
         read += 1
-        for state in axis.hear():
+        for state in axis.receive():
             keep(state)
 
     while time.monotonic_ns() < axis.begins_ns or math.isnan(axis.turning()[0]):
@@ -143,32 +142,26 @@ def _wait_until_steady(
 
 
 def _record(plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Reporter) -> ScanSummary:
-    """Record until the turns are full; a scan is written as soon as the angle after its last beam is known."""
+    """Record the requested full scans; a scan is written when an angle after its last beam is known."""
     reporter.step("scanning until Ctrl-C" if plan.endless else f"recording {plan.duration_s:g} s")
     axis.left_out.clear()
     note = {"source": "scanwright scan", "hold": "true" if isinstance(plan.motion, StopAndGo) else "false"}
     with recorder_of(None if plan.endless else plan.recording, note, plan.attached) as recorder:
         run = _Run(plan, scans, axis, reporter, recorder)
-        while run.done < run.wanted or run.waiting:
-            run.take_scan()
+        while run.done < run.requested or run.waiting:
+            run.read_scan()
     return run.summary()
 
 
 class _Run:
-    """What was recorded so far, and how many full scans it is.
-
-    Attributes:
-        done: full scans.
-        wanted: full scans, infinite without an end.
-        waiting: scans whose last beam is later than the last angle.
-    """
+    """State of a recording."""
 
     def __init__(
         self, plan: ScanPlan, scans: LidarScans, axis: AxisThread, reporter: Reporter, recorder: Recorder | Watch
     ) -> None:
         self._plan, self._scans, self._axis, self._reporter, self._recorder = plan, scans, axis, reporter, recorder
-        self.done, self.wanted = 0.0, math.inf if plan.endless else float(plan.turns)
-        self.waiting: deque[Scan] = deque()
+        self.done, self.requested = 0.0, math.inf if plan.endless else float(plan.turns)  # full scans
+        self.waiting: deque[Scan] = deque()  # scans whose last beam is later than the last angle
         self._began_s = self._reported_s = time.monotonic()
         self._dropped, self._bad = scans.lidar.dropped, scans.lidar.bad_packets
         self._speeds = deque([axis.turning()], maxlen=_MOST_SPEEDS)
@@ -178,8 +171,8 @@ class _Run:
             self._keep(state)
         self._begin_turns()
 
-    def take_scan(self) -> None:
-        """Wait for a scan, and write what is complete; the full scan in which the lidar was lost begins anew."""
+    def read_scan(self) -> None:
+        """Wait for a scan, and write the complete ones; restart the full scan in which the lidar was lost."""
         try:
             scan = self._scans.next()
         except DeviceError:
@@ -192,7 +185,7 @@ class _Run:
             return
         for finding in self._checks.scan(scan, time.monotonic_ns()):
             self._reporter.warn(finding.message)  # its hints are options of `import`
-        if self.done < self.wanted:
+        if self.done < self.requested:
             self.waiting.append(scan)
         self._write_complete()
         motion = self._plan.motion
@@ -227,18 +220,17 @@ class _Run:
         )
 
     def _begin_turns(self) -> None:
-        """Full scans count from here."""
         self._earlier, self._away = math.floor(self.done), self._scans.away
         self._begin_s, self._from_rad = time.monotonic(), self._axis.window[-1].position_rad
 
     def _keep(self, state: ServoState) -> None:
-        for one in (self._recorder, self._reporter.watch, self._checks):
-            one.joint(state.time_ns, state.position_rad)
+        for receiver in (self._recorder, self._reporter.watch, self._checks):
+            receiver.joint(state.time_ns, state.position_rad)
         self._angles += 1
 
     def _write_complete(self) -> None:
-        """Write the scans after whose last beam an angle is known."""
-        for state in self._axis.hear():
+        """Write the scans with an angle after their last beam."""
+        for state in self._axis.receive():
             self._keep(state)
         while self.waiting and self.waiting[0].time_ns[-1] <= self._axis.window[-1].time_ns:
             ready = self.waiting.popleft()

@@ -1,7 +1,7 @@
-"""Servo thread of a scan: gives its orders and reads its angle a hundred times a second, at uneven times.
+"""Servo thread of a scan: commands the motion and reads the angle a hundred times a second, at uneven times.
 
-At even times an axis can turn nearly whole encoder steps between reads (an AX-12A at 30 deg/s): all readings are then
-rounded alike, which no smoothing removes. Uneven times average it out. Failures raise DeviceError.
+At even times an axis can turn nearly integer encoder steps between reads (an AX-12A at 30 deg/s): all readings then
+have the same rounding error, which no smoothing removes. Uneven times average it out. Failures raise DeviceError.
 """
 
 from __future__ import annotations
@@ -26,58 +26,52 @@ from scanwright.firmware_io.servo.servo import ServoDriver
 
 SERVO_HZ = 100.0  # an angle every 0.6 deg at 60 deg/s
 
-_STOP_ANSWER_S = 5.0  # three tries of two orders take 1.5 s
-_DEAF_S = 0.5  # as long as answers may fail; angles are interpolated over less than that
+_STOP_REPLY_S = 5.0  # three tries of two requests take 1.5 s
+_FAILING_S = 0.5  # longest time without replies; angles are interpolated over less than that
 _WINDOW = 50  # samples: half a second
 _STILL_RAD = math.radians(0.2)  # two steps of the encoder
 _UNCERTAIN_STEPS = 0.6  # of the encoder; up to it an angle of uncertain time is about as good as any other
-_GAP_NS = 1_000_000_000  # beyond it a doubtful angle beats none
-_GAP_BOUNDS = 4  # unless its time is as uncertain as the gap is long: one transaction in which this process was stopped
+_GAP_NS = 1_000_000_000  # beyond it an uncertain angle is better than none
+_GAP_BOUNDS = 4  # unless its time is as uncertain as the gap is long: this process was stopped in the transaction
 
 
 class AxisThread:
-    """What the servo's thread is told and tells, and what is made of it here.
-
-    Attributes:
-        begins_ns: when the motion proper begins; before it the axis is on its way to the start.
-        orders: courses for the thread, None if the axis shall stand.
-        stop_answers: from the thread, whether the servo answered the order to stand; False from one that has failed.
-    """
+    """Queues to and from the servo thread, with the accepted angles."""
 
     def __init__(self, motion: Motion, start_rad: float, step_rad: float) -> None:
-        self.orders: SimpleQueue[Iterator[Move] | None] = SimpleQueue()
+        self.orders: SimpleQueue[Iterator[Move] | None] = SimpleQueue()  # moves for the thread; None: hold
         self.received: SimpleQueue[ServoState | Exception] = SimpleQueue()  # states and errors from the thread
-        self.window: deque[ServoState] = deque(maxlen=_WINDOW)  # the good angles of the last half second
-        self.left_out: Counter[str] = Counter()  # angles that are not recorded, reason -> count
-        self.longest_gap_ns = 0  # between two good angles
+        self.stop_replies: SimpleQueue[bool] = SimpleQueue()  # whether the servo confirmed a stop
+        self.window: deque[ServoState] = deque(maxlen=_WINDOW)  # accepted angles of the last half second
+        self.left_out: Counter[str] = Counter()  # rejected angles, reason -> count
+        self.longest_gap_ns = 0  # between two accepted angles
         self._bounds_ns: deque[int] = deque(maxlen=2 * _WINDOW)
-        self._unread: list[ServoState] = []  # heard by `go`, for the next who hears
+        self._unread: list[ServoState] = []  # received by `go`, for the next `receive`
         self._failure: Exception | None = None
         self._motion = motion
         self._uncertain_rad = _UNCERTAIN_STEPS * step_rad
-        self.stop_answers: SimpleQueue[bool] = SimpleQueue()
         self._order(start_rad)
 
     def stop(self) -> bool:
-        """Stand, with torque on, until `go`; whether the servo has answered that it was told so."""
+        """Hold, with torque on, until `go`; return whether the servo confirmed that."""
         self.orders.put(None)
         try:
-            return self.stop_answers.get(timeout=_STOP_ANSWER_S)
+            return self.stop_replies.get(timeout=_STOP_REPLY_S)
         except Empty:
             return False
 
     def go(self) -> None:
-        """Make the motion anew from where the axis stands; `begins_ns` tells when it begins."""
-        self._unread = self.hear()
+        """Restart the motion from the present angle, and set `begins_ns`."""
+        self._unread = self.receive()
         self._order(self.window[-1].position_rad if self.window else 0.0)
 
     def _order(self, from_rad: float) -> None:
         lead_s, moves = course(self._motion, from_rad)
-        self.begins_ns = time.monotonic_ns() + round(lead_s * 1e9)
+        self.begins_ns = time.monotonic_ns() + round(lead_s * 1e9)  # until then the axis moves to the start
         self.orders.put(moves)
 
-    def hear(self) -> list[ServoState]:
-        """Return what is new and fit to be recorded."""
+    def receive(self) -> list[ServoState]:
+        """Return the new accepted angles."""
         good, self._unread = self._unread, []
         while not self.received.empty() and self._failure is None:
             state = self.received.get()
@@ -87,7 +81,7 @@ class AxisThread:
             self._bounds_ns.append(state.time_bound_ns)
             if math.isnan(state.position_rad):
                 self.left_out["servo angles in the dead sector"] += 1
-            elif (  # where the axis turns back it is slow, and no angle is in doubt
+            elif (  # a slow axis, as at the ends of a sweep, makes no angle uncertain
                 state.time_bound_ns > 2 * sorted(self._bounds_ns)[len(self._bounds_ns) // 10]
                 and abs(state.velocity_rad_s) * state.time_bound_ns > self._uncertain_rad * 1e9
                 and self.window
@@ -104,7 +98,7 @@ class AxisThread:
         return good
 
     def moved(self, scan: Scan) -> bool:
-        """Whether the axis turned while a scan was taken, from the angle before it to the angle after it."""
+        """Whether the axis turned between the last angle before a scan and the first one after it."""
         first_ns, last_ns = scan.stamp_ns, int(scan.time_ns[-1])
         before = [state.position_rad for state in self.window if state.time_ns <= first_ns][-1:]
         during = [state.position_rad for state in self.window if first_ns < state.time_ns < last_ns]
@@ -112,7 +106,7 @@ class AxisThread:
         return not (before and after) or np.ptp(before + during + after) > _STILL_RAD
 
     def turning(self) -> tuple[float, float]:
-        """Speed [deg/s] over the window, and the rms deviation from even turning [deg]."""
+        """Return the speed [deg/s] over the window, and the rms deviation from uniform rotation [deg]."""
         if len(self.window) < _WINDOW:
             return math.nan, math.nan
         time_s = np.array([state.time_ns - self.window[0].time_ns for state in self.window]) / 1e9
@@ -123,7 +117,7 @@ class AxisThread:
 
 @contextmanager
 def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
-    """The servo makes its motion, and is asked where it is, during the body."""
+    """Run the motion and the readings of a servo during the body."""
     start_rad = servo.read().position_rad
     if math.isnan(start_rad):
         raise DeviceError(
@@ -140,7 +134,7 @@ def turning_servo(servo: ServoDriver, motion: Motion) -> Iterator[AxisThread]:
 
 
 def _join(thread: Thread) -> None:
-    """Wait for the end of the thread, also where Ctrl-C comes again: it might turn a servo that was just stopped."""
+    """Wait for the end of the thread, also at a second Ctrl-C: it could turn a servo after its stop."""
     again: KeyboardInterrupt | None = None
     while thread.is_alive():
         try:
@@ -152,7 +146,7 @@ def _join(thread: Thread) -> None:
 
 
 def _follow(servo: ServoDriver, axis: AxisThread, done: Event) -> None:
-    """The servo's thread: give each order at its time, ask for the state at `SERVO_HZ`, tell what goes wrong."""
+    """Run the servo thread: command each move at its time, read the state at `SERVO_HZ`, report errors."""
     began_s = due_s = answered_s = time.monotonic()
     moves: Iterator[Move] = iter(())
     move, to_hold = None, False
@@ -165,11 +159,11 @@ def _follow(servo: ServoDriver, axis: AxisThread, done: Event) -> None:
                 to_hold = ordered is None
                 began_s, moves = now_s, iter(()) if ordered is None else ordered
                 move = next(moves, None)
-            try:  # an order that was not answered is given again
+            try:  # a command without a reply is repeated
                 if to_hold:
                     servo.hold()
                     to_hold = False
-                    axis.stop_answers.put(True)
+                    axis.stop_replies.put(True)
                 if move is not None and now_s - began_s >= move.at_s:
                     if math.isinf(move.goal_rad):
                         servo.spin(move.rate_rad_s)
@@ -179,8 +173,8 @@ def _follow(servo: ServoDriver, axis: AxisThread, done: Event) -> None:
                 axis.received.put(servo.read())
                 answered_s = now_s
             except (DeviceTimeoutError, ProtocolError):
-                if now_s - answered_s > _DEAF_S:
+                if now_s - answered_s > _FAILING_S:
                     raise
-    except Exception as error:  # whatever it is, the thread that waits for it raises it
+    except Exception as error:  # raised by the receiving thread
         axis.received.put(error)
-        axis.stop_answers.put(False)
+        axis.stop_replies.put(False)

@@ -1,7 +1,7 @@
-"""Diagnosis of the devices: what is plugged in, how well it answers, what is wrong and what to do about it.
+"""Diagnosis of the connected devices, with remedies.
 
-It only reads. It opens the ports that are named, and those whose USB ids are in the catalogue. A servo is listened to
-first, then read; whoever drives it goes on. A lidar measures for a few seconds, its laser on, and keeps no setting.
+It only reads. It opens the given ports, and those whose USB ids are in the catalogue. A servo is read only if no other
+program drives it. A lidar measures for a few seconds, its laser on, and keeps no setting.
 """
 
 from __future__ import annotations
@@ -32,23 +32,22 @@ from scanwright.firmware_io.servo.find import find_servo, listen_first, open_bus
 from scanwright.firmware_io.servo.fitness import ServoSetupError, slow_adapter, unfit_settings
 
 SERVO_SETTING = "servo_setting"  # code of a finding that a set-up of the servo at port `subject` solves
-
-_MEASURED_S = 4.0  # 40 turns of the slowest lidar: a rate to a fortieth
-_RATE_WITHIN = 0.02  # data sheets allow a motor 1 to 2 %
-_RETURNS_LEAST = 0.1  # of the beams; fewer come back from outdoors only
+_MEASURED_S = 4.0  # 40 turns of the slowest lidar: a rate within 2.5 %
+_RATE_WITHIN = 0.02  # data sheets specify 1 to 2 %
+_RETURNS_LEAST = 0.1  # of the beams; only scenes outdoors have fewer
 _BOUND_MS = 2.0  # 0.12 deg at 60 deg/s
-_READS = 100  # a second of them
-_READS_HZ = 1.2 * SERVO_HZ  # with some reserve
+_READS = 100  # one second
+_READS_HZ = 1.2 * SERVO_HZ  # with a reserve
 
 
 def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: int | None) -> Iterator[Finding]:
-    """Examine the named ports, else the emulated scanner of the build folder, else what the catalogue knows by USB ids.
+    """Examine the given ports, the emulated scanner of the build folder, or the ports with USB ids of the catalogue.
 
     Args:
-        out: build folder; its angle set says which devices it should be.
+        out: build folder; its angle set names the expected devices.
         lidar: address.
         servo: port.
-        servo_id: number of the servo on its bus; None if it is alone.
+        servo_id: None if it is the only servo.
     """
     yield _ok("system", "", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
     angles = None if out is None else load_angles(out / "angles.json")
@@ -74,12 +73,12 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
 
 
 def fix(out: Path | None, servo: str | None, servo_id: int | None) -> tuple[str, Iterator[str | Path]]:
-    """Correct servo settings; only on a named port or an emulated scanner (else DeviceError).
+    """Correct servo settings of a given port or an emulated scanner; DeviceError without either.
 
     Args:
         out: build folder, which gets the undo file; None for the working folder.
         servo: port.
-        servo_id: id on its bus; None if it is alone.
+        servo_id: None if it is the only servo.
 
     Returns:
         The port, and the steps of `settings.set_up`.
@@ -93,14 +92,14 @@ def fix(out: Path | None, servo: str | None, servo_id: int | None) -> tuple[str,
 
 
 def _servo_of(angles: AngleSet | None) -> tuple[str | None, bool | None]:
-    """Model of the servo, and whether it spins, as far as an angle set specifies it."""
+    """Return the model of the servo, and whether it spins; None if the angle set does not specify it."""
     if angles is None:
         return None, None
     return angles.servo, None if angles.motion is None else isinstance(angles.motion, Spin)
 
 
 def _guarded(port: str, examination: Iterator[Finding]) -> Iterator[Finding]:
-    """A device that fails ends its own examination only."""
+    """Convert the errors of an examination to findings."""
     try:
         yield from examination
     except ServoSetupError as error:
@@ -148,7 +147,6 @@ def _examine_lidar(port: str, angles: AngleSet | None) -> Iterator[Finding]:
 
 
 def _examine_servo(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> Iterator[Finding]:
-    """Listen, then ask."""
     with closing(open_bus(port)) as bus:
         listen_first(bus)
         unit = find_servo(bus, model, servo_id)
@@ -161,7 +159,7 @@ def _examine_servo(port: str, model: str | None, servo_id: int | None, *, spins:
         answers = [unit.present() for _ in range(_READS)]
         reads_hz = _READS / (time.monotonic() - began_s)
     bound_ms = median(answer.bound_ns for answer in answers) / 1e6
-    volts, degC = (table.pick(one, answers[-1].data) for one in (table.voltage, table.temperature))
+    volts, degC = (table.pick(register, answers[-1].data) for register in (table.voltage, table.temperature))
     yield _ok("servo_identity", port, f"{name} ({table.model}), {protocol}")
     if reports:
         hint = "find the cause before it turns again; a scan resets it"
@@ -186,5 +184,5 @@ def _ok(code: str, subject: str, message: str) -> Finding:
 
 
 def _judged(good: bool, code: str, port: str, text: str, value: float, limit: float, unit: str, hint: str) -> Finding:
-    """A finding that is ok, or a warning with a hint."""
+    """Return a finding that is ok, or a warning with a hint."""
     return Finding(code, "ok" if good else "warning", port, f"{port}: {text}", value, limit, unit, "" if good else hint)

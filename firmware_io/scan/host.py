@@ -1,4 +1,4 @@
-"""Diagnosis of this computer: what keeps serial ports from working, and the udev rules that cure it (Linux)."""
+"""Diagnosis of serial ports of this computer, and udev rules for them (Linux)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BRIDGES = {
     "1a86:55d3": "CH343, of Feetech's boards",
     "0403:6001": "FT232R",
 }
-"""USB to serial bridges that lidars and servo adapters come with, but other devices too; ids of the makers."""
+"""USB to serial bridges of lidars and servo adapters, also used in other devices; ids of the makers."""
 
 CURED_BY_RULES = ("brltty", "modem_manager", "latency_timer")
 """Codes of the findings that `udev_rules` solve."""
@@ -31,11 +31,7 @@ _SLOWEST_MS = 1  # latency timer: below the 10 ms between two readings of a serv
 
 
 def examine_host(ports: Iterable[str]) -> Iterator[Finding]:
-    """Examine what holds or hides serial ports.
-
-    Args:
-        ports: of the devices, as far as they are known.
-    """
+    """Examine permissions of the ports, and programs and settings that disturb serial ports."""
     yield from _permissions(ports)
     if rule := _brltty_rule():
         hint = "remove the package brltty, or install the udev rules"
@@ -74,7 +70,7 @@ def _permissions(ports: Iterable[str]) -> Iterator[Finding]:
 
 
 def _brltty_rule() -> Path | None:
-    """The rule by which brltty takes common adapters; None if there is none, or a file of the same name masks it."""
+    """Return the rule by which brltty claims common adapters; None without one, or if another file masks it."""
     seen: set[str] = set()
     for folder in _RULE_FOLDERS:
         for file in sorted((_ROOT / folder).glob("*brltty*.rules")):
@@ -108,7 +104,7 @@ def _latency_timers() -> Iterator[Finding]:
 
 
 def _shared_serial_numbers() -> Iterator[Finding]:
-    """Adapters that `/dev/serial/by-id` cannot tell apart."""
+    """Find adapters that `/dev/serial/by-id` does not distinguish."""
     ports: defaultdict[tuple[int, int, str], list[str]] = defaultdict(list)
     for port in list_ports.comports():
         if port.vid is not None and port.pid is not None:

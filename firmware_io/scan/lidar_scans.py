@@ -1,7 +1,7 @@
-"""Scans of a lidar, across disconnections, and its clock on the host's.
+"""Scans of a lidar, across disconnections, and the settling of its clock.
 
 If the lidar falls silent, its cable may be torn, so the servo stops and holds at once. If the sensor is back within ten
-seconds, the scan goes on, up to nine times in ten minutes. A sensor that reports a fault of its own ends it.
+seconds, the scan continues, up to nine times in ten minutes. A fault reported by the sensor ends it.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from scanwright.firmware_io.scan.reporter import Reporter
 
 CLOCK_GOOD_NS = 500_000  # 0.03 deg at 60 deg/s, a third of an encoder's step
 _CLOCK_LEAST_S = 3.0  # three one-second buckets give a rate
-_CLOCK_PATIENCE_S = 10.0  # longer improves it no more on a busy computer
+_CLOCK_PATIENCE_S = 10.0  # more does not help on a busy computer
 _AWAY_S = 10.0  # to plug it in again, and for its start
-_MOST_LOST, _LOST_WITHIN_S = 10, 600.0  # a loose plug or a weak supply: no scan comes of it
-_SERVO_UNKNOWN = "the servo has not answered that it stands: look, and cut its power if it turns"
+_MOST_LOST, _LOST_WITHIN_S = 10, 600.0  # a loose plug or a weak supply
+_SERVO_UNKNOWN = "the servo did not confirm that it stopped: check it, and cut its power if it turns"
 
 
 class LidarScans:
-    """Scans with the host's times, as they come; goes on after the sensor was away for a while."""
+    """Source of scans with host times that reconnects a lost sensor."""
 
     def __init__(self, lidar: LidarDriver, reporter: Reporter) -> None:
         self.lidar = lidar
         self.axis: AxisThread | None = None  # stops while the sensor is away; None before the servo turns
         self.clock_ns = 0  # standard uncertainty of the last scan's time
-        self.away = 0  # how often the sensor was
+        self.away = 0  # number of disconnections
         self._warned = ""
         self._reporter = reporter
         self._lost_s: deque[float] = deque(maxlen=_MOST_LOST)
@@ -68,13 +68,13 @@ class LidarScans:
             self.lidar.reconnect(max(deadline_s - time.monotonic(), 0.0))
             try:
                 return self.lidar.read()
-            except DeviceError:  # a sensor that just got its power answers before it measures
+            except DeviceError:  # a sensor that just got its power replies before it measures
                 if time.monotonic() > deadline_s:
                     raise
 
 
 def settle_clock(scans: LidarScans, reporter: Reporter) -> None:
-    """Read scans until the sensor's clock is known, or for so long that it will not be."""
+    """Read scans until the sensor's clock is known, at most `_CLOCK_PATIENCE_S`."""
     reporter.step("estimating the sensor's clock")
     began_s = time.monotonic()
     while (waited_s := time.monotonic() - began_s) < _CLOCK_LEAST_S or scans.clock_ns > CLOCK_GOOD_NS:

@@ -1,7 +1,7 @@
-"""Scans for a live view, placed as `assemble` places them.
+"""Scans for a live view, placed as by `assemble`.
 
-The reading thread appends to two short queues; another thread sends them five times a second to a process of its own
-that makes points. A slow viewer loses its oldest scans, which are counted; the recording loses nothing.
+The reading thread appends to two short queues; another thread sends them five times a second to a separate process
+that computes points. A slow viewer loses its oldest scans, which are counted; the recording loses nothing.
 """
 
 from __future__ import annotations
@@ -24,54 +24,39 @@ from scanwright.firmware_io.assembly.streaming import Assembler
 from scanwright.firmware_io.samples import JointSample, Scan
 from scanwright.firmware_io.scan.scan_end import ScanEnd
 
-MOST_SCANS = 400  # ten seconds at 40 Hz: as long as the page takes to start on a busy computer
+MOST_SCANS = 400  # ten seconds at 40 Hz, the start of the page on a busy computer
 MOST_ANGLES = 2000  # 20 s at 100 Hz
 EVERY_S = 0.2  # five times a second looks continuous
 
 
 class Watch(Protocol):
-    """Receives a recording while it is made; none of these may wait."""
+    """Receiver of a recording while it is made; its methods must not block."""
 
     def joint(self, time_ns: int, position_rad: float) -> None:
-        """An angle of the servo."""
+        """Receive an angle of the servo."""
 
     def scan(self, scan: Scan) -> None:
-        """A scan whose last beam is not later than the last angle."""
+        """Receive a scan whose last beam is not later than the last angle."""
 
     def message(self, line: str) -> None:
-        """A line of progress, or a warning."""
+        """Receive a line of progress, or a warning."""
 
     def close(self) -> None:
-        """The recording has ended."""
+        """End the recording."""
 
 
 class Viewer(Watch, Protocol):
     """A `Watch` that also shows how the scan ended."""
 
     def ended(self, end: ScanEnd) -> None:
-        """How the scan ended; the last call before `close`."""
+        """Receive the end of the scan; the last call before `close`."""
 
 
-class Unwatched:
+class Unwatched(Viewer):
     """The `Viewer` of a recording without viewers."""
 
-    def joint(self, time_ns: int, position_rad: float) -> None:
-        """Nothing."""
 
-    def scan(self, scan: Scan) -> None:
-        """Nothing."""
-
-    def message(self, line: str) -> None:
-        """Nothing."""
-
-    def ended(self, end: ScanEnd) -> None:
-        """Nothing."""
-
-    def close(self) -> None:
-        """Nothing."""
-
-
-UNWATCHED = Unwatched()
+UNWATCHED = Unwatched()  # type: ignore[abstract]  # the empty bodies of `Viewer` are its implementation
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +89,13 @@ class Both:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
-    """What came since the last one; `lost` counts the scans that the view left out so far."""
+    """Data since the last batch."""
 
-    time_ns: Int64[ndarray, " n"]
+    time_ns: Int64[ndarray, " n"]  # of the angles, shape (n,)
     position_rad: Float64[ndarray, " n"]
     scans: tuple[Scan, ...]
     lines: tuple[str, ...]
-    lost: int
+    lost: int  # scans that the view has dropped so far
     end: ScanEnd | None = None
 
 
@@ -150,7 +135,7 @@ class Feed:
             self.end = end
 
     def close(self) -> None:
-        """Send what is left, and end; a viewer that does not take it is not waited for."""
+        """Send the rest, for at most 2 s, and close the pipe."""
         self._done.set()
         self._thread.join(timeout=2.0)
         self._sending.close()
@@ -170,43 +155,34 @@ class Feed:
             last = self._done.wait(EVERY_S)
             try:
                 self._sending.send(self._batch())
-            except OSError:  # the viewer has gone: the scan goes on
+            except OSError:  # the viewer was closed: the scan continues
                 return
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudGrowth:
-    """By what a cloud has grown.
+    """New points of a cloud."""
 
-    Attributes:
-        points_m: in the world, shape (n, 3).
-        intensity: shape (n,), 0 from a sensor that measures none.
-        time_s: of the scan that each belongs to, since the first one, shape (n,).
-        lines: messages of the scan since the last one.
-        lost: scans that the view left out so far.
-        end: how the scan ended; None while it runs.
-    """
-
-    points_m: Float32[ndarray, "n 3"]
-    intensity: Float32[ndarray, " n"]
-    time_s: Float32[ndarray, " n"]
-    lines: tuple[str, ...]
-    lost: int
-    end: ScanEnd | None = None
+    points_m: Float32[ndarray, "n 3"]  # in the world
+    intensity: Float32[ndarray, " n"]  # 0 from a sensor that measures none
+    time_s: Float32[ndarray, " n"]  # of the scan of each point, since the first scan
+    lines: tuple[str, ...]  # new messages
+    lost: int  # scans that the view has dropped so far
+    end: ScanEnd | None = None  # None while the scan runs
 
 
 class Placing:
-    """Batches in, points out, as `Assembler` places them; the axis straight between its samples, so that none waits."""
+    """Converter of batches to points by `Assembler`, with linear interpolation of the axis, so that no scan waits."""
 
     def __init__(self, angles: AngleSet, own_body: OwnBody | None) -> None:
         self._assembler = Assembler(angles, own_body=own_body, smooth=False)
         self._first_ns: int | None = None
 
     def place(self, batch: Batch) -> CloudGrowth:
-        """Points of the scans of a batch; beams without a place are left out of the view."""
+        """Return the points of the scans of a batch."""
         angles = map(JointSample, batch.time_ns.tolist(), batch.position_rad.tolist())
-        came: list[JointSample | Scan] = [*angles, *batch.scans]
-        placed = [line for what in came for line in self._assembler.push(what)]
+        messages: list[JointSample | Scan] = [*angles, *batch.scans]
+        placed = [line for message in messages for line in self._assembler.push(message)]
         points = [np.empty((0, 3), np.float32)]
         intensity, seconds = [np.empty(0, np.float32)], [np.empty(0, np.float32)]
         for line in placed:
@@ -229,15 +205,15 @@ class Placing:
 
 
 def batches(receiving: Connection) -> Iterator[Batch]:
-    """What comes through the pipe, until the other end is closed."""
+    """Yield the batches from the pipe until the other end is closed."""
     while True:
         try:
             batch = receiving.recv()
-        except (EOFError, OSError):  # OSError: the sender was killed within a message
+        except (EOFError, OSError):  # OSError: the sender was killed in a message
             return
         yield batch
 
 
 def growing(receiving: Connection, placing: Placing) -> Iterator[CloudGrowth]:
-    """What comes through the pipe, placed, until the other end is closed."""
+    """Yield the points of the batches from the pipe until the other end is closed."""
     return map(placing.place, batches(receiving))

@@ -1,4 +1,4 @@
-"""Plan of a scan: read, checked and printed before any device is touched."""
+"""Plan of a scan, checked before any device is opened."""
 
 from __future__ import annotations
 
@@ -22,30 +22,11 @@ _LONGEST_S = 7 * 24 * 3600.0  # a week
 
 @dataclass(frozen=True, slots=True)
 class ScanPlan:
-    """Plan of one scan.
+    """Plan of one scan; for the other fields see `plan_scan`."""
 
-    Attributes:
-        angles: angle set of the scanner, calibrated if it has been.
-        angles_path: its file.
-        frames: description of it.
-        motion: of its servo.
-        turns: full scans.
-        intensity: whether intensities are recorded.
-        cluster: steps that share one range, the least of theirs.
-        every: one scan of so many is recorded.
-        stamp_at: beam of the sensor's timestamps; None for the default of its family.
-        echo: echo that a beam of a SICK reports; None leaves it as it is.
-        mean_filter_off: switch a SICK's mean filter off.
-        ports: where the devices are.
-        servo_id: number of the servo on its bus; None if it is alone there.
-        recording: file to write.
-        attached: files kept inside it, name -> text.
-        endless: record nothing, and go on until it is ended.
-    """
-
-    angles: AngleSet
+    angles: AngleSet  # calibrated, if there is a calibration
     angles_path: Path
-    frames: str
+    frames: str  # description of the angle set
     motion: Motion
     turns: int
     intensity: bool
@@ -57,12 +38,12 @@ class ScanPlan:
     ports: Ports
     servo_id: int | None
     recording: Path
-    attached: dict[str, str]
+    attached: dict[str, str]  # files kept inside the recording, name -> text
     endless: bool = False
 
     @property
     def duration_s(self) -> float:
-        """How long the recording lasts."""
+        """Duration of the recording."""
         return self.turns * self.motion.duration_s
 
     def lines(self) -> list[str]:
@@ -95,26 +76,26 @@ def plan_scan(
     mean_filter_off: bool = False,
     endless: bool = False,
 ) -> ScanPlan:
-    """Plan a scan with the scanner of a build folder; touch no device and write nothing.
+    """Plan a scan with the scanner of a build folder, without opening a device or writing a file.
 
     Args:
-        out: build folder; its `angles.json` is all that is needed.
+        out: build folder with an `angles.json`.
         turns: full scans.
         period_s: of one full scan; None for that of the angle set. `calibrate` needs two to find the backlash.
-        lidar: address; None for the emulated or the plugged-in one, as for `servo`.
+        lidar: address; None for the emulated or the connected one, as for `servo`.
         servo: port.
-        servo_id: its number on the bus; None if it is alone there.
+        servo_id: None if it is the only servo.
         recording: None for one in `out`, named by date and time.
         intensity: record intensities.
-        cluster: steps that share one range.
-        every: one scan of so many is recorded.
+        cluster: steps that share one range, the smallest of them.
+        every: record only each n-th scan.
         stamp_at: beam of the sensor's timestamps; None for the default of its family.
-        echo: echo that a beam of a SICK reports; None leaves it as it is.
+        echo: echo that a beam of a SICK reports; None leaves it unchanged.
         mean_filter_off: switch a SICK's mean filter off.
-        endless: record nothing, and go on until it is ended; `turns` and `recording` have no effect then.
+        endless: record nothing and run until stopped; `turns` and `recording` have no effect.
 
     Raises:
-        ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an unusable file name.
+        ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an invalid file name.
     """
     in_use = angles_in_use(out)
     angles = in_use.angles

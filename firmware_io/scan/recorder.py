@@ -1,4 +1,4 @@
-"""Recorder of a live scan: a crash costs less than a second.
+"""Recorder of a live scan; a crash loses less than a second.
 
 Every quarter of a second the messages so far are written as one chunk and synced. After kill -9, a full disk or a power
 cut the file has no index; `scanwright repair` adds it. Device times are on the monotonic clock; the difference to the
@@ -26,15 +26,19 @@ from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 
 
 class Recorder:
-    """Recorder; use it in `with`. A thread waits for the disk, so that `scan` and `joint` return at once.
+    """Recorder; a context manager. A thread waits for the disk, so that `scan` and `joint` return at once.
+
+    Args:
+        path: of the file.
+        note: origin of the recording.
+        attached: files to keep inside it (name -> text), such as angles.json.
 
     Raises:
         RecordingError: the file exists or cannot be created.
-        DeviceError: the disk refuses; what was written before stays and can be repaired.
+        DeviceError: a write fails; earlier data can be repaired.
     """
 
     def __init__(self, path: Path, note: Mapping[str, str], attached: Mapping[str, str]) -> None:
-        """Args: the file; where it comes from, in words; files to keep with it (name -> text), such as angles.json."""
         self._path = path
         self._wall_minus_monotonic_ns = time.time_ns() - time.monotonic_ns()
         self._note = {**note, "wall_minus_monotonic_ns": str(self._wall_minus_monotonic_ns)}
@@ -86,7 +90,7 @@ class Recorder:
                 with self._lock:
                     self._messages.flush()
                 self._file.sync()
-        except Exception as error:  # whatever it is, the thread that writes next raises it
+        except Exception as error:  # raised by the next write of another thread
             self._failure = error
 
     def _check(self) -> None:
@@ -96,14 +100,14 @@ class Recorder:
             raise self._failure
 
     def _lost(self, error: OSError) -> DeviceError:
-        kept = f"what came before is on the disk: free space, then `scanwright repair {self._path}`"
+        kept = f"earlier data are on the disk: free space, then `scanwright repair {self._path}`"
         return DeviceError(f"{self._path}: cannot write: {error.strerror or error}; {kept}")
 
 
 def recorder_of(
     path: Path | None, note: Mapping[str, str], attached: Mapping[str, str]
 ) -> AbstractContextManager[Recorder | Watch]:
-    """The recorder of a file, whose folder is made, or one that keeps nothing."""
+    """Return the recorder of a file, whose folder is made, or one that writes nothing."""
     if path is None:
         return nullcontext(UNWATCHED)
     path.parent.mkdir(exist_ok=True)
@@ -111,7 +115,7 @@ def recorder_of(
 
 
 class _AtomicWrites:
-    """A new file that grows by what was written between two flushes, or not at all."""
+    """A new file to which a flush appends all pending bytes or none."""
 
     def __init__(self, path: Path) -> None:
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)

@@ -1,4 +1,4 @@
-"""Messages of a scan: progress for the caller, warnings for the log, both for those who watch it live."""
+"""Messages of a scan: progress for the caller, warnings for the log, both for live viewers."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Reporter:
-    """Passes on what happens in a scan."""
+    """Receiver of the messages of a scan."""
 
     progress: Progress = no_progress
     watch: Watch = UNWATCHED
 
     def step(self, text: str, fraction: float | None = None) -> None:
-        """Report what is being done, and the share of it that is done."""
+        """Report a step, and its completed fraction."""
         self.progress(text, fraction)
         self.watch.message(text if fraction is None else f"{fraction:.0%}: {text}")
 
     def warn(self, text: str) -> None:
-        """Report what a person must look at."""
+        """Report a warning."""
         _log.warning("%s", text)
         self.watch.message(f"warning: {text}")

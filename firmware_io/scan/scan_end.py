@@ -1,4 +1,4 @@
-"""How a scan ended, in the words of the terminal: for a page that must not stay silent about it."""
+"""End of a scan, with the lines of the terminal, for live views."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 Outcome = Literal["done", "lossy", "stopped", "failed", "unsafe"]
 
-_SERVO_UNKNOWN = "state of the servo unknown: look, and cut its power if it turns"
+_SERVO_UNKNOWN = "state of the servo unknown: check it, and cut its power if it turns"
 _HEADINGS: dict[Outcome, str] = {
     "done": "The scan is done.",
     "lossy": "The scan is done, but data were lost.",
@@ -23,15 +23,10 @@ _HEADINGS: dict[Outcome, str] = {
 
 @dataclass(frozen=True, slots=True)
 class ScanEnd:
-    """The end of a scan.
+    """The end of a scan."""
 
-    Attributes:
-        outcome: `unsafe` if a device did not confirm that it stopped: the servo may turn, or the laser may be on.
-        lines: the lines that the terminal prints.
-    """
-
-    outcome: Outcome
-    lines: tuple[str, ...]
+    outcome: Outcome  # `unsafe` if a device did not confirm that it stopped
+    lines: tuple[str, ...]  # as printed in the terminal
 
     @property
     def heading(self) -> str:
@@ -43,10 +38,10 @@ LOST = ScanEnd(
     "unsafe",
     (
         "The connection to the scan program is lost, and the state of the devices is unknown.",
-        "The servo may turn and the laser may be on: look, and cut their power.",
+        "The servo may turn and the laser may be on: check them, and cut their power.",
     ),
 )
-"""The end of a scan whose program went away without a word."""
+"""The end of a scan whose program died."""
 
 
 def finished(summary: ScanSummary, lines: Iterable[str] = ()) -> ScanEnd:
@@ -61,7 +56,7 @@ def failed(error: ScanwrightError) -> ScanEnd:
 
 
 def stopped(stop: KeyboardInterrupt) -> ScanEnd:
-    """Return the end of a scan that a person stopped; unsafe without an answer of the servo."""
+    """Return the end of a scan stopped by the user; unsafe without a reply of the servo."""
     notes = notes_of(stop)
     unsafe = not notes or _has_unsafe_note(stop)
     return ScanEnd("unsafe" if unsafe else "stopped", ("stopped", *(notes or [_SERVO_UNKNOWN])))

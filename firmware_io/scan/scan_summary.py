@@ -1,11 +1,11 @@
-"""What a scan recorded, and what it left out."""
+"""Summary of a scan: recorded and dropped data."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-BETWEEN_STOPS = "scans between two stops"  # between two stops: left out by design
+BETWEEN_STOPS = "scans between two stops"  # dropped by design
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,11 @@ class ScanSummary:
 
     @property
     def lost_data(self) -> bool:
-        """Whether data are missing that the motion does not leave out by design."""
+        """Whether data are missing other than those dropped by design."""
         return bool(self.reconnects or set(self.left_out) - {BETWEEN_STOPS})
 
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Format the summary."""
         lines = [f"dropped {count:,}: {reason}" for reason, count in self.left_out.items()]
         if self.reconnects:
             lines.append(f"lidar reconnects: {self.reconnects}")

@@ -1,1 +1,1 @@
-"""Servos: what everybody asks of one (`servo`), the guard that takes its torque, and one folder a family."""
+"""Servo driver, its watchdog process, and one folder per protocol family."""

@@ -1,4 +1,4 @@
-"""Change the id or baud rate of a servo, with care: a mistake makes it hard to find again."""
+"""Change of the id or baud rate of a servo."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def set_address(
         folder: for the undo file.
 
     Raises:
-        ScanwrightError: nothing to do, or no such id.
+        ScanwrightError: nothing to do, or an invalid id.
         DeviceError: no servo or several match, the id is taken, servo or adapter lack the baud rate, its torque is on,
             or the undo file cannot be written: then nothing was changed. Or the servo keeps its old setting.
     """
@@ -42,16 +42,16 @@ def set_address(
         unit = _only(bus, from_id, from_baud)
         table = unit.table
         yield f"{unit} ({table.model}), protocol {table.protocol} at {bus.baud} baud"
-        wanted = {
+        counts = {
             table.id: unit.id if new_id is None else new_id,
             table.baud: table.baud_count(bus.baud if new_baud is None else new_baud),
         }
-        changes = [(one, was, count) for one, count in wanted.items() if (was := unit.count(one)) != count]
+        changes = [(entry, was, count) for entry, count in counts.items() if (was := unit.count(entry)) != count]
         if not changes:
             yield f"{unit}: number and speed are right already"
             return
         check_torque(unit)
-        _refuse_collision(unit, wanted)
+        _refuse_collision(unit, counts)
         yield keep_settings(folder, unit, changes)
         for register, was, count in changes:
             unit, line = changed(unit, register, was, count)
@@ -59,7 +59,7 @@ def set_address(
 
 
 def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUnit:
-    """The servo that is meant."""
+    """Return the servo with this id and baud rate, or the only one."""
     listen_first(bus)
     if from_id is None:
         there = all_answering(bus, from_baud)
@@ -72,13 +72,13 @@ def _only(bus: ServoBus, from_id: int | None, from_baud: int | None) -> ServoUni
     return find_servo(bus, None, from_id, baud=from_baud)
 
 
-def _refuse_collision(unit: ServoUnit, wanted: dict[Register, int]) -> None:
-    """Check that no servo has the new number at the new speed, and that the adapter supports that speed."""
+def _refuse_collision(unit: ServoUnit, counts: dict[Register, int]) -> None:
+    """Check that no servo has the new id at the new baud rate, and that the adapter supports that rate."""
     bus, table, before = unit.bus, unit.table, unit.bus.baud
-    new_id, new_baud = wanted[table.id], table.bauds[wanted[table.baud]]
+    new_id, new_baud = counts[table.id], table.bauds[counts[table.baud]]
     if not bus.set_baud(new_baud):
-        raise DeviceError(f"{bus.port}: this adapter cannot do {new_baud} baud; nothing was changed")
-    answering = bus.ping(new_id, PING_S)  # it is not the servo itself: number or speed are others
+        raise DeviceError(f"{bus.port}: this adapter does not support {new_baud} baud; nothing was changed")
+    answering = bus.ping(new_id, PING_S)  # another servo: this one has another id or baud rate
     bus.set_baud(before)
     if answering:
         raise DeviceError(f"{bus.port}: a servo {new_id} answers at {new_baud} baud already; nothing was changed")

@@ -1,4 +1,4 @@
-"""Servo families that can be driven; one line here makes a family known to every command.
+"""Supported servo families.
 
 An installed package adds a `ServoFamily` by an entry point of the group "scanwright.servos" (docs/how-to/new-servo.md).
 """
@@ -21,11 +21,9 @@ class ServoFamily:
     """Servos of one maker.
 
     Attributes:
-        name: of the family.
-        tables: of its models.
-        bauds: bits per second, those first that servos are set to most.
-        emulator: "package.module:Class" of its `emulators.servo.machine.ServoMachine`, made of (control table, load on
-            the horn, time in ns, angle of the horn); drivers import no emulators.
+        bauds: baud rates, most common first.
+        emulator: "package.module:Class" of its `emulators.servo.machine.ServoMachine`, with arguments (control table,
+            load on the horn, time in ns, angle of the horn); drivers import no emulators.
     """
 
     name: str
@@ -34,7 +32,7 @@ class ServoFamily:
     emulator: str
 
     def formats(self, model: str | None) -> tuple[PacketFormat, ...]:
-        """How the servos of that name, or all of them, pack what they say."""
+        """Return the packet formats of a model, or of all."""
         return tuple(dict.fromkeys(table.packets for table in self.tables if model in (None, table.model)))
 
 
@@ -56,10 +54,10 @@ FAMILIES = (
 
 @cache
 def all_families() -> dict[str, ServoFamily]:
-    """The shipped families and those of installed packages, by name; raises as `with_installed`."""
+    """Return the shipped families and those of installed packages, by name; raises as `with_installed`."""
     return with_installed(SERVO_GROUP, ServoFamily, FAMILIES)
 
 
 def all_tables() -> tuple[ControlTable, ...]:
-    """The control tables of every family; raises as `all_families`."""
+    """Return the control tables of all families; raises as `all_families`."""
     return tuple(table for family in all_families().values() for table in family.tables)

@@ -1,4 +1,4 @@
-"""Find baud rate, protocol and model of a servo on a port. Writes only to unmute a servo, on request."""
+"""Detection of baud rate, protocol and model of a servo on a port."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from scanwright.firmware_io.servo.fitness import mute_servo
 
 Unmute = Literal["never", "until power-off", "for good"]
 
-_PATIENT_PING_S = 0.2  # four times as long, for a device that starts
+_PATIENT_PING_S = 0.2  # for a device that is starting
 _LISTEN_S = 0.3  # thirty readings of another program at 100 Hz
 
 
 def open_bus(port: str) -> ServoBus:
-    """The port alone, before it is known who is on it."""
+    """Open a port before its servos are known."""
     return ServoBus(port, all_tables()[0].packets)
 
 
 def find_servo(
     bus: ServoBus, model: str | None, servo_id: int | None, *, baud: int | None = None, unmute: Unmute = "never"
 ) -> ServoUnit:
-    """Set the bus to the speed and the packets that a servo answers to. Only reads, unless it may unmute the servo.
+    """Set the bus to the baud rate and packets of a servo. Only reads, unless `unmute` allows to write.
 
     Args:
-        bus: a fresh one.
-        model: what it must be; None for any that is known.
-        servo_id: its number; None if it is alone.
-        baud: the only speed to ask at; None for all that are known.
-        unmute: whether to set a servo that answers nothing but pings to answer everything: never, only if that setting
-            is volatile (else its torque is turned off), or always.
+        bus: a newly opened one.
+        model: expected catalogue name; None for any.
+        servo_id: None if it is the only servo.
+        baud: None to try all known ones.
+        unmute: whether to set a servo that replies only to pings to reply to all requests: never, only if that setting
+            is volatile (otherwise its torque is turned off), or always.
 
     Raises:
-        ServoSetupError: it is mute, and may not be unmuted.
-        DeviceError: none answers, several do, or it is another model.
+        ServoSetupError: it replies only to pings, and `unmute` does not allow to change that.
+        DeviceError: no servo replies, several do, or it is another model.
     """
     if model is not None and model not in {table.model for table in all_tables()}:
         known = f"known: {', '.join(sorted({table.model for table in all_tables()}))}"
@@ -48,7 +48,7 @@ def find_servo(
     bus.find_echo()
     mute: tuple[int, str, int] | None = None
     met: set[str] = set()
-    for wait_s in (PING_S, _PATIENT_PING_S):  # adapter or servo may still be starting, or this computer be busy
+    for wait_s in (PING_S, _PATIENT_PING_S):  # adapter or servo may be starting, or this computer busy
         strangers = []
         for unit in _answering(bus, model, servo_id, baud, wait_s):
             identity = _identity(unit)
@@ -64,20 +64,18 @@ def find_servo(
             if identity is not None:
                 strangers.append(f"servo {unit.id} has model number {identity} in protocol {bus.packets.protocol}")
             elif unit.table.can_be_mute and mute == here:
-                if (
-                    unmute == "until power-off"
-                ):  # who is going to drive it wants it without torque, and cannot read that
+                if unmute == "until power-off":  # the driver requires torque off, which it cannot read back
                     bus.write_unanswered(unit.id, unit.table.torque, unit.table.torque.encode(0))
                 raise mute_servo(bus.port, unit.table, unit.id)
             elif unit.table.can_be_mute:
                 mute = here
-        if any(stranger in met for stranger in strangers):  # not once: a late answer may be taken for another one's
+        if any(stranger in met for stranger in strangers):  # twice: a late reply can be mistaken for another one
             known = ", ".join(f"{table.number} {table.model}" for table in all_tables())
             raise DeviceError(f"{bus.port}: {', '.join(strangers)}, which is unknown; known: {known}")
         met |= set(strangers)
     missing = "no servo" if servo_id is None else f"servo {servo_id} does not answer; no servo"
-    speeds = ", ".join(str(one) for one in dict.fromkeys(speed for speed, _ in _line_settings(model, baud)))
-    raise DeviceTimeoutError(f"{bus.port}: {missing} at {speeds} baud: check its power, cable and number")
+    rates = ", ".join(dict.fromkeys(str(rate) for rate, _ in _line_settings(model, baud)))
+    raise DeviceTimeoutError(f"{bus.port}: {missing} at {rates} baud: check its power, cable and number")
 
 
 def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
@@ -88,7 +86,7 @@ def _may_unmute(table: ControlTable, unmute: Unmute) -> bool:
 
 
 def listen_first(bus: ServoBus) -> None:
-    """Check whether a device sends unasked, before anything is sent to it."""
+    """Raise DeviceError if a device sends without a request."""
     if noise := bus.listen(_LISTEN_S):
         raise DeviceError(
             f"{bus.port}: {len(noise)} bytes came before any request: another program drives this bus, or no "
@@ -97,56 +95,49 @@ def listen_first(bus: ServoBus) -> None:
 
 
 def all_answering(bus: ServoBus, baud: int | None) -> list[tuple[int, int]]:
-    """Speed and number of every servo that answers a ping, at one speed or at all that are known."""
+    """Return baud rate and id of all servos that reply to a ping, at one baud rate or at all known ones."""
     bus.find_echo()
     answering = set()
-    for speed, packets in _line_settings(None, baud):
+    for rate, packets in _line_settings(None, baud):
         bus.packets = packets
-        if bus.set_baud(speed):
-            answering |= {(speed, number) for number in bus.ping(packets.everyone, PING_S)}
+        if bus.set_baud(rate):
+            answering |= {(rate, number) for number in bus.ping(packets.everyone, PING_S)}
     return sorted(answering)
 
 
 def _line_settings(model: str | None, baud: int | None) -> Iterator[tuple[int, PacketFormat]]:
-    """Speeds and packets to ask with: every family's first speed before any one's second."""
+    """Return the baud rates and packet formats to try: the first rate of all families before their second."""
     families = all_families().values()
-    most = max(len(family.bauds) for family in families)
-    tried = set()
-    for rank in range(most):
-        for family in families:
-            for packets in family.formats(model):
-                speeds = family.bauds[rank : rank + 1] if baud is None else (baud,)
-                for speed in speeds:
-                    if (speed, packets) not in tried:
-                        tried.add((speed, packets))
-                        yield speed, packets
+    pairs = (
+        (rate, packets)
+        for rank in range(max(len(family.bauds) for family in families))
+        for family in families
+        for packets in family.formats(model)
+        for rate in (family.bauds[rank : rank + 1] if baud is None else (baud,))
+    )
+    return iter(dict.fromkeys(pairs))
 
 
 def _answering(
     bus: ServoBus, model: str | None, servo_id: int | None, baud: int | None, wait_s: float
 ) -> Iterator[ServoUnit]:
-    """A servo for each way in which one answers a ping, with the first table of those that speak so."""
-    for speed, packets in _line_settings(model, baud):
+    """Yield a servo for each baud rate and packet format with a reply to a ping, with any table of that format."""
+    for rate, packets in _line_settings(model, baud):
         bus.packets = packets
-        if bus.set_baud(speed):
+        if bus.set_baud(rate):
             answering = bus.ping(packets.everyone if servo_id is None else servo_id, wait_s)
             if len(answering) > 1:
                 raise DeviceError(f"{bus.port}: servos {answering} answer: give servo_id")
             if answering:
-                yield ServoUnit(bus, _any_table(packets), answering[0])
-
-
-def _any_table(packets: PacketFormat) -> ControlTable:
-    """One of those that speak so: what is common to all of them can be read from it."""
-    return next(table for table in all_tables() if table.packets is packets)
+                yield ServoUnit(bus, next(table for table in all_tables() if table.packets is packets), answering[0])
 
 
 def _identity(unit: ServoUnit) -> ControlTable | int | None:
-    """Return the table of a servo that answers; its model number if that is unknown; None if it has none.
+    """Return the table of a servo; its model number if that is unknown; None if it does not report one.
 
     Families with one packet format read each other's registers as model numbers, so the id must match too.
     """
-    with suppress(DeviceTimeoutError, ProtocolError):  # a late answer to the ping at another speed, or a mute one
+    with suppress(DeviceTimeoutError, ProtocolError):  # a late reply to a ping at another rate, or only pings
         number = unit.count(unit.table.model_number)
         for table in all_tables():
             if (table.packets, table.number) == (unit.table.packets, number) and unit.count(table.id) == unit.id:

@@ -1,8 +1,8 @@
-"""The settings that the driver needs in a servo: which differ, why each matters, and the error that lists them."""
+"""Settings that the driver requires of a servo, and the error that lists those that differ."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scanwright.design.errors import DeviceError
@@ -10,7 +10,7 @@ from scanwright.firmware_io.serial_port import latency_ms, latency_timer
 from scanwright.firmware_io.servo.bus.registers import ControlTable, Register, Setting
 from scanwright.firmware_io.servo.bus.unit import ServoUnit
 
-_READ_S = 0.007  # of bytes, so that with 3 ms for adapter and program 100 readings fit into a second
+_READ_S = 0.007  # longest bytes of a reading, so that with 3 ms for adapter and program it is read at 100 Hz
 _MUTE = "so that it answers nothing but pings"
 _ANSWERS_LESS = "so that it does not answer writes"
 _NEUTRAL = "which turns or shifts the angles"
@@ -19,31 +19,24 @@ _MODE = {True: "so that it does not turn continuously", False: "so that it does 
 
 @dataclass(frozen=True, slots=True)
 class SettingChange:
-    """A setting of a servo that must change.
-
-    Attributes:
-        register: its register.
-        now: its count.
-        needed: the count that the driver needs.
-        why: what the setting does as it is.
-    """
+    """A setting of a servo that must change."""
 
     register: Register
-    now: int
-    needed: int
-    why: str
+    now: int  # present count
+    needed: int  # required count
+    why: str  # effect of the present count
 
     def __str__(self) -> str:
         return f"{self.register} is {self.now}, {self.why}; {self.needed} is right"
 
 
 class ServoSetupError(DeviceError):
-    """Settings that are permanent must change before the servo can be used; nothing was written, nothing moved.
+    """Permanent settings must change before the servo can be used; nothing was written.
 
     Attributes:
         port: of the servo.
-        model: name, as in the catalogue; None if the servo does not answer a question for it.
-        servo_id: its number on the bus.
+        model: catalogue name; None if the servo does not report it.
+        servo_id: its id.
         changes: the settings, in the order in which they can be written.
     """
 
@@ -56,7 +49,7 @@ class ServoSetupError(DeviceError):
 
 
 def needed_settings(table: ControlTable, *, spins: bool | None) -> list[tuple[Setting, str]]:
-    """Return the settings that the driver requires, and the effect of others; `spins` None: motion not known yet."""
+    """Return the settings that the driver requires, and the effect of others; `spins` None: motion unknown."""
     mode = () if spins is None else table.mode(spins=spins)
     return [
         ((table.status_return, table.answers_all), _ANSWERS_LESS),
@@ -66,43 +59,48 @@ def needed_settings(table: ControlTable, *, spins: bool | None) -> list[tuple[Se
 
 
 def set_up_counts(table: ControlTable, baud: int, *, spins: bool | None) -> dict[Register, int]:
-    """The counts of a servo that is set up: `needed_settings`, no return delay, and a speed that suffices."""
+    """Return the counts of a configured servo: `needed_settings`, no return delay, a sufficient baud rate."""
     counts = {register: count for (register, count), _ in needed_settings(table, spins=spins)}
     counts[table.return_delay_ns] = 0
     return counts | (dict([table.fast]) if _reading_s(table, baud) > _READ_S else {})
 
 
 def mode_changes(unit: ServoUnit, *, spins: bool) -> list[SettingChange]:
-    """The settings of one mode that differ; only reads."""
+    """Read which settings of a mode differ."""
     return _differing(unit, [(setting, _MODE[spins]) for setting in unit.table.mode(spins=spins)])
 
 
 def needed_changes(unit: ServoUnit, *, spins: bool | None) -> list[SettingChange]:
-    """Return the required settings that differ; an unmuting that was made comes first, to be kept and undone."""
+    """Read which required settings differ; first the replies of a servo that was unmuted, to be undone."""
     level = unit.table.status_return
     muted = [SettingChange(level, 0, unit.table.answers_all, _MUTE)] if unit.was_mute else []
     return muted + _differing(unit, needed_settings(unit.table, spins=spins))
 
 
 def improvements(unit: ServoUnit) -> list[SettingChange]:
-    """The settings that differ and that the driver can do without, if less well; only reads."""
-    delay = unit.table.return_delay_ns
+    """Read which optional settings differ: return delay and baud rate."""
+    delay, baud = unit.table.return_delay_ns, unit.bus.baud
     late = f"so that its answers are {unit.value(delay) / 1e3:g} us late"
-    return [*_differing(unit, [((delay, 0), late)]), *_slow(unit)]
+    changes = _differing(unit, [((delay, 0), late)])
+    if (wire_s := _reading_s(unit.table, baud)) > _READ_S:
+        register, count = unit.table.fast
+        slow = f"{baud} baud, so that it can be read at {1 / wire_s:.0f} Hz at most"
+        changes.append(SettingChange(register, unit.count(register), count, slow))
+    return changes
 
 
 def unfit_settings(unit: ServoUnit, *, spins: bool | None = None) -> list[SettingChange]:
-    """All of `needed_changes` and `improvements`, in the order in which they can be written; only reads."""
+    """Read `needed_changes` and `improvements`, in the order in which they can be written."""
     return needed_changes(unit, spins=spins) + improvements(unit)
 
 
 def mute_servo(port: str, table: ControlTable, servo_id: int) -> ServoSetupError:
-    """The error of a servo that answers nothing but pings, and keeps that without power."""
+    """Return the error of a servo that permanently replies only to pings."""
     return ServoSetupError(port, None, servo_id, [SettingChange(table.status_return, 0, table.answers_all, _MUTE)])
 
 
 def settable(table: ControlTable) -> dict[str, Register]:
-    """The registers that a set-up may write, and the number of the servo, by their names."""
+    """Return the registers that a set-up can write, by name."""
     registers = [
         table.status_return,
         table.return_delay_ns,
@@ -114,12 +112,12 @@ def settable(table: ControlTable) -> dict[str, Register]:
 
 
 def slow_adapter(port: str) -> str | None:
-    """What to do about a USB adapter that gathers bytes before it hands them over; None if there is none."""
-    gathers_ms = latency_ms(port)
-    if gathers_ms <= 1:
+    """Return advice for a USB adapter with a latency above 1 ms; None for others."""
+    delay_ms = latency_ms(port)
+    if delay_ms <= 1:
         return None
     return (
-        f"the USB adapter gathers bytes for {gathers_ms} ms, so angles are late and few: as root, "
+        f"the USB adapter gathers bytes for {delay_ms} ms, so angles are late and few: as root, "
         f'echo 1 > {latency_timer(port)}, or permanently a udev rule with ATTR{{latency_timer}}="1"'
     )
 
@@ -135,14 +133,4 @@ def _differing(unit: ServoUnit, needed: list[tuple[Setting, str]]) -> list[Setti
 
 
 def _reading_s(table: ControlTable, baud: int) -> float:
-    """How long the bytes of one reading take."""
     return (table.packets.overhead + table.present.size) * 10 / baud
-
-
-def _slow(unit: ServoUnit) -> Iterator[SettingChange]:
-    """Its speed, if the servo cannot be read 100 times a second."""
-    table, baud = unit.table, unit.bus.baud
-    if (wire_s := _reading_s(table, baud)) > _READ_S:
-        register, count = table.fast
-        why = f"{baud} baud, so that it can be read at {1 / wire_s:.0f} Hz at most"
-        yield SettingChange(register, unit.count(register), count, why)

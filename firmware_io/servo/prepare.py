@@ -1,8 +1,9 @@
-"""Prepare a servo: torque off, faults cleared. Permanent registers are never written without consent."""
+"""Preparation of a servo: torque off, faults cleared, settings checked."""
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,12 +22,7 @@ _REBOOT_S = 3.0  # [assumed]: the e-manual states no time
 
 
 def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) -> tuple[str, ...]:
-    """Turn the torque off, clear faults, check the settings; return warnings for the user.
-
-    Raises:
-        ServoSetupError: permanent settings must change, and `undo_folder` is None.
-        DeviceError: the servo does not answer, or does not keep a setting.
-    """
+    """Turn the torque off, clear faults, check the settings; return warnings. Raises as `set_agreed`."""
     table, bus = unit.table, unit.bus
     if not table.is_permanent(table.status_return):
         unit.answer_everything()
@@ -45,25 +41,24 @@ def prepare(unit: ServoUnit, *, spins: bool | None, undo_folder: Path | None) ->
 
 
 def set_agreed(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: Path | None) -> None:
-    """Write volatile settings at once, and permanent ones only with a folder for their undo file.
+    """Write volatile settings, and permanent ones only with a folder for their undo file.
 
     Raises:
         ServoSetupError: a permanent setting differs and there is no folder; nothing was written.
-        DeviceError: the file cannot be written, or a setting does not stay.
+        DeviceError: no reply, the file cannot be written, or the servo does not keep a setting.
     """
     permanent = [change for change in changes if unit.table.is_permanent(change.register)]
-    if permanent and undo_folder is None:
-        raise ServoSetupError(unit.bus.port, unit.table.model, unit.id, permanent)
-    if permanent and undo_folder is not None:
-        for _ in write_changes(unit, permanent, undo_folder):
-            pass
+    if permanent:
+        if undo_folder is None:
+            raise ServoSetupError(unit.bus.port, unit.table.model, unit.id, permanent)
+        deque(write_changes(unit, permanent, undo_folder), maxlen=0)
     for change in changes:
         if change not in permanent:
             unit.set_permanent(change.register, change.needed)
 
 
 def _torque_off(unit: ServoUnit) -> None:
-    """Turn the torque off, also of a servo that is set not to answer that."""
+    """Turn the torque off, also of a servo that does not reply to writes."""
     level, torque = unit.table.status_return, unit.table.torque
     if unit.count(level) == unit.table.answers_all:
         unit.write(torque, 0)

@@ -1,56 +1,52 @@
-"""Whether a servo does what it was told: its state, the order it has, and the stall that parts them."""
+"""State of a servo, its commanded motion, and detection of a stall."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 
-_STALL_S = 0.5  # as long as the horn may take to start moving
-_STALL_COUNTS = 8  # of the encoder, due at least before a stall can be told from its steps
-_STALL_SHARE = 0.1  # of the way due
-_ARRIVED_RAD = math.radians(5.0)  # a loop without integral stops short of its goal, by friction and weight
+_STALL_S = 0.5  # longest start of a motion
+_STALL_COUNTS = 8  # expected motion above which a stall differs from the resolution of the encoder
+_STALL_SHARE = 0.1  # of the expected motion
+_ARRIVED_RAD = math.radians(5.0)  # a loop without integral part stops before its goal, due to friction and weight
 
 
 @dataclass(frozen=True, slots=True)
 class ServoState:
-    """What the servo was doing at one moment.
+    """State of the servo at one time.
 
     Attributes:
-        time_ns: `time.monotonic_ns()` of the sampling.
-        time_bound_ns: it was sampled within this of `time_ns`.
-        position_rad: turns are counted; counter-clockwise as one looks at the horn, 0 at the encoder's centre.
-            NaN in the AX-12A's dead sector.
-        velocity_rad_s: NaN in the AX-12A's wheel mode, where it measures none.
+        position_rad: with counted turns; counter-clockwise seen towards the horn, 0 at the encoder's centre. NaN in the
+            AX-12A's dead sector.
+        velocity_rad_s: NaN in the AX-12A's wheel mode, which measures none.
         load: fraction of the rated torque, positive counter-clockwise.
-        voltage_V: of the supply.
-        temperature_degC: inside.
     """
 
-    time_ns: int
-    time_bound_ns: int
+    time_ns: int  # `time.monotonic_ns()` of the sampling
+    time_bound_ns: int  # largest error of `time_ns`
     position_rad: float
     velocity_rad_s: float
     load: float
-    voltage_V: float  # noqa: N815 - volts
+    voltage_V: float  # noqa: N815 - volts of the supply
     temperature_degC: float  # noqa: N815
 
 
 @dataclass(frozen=True, slots=True)
 class TurnOrder:
-    """What the servo was told to do, and where it was when it last got on with it."""
+    """Commanded motion, with time and position of its last progress."""
 
-    rate_rad_s: float  # how fast, negative clockwise
-    goal_rad: float  # where to; infinite for turning without end
-    since_ns: int = 0  # when it last got on with it; 0 before it was seen to
-    from_rad: float = math.nan  # where it was then
+    rate_rad_s: float  # negative clockwise
+    goal_rad: float  # infinite for continuous rotation
+    since_ns: int = 0  # time of the last progress; 0 without
+    from_rad: float = math.nan  # position at that time
 
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """How far it came, and how far it should have; NaN if it stayed in a dead sector."""
+    """A commanded motion without progress."""
 
-    moved_rad: float
-    due_rad: float
+    moved_rad: float  # NaN in a dead sector
+    due_rad: float  # expected motion
 
     def __str__(self) -> str:
         stuck = math.isnan(self.moved_rad)
@@ -59,7 +55,7 @@ class Stall:
 
 
 def follow(order: TurnOrder, state: ServoState, step_rad: float) -> TurnOrder | Stall | None:
-    """Return the order with the progress made; None when the goal is reached."""
+    """Return the order with its progress; None if the goal is reached."""
     here_rad, latest_ns = state.position_rad, state.time_ns + state.time_bound_ns
     if abs(order.goal_rad - here_rad) < _ARRIVED_RAD:
         return None

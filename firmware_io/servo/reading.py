@@ -1,4 +1,4 @@
-"""What a servo's answer says: its registers in SI units, turns counted from what was known before."""
+"""State of a servo from a reading of its registers."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from scanwright.firmware_io.servo.progress import ServoState, TurnOrder
 def state_of(
     table: ControlTable, answer: ServoAnswer, *, spins: bool, known: ServoState | None, order: TurnOrder | None
 ) -> ServoState:
-    """Return the state in an answer.
+    """Decode a reading of the present values.
 
     Args:
         table: of the servo.
-        answer: to a reading of its block.
+        answer: reply to the reading.
         spins: whether it is in wheel mode.
         known: last state with a position, from which turns are counted.
-        order: current order to turn.
+        order: commanded motion.
     """
     data = answer.data
     count = round(table.pick(table.position, data) / table.position.unit)
     angle_rad = (count - table.centre) * table.position.unit
     velocity_rad_s = table.pick(table.velocity, data)
     if not table.speed_loop and spins:
-        velocity_rad_s = math.nan  # there the register holds the torque
+        velocity_rad_s = math.nan  # the register contains the torque
     if not table.measures_turn and not 0 < count < table.last:
-        angle_rad = math.nan  # at one end, or in the dead sector between both: the potentiometer cannot tell
+        angle_rad = math.nan  # at an end of the potentiometer, or in its dead sector
     elif known:
         angle_rad = nearest_turn(angle_rad, known.position_rad + _due_rad(known, velocity_rad_s, answer, order))
     else:
-        angle_rad = nearest_turn(angle_rad, 0.0)  # servos of protocol 2.0 count turns of their own
+        angle_rad = nearest_turn(angle_rad, 0.0)  # servos of protocol 2.0 count turns
     return ServoState(
         time_ns=answer.sampled_ns,
         time_bound_ns=answer.bound_ns,
@@ -45,12 +45,12 @@ def state_of(
 
 
 def nearest_turn(angle_rad: float, expected_rad: float) -> float:
-    """The angle, whole turns added so that it comes nearest to the expected one."""
+    """Add full turns to an angle so that it is nearest to the expected one."""
     return angle_rad + 2 * math.pi * round((expected_rad - angle_rad) / (2 * math.pi))
 
 
 def _due_rad(known: ServoState, velocity_rad_s: float, answer: ServoAnswer, order: TurnOrder | None) -> float:
-    """How far it will have turned since it was known where it is; next to nothing without an order to turn."""
+    """Return the expected motion since the last known position; 0 without an order."""
     if not order:
         return 0.0
     measured = [rate for rate in (known.velocity_rad_s, velocity_rad_s) if not math.isnan(rate)]

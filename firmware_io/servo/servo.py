@@ -1,11 +1,11 @@
 """Driver of one servo: spin, sweep, hold, read. On every exit the servo is stopped and its port closed.
 
-An error that leaves `with` has a note: that the servo answered that its torque is off, or that it could not be stopped.
-`open_servo` finds baud rate, protocol and model, and turns the torque off. Permanent settings are written only if the
-caller names a folder for the undo file. While the servo turns, call `read` at least every two seconds: it counts turns,
-and a servo that is not read is stopped by the guard process, and by its bus watchdog if it has one.
+An error that leaves `with` has a note: the servo confirmed that its torque is off, or could not be stopped.
+`open_servo` detects baud rate, protocol and model, and turns the torque off. Permanent settings are written only with
+a folder for the undo file. While the servo turns, call `read` at least every two seconds: it counts turns, and
+otherwise the watchdog process stops the servo, as does its bus watchdog if it has one.
 
-A servo without a watchdog (protocol 1.0, STS) that spins continues if its bus is cut.
+A servo without a bus watchdog (protocol 1.0, STS) that spins continues if its bus is cut.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from scanwright.firmware_io.servo.prepare import prepare, set_agreed
 from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
 from scanwright.firmware_io.servo.reading import state_of
 
-_GENTLE_RAD_S = 0.5  # to the end of an AX-12A's range, where it is in its dead sector when it begins to hold
+_GENTLE_RAD_S = 0.5  # to the end of the range of an AX-12A, if it begins to hold in its dead sector
 
 _IS_OFF = "has answered that its torque is off"
 _ADVICE = {
@@ -39,15 +39,15 @@ _ADVICE = {
 
 
 class ServoDriver:
-    """One servo on its port; made by `open_servo`, used as a context manager.
+    """One servo; made by `open_servo`, used as a context manager.
 
     Attributes:
-        model: name, as in the catalogue.
-        protocol: as its maker calls it: "2.0".
-        baud: bits per second.
+        model: catalogue name.
+        protocol: name given by the maker, such as "2.0".
+        baud: baud rate.
         id: on the bus.
         port: name of the port.
-        step_rad: of its encoder.
+        step_rad: resolution of the encoder.
     """
 
     def __init__(self, unit: ServoUnit, warnings: tuple[str, ...], undo_folder: Path | None = None) -> None:
@@ -60,7 +60,7 @@ class ServoDriver:
         self._undo_folder = undo_folder
         self._spins: bool | None = None  # in wheel mode; None without torque
         self._order: TurnOrder | None = None
-        self._known: ServoState | None = None  # the last state with a position, from which turns are counted
+        self._known: ServoState | None = None  # last state with a position, from which turns are counted
         self._guard = Guard(bus.fileno(), *unit.torque_off())
 
     def __str__(self) -> str:
@@ -75,23 +75,23 @@ class ServoDriver:
         except DeviceError as unsafe:
             if error is None:
                 raise
-            error.add_note(UnsafeNote(unsafe))  # the first error tells more
+            error.add_note(UnsafeNote(unsafe))  # the first error is more important
         else:
             if error is not None:
                 error.add_note(f"{self} {_IS_OFF}")
 
     def close(self) -> None:
-        """Turn the torque off, close the port; UnsafeError if the servo does not answer. Can be called again."""
+        """Turn the torque off, close the port; UnsafeError if the servo does not reply. Can be called again."""
         if not self._bus.is_open:
             return
         trouble: BaseException | None = None
         try:
             self._stop()
-        except BaseException as error:  # Ctrl-C again, too: the guard insists
+        except BaseException as error:  # also a second Ctrl-C: the watchdog process continues
             trouble = error
         self._bus.close()
-        answered = self._guard.dismiss(at_rest=trouble is None)  # which tries longer
-        if isinstance(trouble, UnsafeError):  # the guard's packet is the one that had no effect
+        answered = self._guard.dismiss(at_rest=trouble is None)
+        if isinstance(trouble, UnsafeError):  # the packet of the watchdog process has no effect either
             raise trouble
         if trouble and not answered:
             raise UnsafeError(f"{self}: could not be stopped: cut its power ({trouble})") from trouble
@@ -101,21 +101,21 @@ class ServoDriver:
 
     @property
     def lost_replies(self) -> int:
-        """Count of answers that were damaged or did not come."""
+        """Number of damaged or missing replies."""
         return self._bus.lost_replies
 
     def warnings(self) -> tuple[str, ...]:
-        """What was not as it should be when the servo was opened, and what to do about it."""
+        """Return the problems at opening, with advice."""
         return self._warnings
 
     def spin(self, rate_rad_s: float) -> None:
         """Turn continuously; positive is counter-clockwise.
 
-        An AX-12A has no speed loop: it gets that share of its voltage which would give this rate without load.
+        An AX-12A has no speed loop: it gets the voltage of this rate without load.
 
         Raises:
-            ServoSetupError: the servo is set to go to angles, and that is permanent.
-            DeviceError: the rate is beyond the motor.
+            ServoSetupError: the servo is permanently set to move to angles.
+            DeviceError: the motor does not reach the rate.
         """
         self._check_rate(rate_rad_s)
         self._enter(spins=True)
@@ -125,11 +125,11 @@ class ServoDriver:
         self._order = TurnOrder(rate_rad_s, math.copysign(math.inf, rate_rad_s))
 
     def sweep_to(self, angle_rad: float, rate_rad_s: float) -> None:
-        """Go to an angle at a rate (above 0); angles are those of the encoder, turns counted before are forgotten.
+        """Move to an angle of the encoder at a rate (above 0); this resets the count of turns.
 
         Raises:
-            ServoSetupError: the servo is set to spin, and that is permanent.
-            DeviceError: the servo has no such angle, or the rate is beyond the motor.
+            ServoSetupError: the servo is permanently set to spin.
+            DeviceError: the servo does not reach the angle or the rate.
         """
         table = self._table
         low_rad, high_rad = table.reach_rad
@@ -142,14 +142,14 @@ class ServoDriver:
         self._enter(spins=False)
         self._observe()
         self._watch()
-        self._unit.write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means as fast as it can
+        self._unit.write(table.joint_speed, max(rate_rad_s, table.joint_speed.unit))  # count 0 means unlimited
         self._unit.write(table.goal, angle_rad + table.centre * table.position.unit)
         self._order = TurnOrder(rate_rad_s, angle_rad)
 
     def hold(self) -> None:
-        """Stand where it is, with torque on; from rest, in the mode that the servo is set to.
+        """Hold the present position with torque on, from rest in the configured mode.
 
-        An AX-12A that is set to spin only loses its drive, for want of a speed loop.
+        An AX-12A in wheel mode is only not driven, as it has no speed loop.
         """
         self._observe()
         if self._spins is False:
@@ -162,18 +162,18 @@ class ServoDriver:
         self._rest()
 
     def release(self) -> None:
-        """Stand without torque, so that a hand can turn it."""
+        """Stop and turn the torque off."""
         self._stop()
 
     def read(self) -> ServoState:
-        """Position, velocity, load, voltage and temperature of one moment, in one transaction.
+        """Read the state in one transaction.
 
         Raises:
-            DeviceFaultError: overload, overheating, voltage, or no motion where there should be; it was told to stop,
-                and a note says so where it has not answered that it did.
-            DeviceTimeoutError: it does not answer.
-            ProtocolError: it answers nonsense.
-            DeviceError: the guard stopped it, as it was not read for two seconds.
+            DeviceFaultError: overload, overheating, voltage, or a stall; the servo was stopped, or a note reports that
+                it did not confirm that.
+            DeviceTimeoutError: no reply.
+            ProtocolError: damaged replies.
+            DeviceError: the watchdog process stopped it, as it was not read for two seconds.
         """
         if self._order and not self._guard.beat():
             self._neglected()
@@ -192,7 +192,6 @@ class ServoDriver:
         return state
 
     def _follow(self, order: TurnOrder, state: ServoState) -> TurnOrder | None:
-        """The order with the progress made; None when the goal is reached."""
         progress = follow(order, state, self.step_rad)
         if isinstance(progress, Stall):
             if not self._unit.has_torque():
@@ -203,7 +202,7 @@ class ServoDriver:
         return progress
 
     def _reported_fault(self, answer: ServoAnswer) -> str:
-        """What it reports of itself, and what to do about it."""
+        """Return the reported faults with advice."""
         table, names = self._table, self._unit.reported_fault(answer) or ""
         volts, degC = table.pick(table.voltage, answer.data), table.pick(table.temperature, answer.data)
         broken = "switch its power off and on; if it occurs again, the servo is broken"
@@ -232,7 +231,7 @@ class ServoDriver:
             raise DeviceError(f"{self}: rate {math.degrees(rate_rad_s):.1f} deg/s: {fastest} and without load")
 
     def _enter(self, *, spins: bool) -> None:
-        """Wheel or joint mode, standing, torque on."""
+        """Enter wheel or joint mode, at rest with torque on."""
         table = self._table
         if spins is self._spins:
             return
@@ -248,14 +247,14 @@ class ServoDriver:
         self._spins = spins
 
     def _watch(self) -> None:
-        """From here on, silence stops it."""
+        """Start both watchdogs."""
         if not self._guard.turning():
             self._neglected()
         if self._table.watchdog:
             self._unit.write(self._table.watchdog, SILENCE_S)
 
     def _rest(self) -> None:
-        """It stands, or will by itself: silence is fine."""
+        """Pause both watchdogs; the servo is at rest, or will be without further requests."""
         self._order = None
         self._guard.resting()
         if self._table.watchdog:
@@ -264,14 +263,14 @@ class ServoDriver:
     def _stop(self) -> None:
         self._spins, self._order = None, None
         self._unit.write(self._table.torque, 0)
-        if self._unit.has_torque():  # a late goal turns the torque of a Feetech on again
+        if self._unit.has_torque():  # a late goal turns the torque of a Feetech servo on again
             self._unit.write(self._table.torque, 0)
             if self._unit.has_torque():
                 raise UnsafeError(f"{self}: its torque stays on: cut its power")
         self._rest()
 
     def _here(self) -> float:
-        """The goal that is the present position; in protocol 2.0 that one may count turns, which a goal must not."""
+        """Return the goal at the present position, without the turns that protocol 2.0 counts."""
         return self._unit.value(self._table.position) % ((self._table.last + 1) * self._table.position.unit)
 
 
@@ -283,20 +282,18 @@ def open_servo(
     spins: bool | None = None,
     undo_folder: Path | None = None,
 ) -> ServoDriver:
-    """Find the servo on a port, whatever its family, speed and protocol, and make it ready; it stands, without torque.
+    """Detect the servo on a port and prepare it, at rest without torque.
 
     Args:
-        port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a re-plug.
-        model: what it must be; None for any that is known.
-        servo_id: its number on the bus; None if it is alone there.
-        spins: whether it is going to spin (True) or to sweep (False), so that a wrong mode is an error at once; None if
-            that is not known yet.
-        undo_folder: lets settings that are permanent be written, and gets a file that undoes each such change; None
-            if the servo must stay as it is.
+        port: such as /dev/ttyUSB0; /dev/serial/by-id/... stays the same after a reconnection.
+        model: expected catalogue name; None for any.
+        servo_id: None if it is the only servo.
+        spins: whether it will spin (True) or sweep (False), to check its mode; None if unknown.
+        undo_folder: allows to write permanent settings, and gets the undo file.
 
     Raises:
-        ServoSetupError: such settings must change, and `undo_folder` is None; the servo is without torque.
-        DeviceError: no port, no servo, several servos, another model, or settings that cannot be made.
+        ServoSetupError: permanent settings must change, and `undo_folder` is None; the torque is off.
+        DeviceError: no port, no servo, several servos, another model, or settings that it does not keep.
     """
     bus = open_bus(port)
     try:

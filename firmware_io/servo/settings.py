@@ -1,4 +1,4 @@
-"""Settings of a servo that are changed for good: written down before that, read back after, set back from there."""
+"""Permanent changes of servo settings, with an undo file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ServoSetting(Record):
 
 
 class ServoSettings(Record):
-    """What was changed of one servo, in the order of the changes."""
+    """Undo file: the changes of one servo, in their order."""
 
     schema_name: Literal["scanwright/servo-settings/1"] = Field(alias="schema")
     port: str
@@ -49,22 +49,22 @@ def set_up(
     spins: bool | None = None,
     agreed: Sequence[SettingChange] | None = None,
 ) -> Iterator[str | Path]:
-    """Write the settings that the driver needs, and those that let it measure better.
+    """Write the required and recommended settings.
 
     Args:
         port: of the servo.
-        model: what it must be; None for any that is known.
-        servo_id: its number; None if it is alone.
-        undo_folder: gets the file that undoes the changes.
+        model: expected catalogue name; None for any.
+        servo_id: None if it is the only servo.
+        undo_folder: gets the undo file.
         spins: as in `fitness.needed_settings`.
-        agreed: write these changes and no others; None for all of `fitness.unfit_settings`.
+        agreed: write only these changes; None for all of `fitness.unfit_settings`.
 
     Yields:
         The undo file, once it is on the disk; then a line for each setting that was written and read back.
 
     Raises:
-        DeviceError: no such servo, its torque is on, a setting is not as it was agreed upon or does not stay, or the
-            file cannot be written.
+        DeviceError: no such servo, its torque is on, a setting is not as agreed or is not kept, or the file cannot be
+            written.
     """
     with closing(open_bus(port)) as bus:
         unit = find_servo(bus, model, servo_id, unmute="for good")
@@ -76,19 +76,19 @@ def set_up(
             yield f"{unit} ({unit.table.model}): every setting is right"
 
 
-def wanted_changes(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> list[SettingChange]:
-    """The settings that `set_up` would write; only reads. Arguments and errors as for `set_up`."""
+def pending_changes(port: str, model: str | None, servo_id: int | None, *, spins: bool | None) -> list[SettingChange]:
+    """Read which settings `set_up` would write. Arguments and errors as for `set_up`."""
     with closing(open_bus(port)) as bus:
         return unfit_settings(find_servo(bus, model, servo_id), spins=spins)
 
 
 def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder: Path) -> Iterator[str | Path]:
-    """Save the counts in a file, write the changes without torque, read all back. Yields and raises as `set_up`."""
+    """Write the undo file and the changes, with torque off, and read all back. Yields and raises as `set_up`."""
     try:
-        file = keep_settings(undo_folder, unit, [(one.register, one.now, one.needed) for one in changes])
+        file = keep_settings(undo_folder, unit, [(change.register, change.now, change.needed) for change in changes])
     except DeviceError:
-        if unit.was_mute:  # it had to answer before its model was known
-            unit.set_answers(unit.table.status_return, 0)
+        if unit.was_mute:  # it was unmuted to read its model
+            unit.set_answers(0)
         raise
     yield file
     for change in changes:
@@ -103,7 +103,7 @@ def write_changes(unit: ServoUnit, changes: Sequence[SettingChange], undo_folder
 
 
 def _still_true(unit: ServoUnit, agreed: Sequence[SettingChange]) -> Sequence[SettingChange]:
-    """The changes, if the settings are what they were when somebody agreed to them."""
+    """Return the changes; DeviceError if a setting has changed since they were agreed."""
     for change in agreed:
         muted = unit.was_mute and change.register == unit.table.status_return
         if not muted and (now := unit.count(change.register)) != change.now:
@@ -131,15 +131,15 @@ def keep_settings(folder: Path, unit: ServoUnit, changes: Sequence[tuple[Registe
 
 
 def restore(file: Path, port: str | None) -> Iterator[str]:
-    """Undo the changes of a file, the last one first; a line for each setting that was written and read back.
+    """Undo the changes of a file, the last one first; yield a line for each setting that was written and read back.
 
     Args:
-        file: one that `keep_settings` wrote.
-        port: where the servo is now; None for where it was.
+        file: written by `keep_settings`.
+        port: present port of the servo; None for that of the file.
 
     Raises:
-        ScanwrightError: no such file, or it is no file of settings.
-        DeviceError: no such servo, it holds its torque, or keeps a count.
+        ScanwrightError: the file does not exist or is not an undo file.
+        DeviceError: no such servo, its torque is on, or it does not accept a count.
     """
     try:
         saved = ServoSettings.model_validate_json(file.read_bytes())
@@ -156,10 +156,10 @@ def restore(file: Path, port: str | None) -> Iterator[str]:
             what = f"{setting.register_name} = {setting.before}"
             raise ScanwrightError(f"{file}: {saved.model} of protocol {saved.protocol} has no setting {what}")
     with closing(open_bus(port or saved.port)) as bus:
-        now_id = next((one.after for one in saved.settings if known[one.register_name] == expected[0].id), saved.id)
-        unit = find_servo(bus, saved.model, now_id, unmute="for good")
+        new_ids = [entry.after for entry in saved.settings if known[entry.register_name] == expected[0].id]
+        unit = find_servo(bus, saved.model, new_ids[0] if new_ids else saved.id, unmute="for good")
         if unit.table != expected[0]:
-            raise DeviceError(f"{unit} speaks protocol {unit.table.protocol}, not {saved.protocol}")
+            raise DeviceError(f"{unit} has protocol {unit.table.protocol}, not {saved.protocol}")
         check_torque(unit)
         for setting in reversed(saved.settings):
             register = known[setting.register_name]
@@ -177,7 +177,7 @@ def check_torque(unit: ServoUnit) -> None:
 
 
 def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple[ServoUnit, str]:
-    """Set one register and read it back; return the servo as it answers now, and the line for the user."""
+    """Set one register and read it back; return the servo with its present id, and a line for the user."""
     table, now = unit.table, unit
     if register == table.baud:
         unit.set_baud(table.bauds[needed])
@@ -185,8 +185,8 @@ def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple
         now = unit.set_id(needed)
     elif register == table.status_return and needed == table.answers_all:
         unit.answer_everything()
-    elif register == table.status_return:  # from here on it may not answer, nor be read back
-        unit.set_answers(register, needed)
+    elif register == table.status_return:  # from here on it may not reply
+        unit.set_answers(needed)
         return unit, f"{unit}: {register}: {was} -> {needed}; it was not read back"
     else:
         unit.set_permanent(register, needed)
@@ -194,7 +194,7 @@ def changed(unit: ServoUnit, register: Register, was: int, needed: int) -> tuple
 
 
 def _write(folder: Path, stem: str, saved: ServoSettings) -> Path:
-    """Write a file of a new name, which is on the disk before anything is changed; the file."""
+    """Write a file with a new name to the disk, and return its path."""
     file, again = folder / f"{stem}.json", 1
     while os.path.lexists(file):  # two changes within a second
         again += 1

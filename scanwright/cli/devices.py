@@ -376,7 +376,7 @@ def servo_setup(
         model, motion = (None, None) if angles is None else (angles.servo, angles.motion)
         spins = None if motion is None else isinstance(motion, Spin)
         if dry_run:
-            changes = [str(change) for change in settings.wanted_changes(port, model, from_id, spins=spins)]
+            changes = [str(change) for change in settings.pending_changes(port, model, from_id, spins=spins)]
             show_result(lambda: changes, Settings(changes), as_json)
         else:
             print_steps(port, settings.set_up(port, model, from_id, folder, spins=spins), as_json)

@@ -16,7 +16,6 @@ from scipy.ndimage import gaussian_filter
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
 from scanwright.design.evaluation.coverage import UNSEEN, mean_density_at
-from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.search.mounts.reference import TunedMount
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -58,14 +57,12 @@ class DensitySphere:
     Attributes:
         maps: at least one.
         bands: colour scale of the density maps.
-        axis_world: direction of the rotation axis.
         middle: mean direction of the weight, of length 1; (0, 0, 0) if it is all around.
         below: share of the weight below the horizon.
     """
 
     maps: tuple[SphereMap, ...]
     bands: Bands
-    axis_world: tuple[float, ...]
     middle: tuple[float, ...]
     below: float
 
@@ -76,7 +73,7 @@ def density_sphere(
     mounts: Iterable[TunedMount],
     shadow: SelfOcclusion | None = None,
 ) -> DensitySphere:
-    """Draw density of the scanner and of the reference mounts on one scale, and the axis.
+    """Draw density of the scanner and of the reference mounts on one scale.
 
     Args:
         problem: the task, `problem_as_built`.
@@ -98,13 +95,12 @@ def density_sphere(
     area, order = np.sqrt(1 - directions[:, 2] ** 2), densities[own].argsort()
     bands = bands_to(densities[own][order][np.searchsorted(area[order].cumsum(), DENSEST * area.sum())])
     maps = _drawn(densities, bands, weight, masked)
-    axis = tuple(R_world_rot(setting[0], setting[1])[:, 2].round(6).tolist())
     counts = weight.ravel() * area
     middle = counts @ directions / max(float(counts.sum()), 1e-12)
     length = float(np.linalg.norm(middle))
     middle *= (length > NOWHERE) / max(length, NOWHERE)
     below = float(counts[directions[:, 2] < 0].sum() / max(float(counts.sum()), 1e-12))
-    return DensitySphere(tuple(maps), bands, axis, tuple(middle.round(6).tolist()), below)
+    return DensitySphere(tuple(maps), bands, tuple(middle.round(6).tolist()), below)
 
 
 def _directions() -> tuple[Array, tuple[int, int]]:

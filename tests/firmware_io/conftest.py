@@ -14,9 +14,9 @@ from scanwright.firmware_io.servo.bus import bus, serial_line, unit
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Emulators share a computer with the tests, and answer late if it is busy: wait ten times as long."""
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 5.0)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 5.0)
     monkeypatch.setattr(sensor_line, "TURN_S", 10.0)
-    monkeypatch.setattr(cola_dialogue, "_ANSWER_S", 1.5)  # waited for whole where a sensor knows one dialect only
+    monkeypatch.setattr(cola_dialogue, "_REPLY_S", 1.5)  # waited for whole where a sensor knows one dialect only
     monkeypatch.setattr(serial_line.SerialLine, "wait_s", 0.5)
     monkeypatch.setattr(bus, "_LATE", 1)
 

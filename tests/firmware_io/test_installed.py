@@ -49,7 +49,7 @@ class Acme(LineDriver):
         pass
 
     def read(self, timeout_s=None):
-        lines, arrival_ns = self._line.hear(self.lines, time.monotonic() + (timeout_s or 5))
+        lines, arrival_ns = self._line.receive(self.lines, time.monotonic() + (timeout_s or 5))
         range_m = np.array(lines[-1].split(), np.float32) / 1000
         scan = Scan(
             stamp_ns=arrival_ns - 100_000_000, angle_min_rad=0.0, angle_increment_rad=-np.pi / 2,
@@ -69,7 +69,7 @@ class Machine:
     def __init__(self, sight):
         self.sight, self.at_ns = sight, time.monotonic_ns()
 
-    def hear(self, received, now_ns, /):
+    def receive(self, received, now_ns, /):
         return b"", b""
 
     def next_ns(self):
@@ -82,7 +82,7 @@ class Machine:
         numbers = np.where(np.isfinite(range_m), np.nan_to_num(range_m, posinf=0, neginf=0) * 1000, 0)
         return [(self.at_ns, (" ".join(f"{mm:.0f}" for mm in numbers) + "\\n").encode())]
 
-    def leave_out(self, before_ns):
+    def skip_to(self, before_ns):
         self.at_ns = max(self.at_ns, before_ns)
 
     def power_cycle(self, now_ns):

@@ -12,6 +12,7 @@ from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate, writ
 from scanwright import api
 from scanwright.cad.checks.checks_json import read_checks
 from scanwright.design.motion import Spin
+from scanwright.firmware_io.calibration import entropy
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
 from scanwright.firmware_io.emulators.world import room
 from scanwright.firmware_io.recording.bag_export import export_bag
@@ -45,6 +46,7 @@ def recordings(tmp_path_factory):
 @pytest.fixture
 def here(recordings, monkeypatch):
     monkeypatch.chdir(recordings)
+    monkeypatch.setattr(entropy, "_SAMPLE", 4000)  # the pairs of points grow with the square
 
 
 @pytest.fixture

@@ -117,7 +117,7 @@ def ldrobot_survive(stream: bytes) -> tuple[int, int]:
 
 
 def lms_dialogue(rng: random.Random) -> bytes:
-    """What an LMS 2xx says: that it heard, who it is, its variant, and scans in both units."""
+    """Replies of an LMS 2xx: acknowledgement, type, variant, and scans in both units."""
     said = b"\x06" + lms_emulators.write_telegram(b"\xbaLMS200;30106;V02.30\x10")
     said += b"\x06" + lms_emulators.write_telegram(b"\xbb\x01\xb4\x00\x32\x00\x10")
     for unit in (0x40, 0x00):
@@ -195,13 +195,13 @@ class Language:
 
     Attributes:
         say: a dialogue with values of its own.
-        hear: feeds a stream in two pieces: how much was accepted and refused; fails where one has no right to be there.
+        receive: feeds a stream in two pieces and returns the accepted and rejected packets; fails if any is wrong.
         unit: what is counted as accepted.
         scraps: that accidents leave in it.
     """
 
     say: Callable[[random.Random], bytes]
-    hear: Callable[[bytes], tuple[int, int]]
+    receive: Callable[[bytes], tuple[int, int]]
     unit: str
     scraps: list[bytes]
 

@@ -101,7 +101,7 @@ class HeldUpLine:
     def write(self, data: bytes) -> None:
         """As `Stream.write`."""
         scanning = self.machine.scanning
-        told, self._received = self.machine.hear(self._received + data, self.now_ns)
+        told, self._received = self.machine.receive(self._received + data, self.now_ns)
         if self.machine.scanning is not scanning:
             self._coming.clear()
         if told:
@@ -139,7 +139,7 @@ class HeldUpLine:
                 waiting += len(data)
                 if waiting <= self._buffer_bytes:
                     self._coming.append(self._handed_over((sent_ns, data)))
-        self.machine.leave_out(self.now_ns)
+        self.machine.skip_to(self.now_ns)
 
 
 @contextmanager

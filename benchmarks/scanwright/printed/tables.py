@@ -27,7 +27,12 @@ NEW = {
     "quadruped_ld19": "--lidar LD19 --servo XL430-W250 --height-m 0.4 --see ground:0.5:5 --robot box:0.7:0.35:0.3 "
     "--ahead-m 0.25"
 }
-HAND_TOOLS = ("hexagon keys", "multimeter", "torque screwdriver")  # what every build needs: not worth a column
+HAND_TOOLS = (
+    "hexagon keys",
+    "multimeter",
+    "torque screwdriver",
+    "caliper",
+)  # what every build needs: not worth a column
 RANGE_M = 5.0
 
 
@@ -76,7 +81,7 @@ def hardware_table(out: Path) -> str:
         "motion",
         "printed",
         "other made parts",
-        "tools besides hex keys",
+        "special tools",
         "USD, with tools",
         "noise at 5 m",
         "bend at 5 m",

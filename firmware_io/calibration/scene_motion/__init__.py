@@ -1,1 +1,1 @@
-"""The assumptions of a calibration: neither the platform nor the scene moves."""
+"""Detection of motion of the platform or the scene."""

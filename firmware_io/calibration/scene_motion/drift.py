@@ -1,8 +1,8 @@
-"""Did the platform move? A calibration assumes that it did not, and motion leaves traces.
+"""Detection of motion of the platform during a recording.
 
-A platform that has moved by h(t) along a surface's normal shows the surface lower by h, as a dent of that spot would,
-but growing with time and the same over all surfaces. So drift and turning at constant rates are six more parameters,
-whose normal equations follow from those of the bulges, tile by tile.
+A motion by h(t) along a surface's normal shows the surface lower by h, as a dent would, but increasing with time and
+the same for all surfaces. So constant rates of translation and rotation are six more parameters, whose normal equations
+follow from those of the bulges of tiles.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _CHANCE = 1e-6  # of a false warning in a recording at rest
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drift:
-    """How a platform seems to have moved while it was scanning, in the fixed frame of the axis."""
+    """Apparent motion of the platform, in the fixed frame of the axis."""
 
     recording: int  # number of the recording
     velocity_m_s: Float64[ndarray, " 3"]  # shape (3,)
@@ -35,7 +35,7 @@ class Drift:
 
     @property
     def sure(self) -> bool:
-        """Whether noise alone would hardly ever show so much."""
+        """Whether the motion is significant."""
         return bool(self.chi2 > chi2.isf(_CHANCE, _RATES))
 
 
@@ -49,17 +49,9 @@ def drifts(
     bulge_m: float,
     scale: float,
 ) -> tuple[Drift, ...]:
-    """How the platform seems to have moved in each recording, at rates that did not change.
+    """Estimate the apparent motion of the platform in each recording, at constant rates.
 
-    Args:
-        mount: where the laser sits.
-        x: what was found.
-        tiles: the flat looks.
-        grouping: their surfaces.
-        normal: the sums that `x` was found from.
-        free: parameters that were found.
-        bulge_m: standard deviation of the walls from planes.
-        scale: by how much the variance of the ranges exceeds that of the tiles.
+    `scale`: variance of the ranges relative to that of the tiles; the others as in `Estimate`.
     """
     middle = tiles.middle.late_by(x[LAG[0]])
     origin, direction = beam_rays(mount, x, middle)
@@ -71,7 +63,7 @@ def drifts(
         mine = (middle.recording == k) & (grouping.surface >= 0)
         time_s = (middle.time_ns - middle.time_ns[mine].min()) / 1e9
         time_s = np.where(mine, time_s - time_s[mine].max() / 2, 0.0)
-        # The scene seems to move the other way; p that turns moves by w x p
+        # the scene appears to move in the opposite direction; a rotation w moves p by w x p
         rise = -time_s[:, None] * np.hstack([plane, np.cross(point, plane)])
         part = reduced(_with(normal, rise), grouping, np.append(free, WIDTH + np.arange(_RATES)), bulge_m)
         rates, spread = step(part)[0], scale * covariance(part)[-_RATES:, -_RATES:]
@@ -83,7 +75,7 @@ def drifts(
 
 
 def _with(normal: Floats, rise: Floats) -> Floats:
-    """Normal equations with further parameters that raise each tile by `rise` of them, shape (m, k)."""
+    """Append parameters to normal equations that raise each tile by `rise` per unit, shape (m, k)."""
     across = normal[:, _U, :, None] * rise[:, None, :]
     corner = normal[:, _U, _U, None, None] * rise[:, :, None] * rise[:, None, :]
     return np.concatenate(

@@ -1,7 +1,7 @@
-"""Did somebody walk through the scene? Most places are looked at twice: what one look met, the other cannot go through.
+"""Detection of motion in the scene by ray conflicts between overlapping views.
 
-Both sides of a fan look from one axis, so half a turn, or a whole one, brings other beams to the same place. At which
-angle of the axis and at which bearing they come to it follows from the mount, in closed form.
+Half a turn, or a full one, brings other beams of the scan plane to the same place. The angle of the axis and the
+bearing of these beams follow from the mount, in closed form.
 """
 
 from __future__ import annotations
@@ -19,42 +19,32 @@ from scanwright.design.arrays import Floats, Ints, Mask
 from scanwright.firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
 from scanwright.firmware_io.calibration.scans import Scans
 
-_ONCE_IN = 1000  # recordings: noise takes one beam of them for a place that another went through
-_SQUARES = (
-    0.5,
-    1.0,
-)  # how far scans around a beam are off, in units of its neighbours: small for the slim and far ones
-_SCANS = 8  # but so many at most: people walk on
-_TESTED = 200_000  # beams: more tell nothing new
-_APART_RAD = np.radians(10.0)  # a turn less than that is the same look
+_ONCE_IN = 1000  # recordings with one false conflict by noise
+_SQUARES = (0.5, 1.0)  # distance of scans around a beam, in that of its neighbours: small for slim and far objects
+_SCANS = 8  # largest distance, as people move
+_TESTED = 200_000  # beams, which suffice
+_APART_RAD = np.radians(10.0)  # smallest rotation between two views
 _TURN_RAD = 2 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
 class OverlappingViews:
-    """What two looks at one place, at two times, say of each other."""
+    """Comparison of two views of one place at two times."""
 
-    tested: int  # beams that could be asked
-    compared: int  # those of them at whose place another beam looked, from half a turn or a whole one away
-    seen_through: int  # those whose place that other beam went through, to end well behind it
+    tested: int  # beams with neighbours
+    compared: int  # those whose place another view covers
+    seen_through: int  # those whose place a beam of another view passed, to end well behind it
 
 
 def overlapping_views(
     mount: Mount, x: Float64[ndarray, " parameters"], beams: ReturnedBeams, noise_m: float
 ) -> OverlappingViews:
-    """Beams that ended where the beams of another look at the same place went through.
+    """Find beams that ended at places through which beams of another view passed.
 
     A beam and its four neighbours (in its scan, and in the scans before and after) ended at five points. A beam of
-    another look passes between these and ends behind all of them, as its own four neighbours do, by more than the five
-    are deep and more than noise makes up even once in `_ONCE_IN` recordings. So the first five met something as wide
-    as what the others went through: no thing that stands still does that, and no slot between things, if it has no
-    holes narrower than three beams.
-
-    Args:
-        mount: where the laser sits.
-        x: what was found.
-        beams: all that returned, in the order they were fired.
-        noise_m: standard deviation of a range.
+    another view passes between these and ends behind all of them, as do its four neighbours, by more than the depth of
+    the five points and more than noise explains once in `_ONCE_IN` recordings. So the object is as wide as the free
+    space of the other view: not a static object, or a slot, without holes narrower than three beams.
     """
     now = beams.under(x)
     origin, direction = beam_rays(mount, x, now)
@@ -83,12 +73,10 @@ def overlapping_views(
 
 
 def _patches(scans: Scans, aside: Floats, square: float) -> Ints:
-    """Each beam, the ones before and after it, those of scans around it, shape (5, n); -1 where one is missing.
+    """Return each beam, its neighbours in its scan and those in scans around it, shape (5, n); -1 if one is missing.
 
-    Args:
-        scans: which beams are neighbours.
-        aside: sine of each beam's angle to the axis, shape (n,). Near that the scans crowd.
-        square: how far off those scans are at least, in units of how far off the beams are.
+    `aside`: sine of each beam's angle to the axis, shape (n,); `square`: smallest distance of those scans relative to
+    that of the beams.
     """
     beam = np.arange(1, scans.scan.size - 1)
     row = scans.scan
@@ -109,7 +97,7 @@ def _patches(scans: Scans, aside: Floats, square: float) -> Ints:
 def _other_views(
     mount: Mount, x: Floats, now: ReturnedBeams, scans: Scans, point: Floats, tested: Ints
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Which beams of those asked another look came near to, and the beam of that look that came nearest."""
+    """Yield tested beams that another view covers, and the nearest beams of that view."""
     run = scans.run[scans.scan[tested]]
     for psi_rad, bearing_rad in _towards(mount, x, point[tested]):
         joint_rad = 2 * psi_rad - axis_angle(x, psi_rad, np.zeros(psi_rad.size))
@@ -124,36 +112,36 @@ def _other_views(
             own = (run == r) & np.isfinite(joint_rad)
             adjacent = (np.abs(run - r) == 1) & (now.place[tested] == place) & np.isfinite(joint_rad)
             low_rad = scans.joint_rad[rows].min()
-            # Of the own run the next look and the last; of the runs before and after it any one
-            for mine, wanted_rad in (
+            # next and last view of its run; any one of the adjacent runs
+            for mine, target_rad in (
                 (own, next_rad),
                 (own, last_rad),
                 (adjacent, low_rad + (joint_rad - low_rad) % _TURN_RAD),
             ):
-                its, other = _nearest_beams(now, scans, rows, np.flatnonzero(mine), wanted_rad, from_first_rad)
+                its, other = _nearest_beams(now, scans, rows, np.flatnonzero(mine), target_rad, from_first_rad)
                 yield tested[its], other
 
 
 def _nearest_beams(
-    now: ReturnedBeams, scans: Scans, rows: Ints, mine: Ints, wanted_rad: Floats, bearing_rad: Floats
+    now: ReturnedBeams, scans: Scans, rows: Ints, mine: Ints, target_rad: Floats, bearing_rad: Floats
 ) -> tuple[Ints, Ints]:
-    """Those of `mine` whose joint angle the scans `rows` of one run reach, and their beams nearest to it."""
+    """Return those of `mine` whose target angle is in the scans `rows` of one run, and the nearest beams."""
     joint_rad = scans.joint_rad[rows]
     direction = 1 if joint_rad[-1] > joint_rad[0] else -1
-    wanted, bearing = wanted_rad[mine], bearing_rad[mine]
-    reached = (wanted >= joint_rad.min()) & (wanted <= joint_rad.max())
-    mine, wanted, bearing = mine[reached], wanted[reached], bearing[reached]
-    after = rows[0] + np.searchsorted(direction * joint_rad, direction * wanted)
+    target, bearing = target_rad[mine], bearing_rad[mine]
+    reached = (target >= joint_rad.min()) & (target <= joint_rad.max())
+    mine, target, bearing = mine[reached], target[reached], bearing[reached]
+    after = rows[0] + np.searchsorted(direction * joint_rad, direction * target)
     best, off = np.zeros(mine.size, np.int64), np.full(mine.size, np.inf)
-    for scan in (after - 2, after - 1, after, after + 1):  # a scan takes time: its ends are not at its middle's angle
+    for scan in (after - 2, after - 1, after, after + 1):  # the axis turns during a scan
         beam, near = scans.beam(np.clip(scan, rows[0], rows[-1]), bearing)
-        its = np.where(near, np.abs(now.joint_rad[beam] - wanted), np.inf)
+        its = np.where(near, np.abs(now.joint_rad[beam] - target), np.inf)
         best, off = np.where(its < off, beam, best), np.minimum(its, off)
     return mine[np.isfinite(off)], best[np.isfinite(off)]
 
 
 def _towards(mount: Mount, x: Floats, point: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """The two angles of the axis whose scan plane holds a point, and its bearing in it; NaN where none does."""
+    """Yield the two angles of the axis whose scan plane contains a point, and its bearing there; NaN without one."""
     columns = mount.plane(x)[0]
     normal, offset = np.cross(columns[:, 0], columns[:, 1]), np.array([x[2], x[3], mount.along_m])
     a = point[:, :2] @ normal[:2]
@@ -168,9 +156,9 @@ def _towards(mount: Mount, x: Floats, point: Floats) -> Iterator[tuple[Floats, F
         yield psi_rad, np.arctan2(seen @ columns[:, 1], seen @ columns[:, 0])
 
 
-def _between(off: Floats, one: Floats, two: Floats) -> Mask:
-    """Whether each `off`, shape (n, 3), lies in the diamond whose corners are +- `one` and +- `two`."""
-    aa, bb, ab = (np.einsum("ij,ij->i", p, q) for p, q in ((one, one), (two, two), (one, two)))
-    ao, bo = (np.einsum("ij,ij->i", p, off) for p in (one, two))
+def _between(off: Floats, a: Floats, b: Floats) -> Mask:
+    """Whether each `off`, shape (n, 3), is in the diamond with the corners +- `a` and +- `b`."""
+    aa, bb, ab = (np.einsum("ij,ij->i", p, q) for p, q in ((a, a), (b, b), (a, b)))
+    ao, bo = (np.einsum("ij,ij->i", p, off) for p in (a, b))
     area = aa * bb - ab**2
     return np.abs(ao * bb - bo * ab) + np.abs(bo * aa - ao * ab) < area

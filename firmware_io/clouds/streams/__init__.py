@@ -1,1 +1,1 @@
-"""Clouds of any size: read, surveyed and written part by part."""
+"""Conversion of clouds in parts, in bounded memory."""

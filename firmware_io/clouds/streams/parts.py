@@ -1,4 +1,4 @@
-"""A cloud in parts, and what must be known of all of them before the first is written."""
+"""A cloud in parts, and the survey of all parts that writers require."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Parts:
     """The clouds of a file, in parts."""
 
     clouds: tuple[Again, ...]  # of the file, in its order
-    notes: tuple[str, ...] = ()  # what is not read
+    notes: tuple[str, ...] = ()  # data that are not read
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,15 +58,14 @@ def _of(cloud: Cloud) -> CloudSurvey:
     return CloudSurvey(head, len(cloud.points_m), low_m, high_m, limits, frozenset(integers))
 
 
-def _both(one: CloudSurvey, other: CloudSurvey) -> CloudSurvey:
-    limits = {
-        name: (min(a, other.limits[name][0]), max(b, other.limits[name][1])) for name, (a, b) in one.limits.items()
-    }
+def _both(a: CloudSurvey, b: CloudSurvey) -> CloudSurvey:
     return replace(
-        one,
-        rows=one.rows + other.rows,
-        low_m=np.minimum(one.low_m, other.low_m),
-        high_m=np.maximum(one.high_m, other.high_m),
-        limits=limits,
-        integers=one.integers & other.integers,
+        a,
+        rows=a.rows + b.rows,
+        low_m=np.minimum(a.low_m, b.low_m),
+        high_m=np.maximum(a.high_m, b.high_m),
+        limits={
+            name: (min(low, b.limits[name][0]), max(high, b.limits[name][1])) for name, (low, high) in a.limits.items()
+        },
+        integers=a.integers & b.integers,
     )

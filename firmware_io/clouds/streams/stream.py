@@ -1,7 +1,4 @@
-"""Convert clouds that are too large for the memory, a million points at a time.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Conversion of clouds that are larger than the memory; unusable input raises RecordingError."""
 
 from __future__ import annotations
 
@@ -12,8 +9,8 @@ from scanwright.firmware_io.clouds.formats import Written, cloud_module
 from scanwright.firmware_io.clouds.streams.parts import Again, Parts, survey
 from scanwright.firmware_io.foreign import foreign_items, of_file
 
-STREAM_BYTES = 250_000_000  # of a file: smaller ones fit into any memory
-ROWS = 500_000  # at a time
+STREAM_BYTES = 250_000_000  # smallest file that is streamed
+ROWS = 500_000  # in memory
 
 
 def stream(source: Path, target: Path, *, least_bytes: int = STREAM_BYTES, rows: int = ROWS) -> Written | None:
@@ -23,7 +20,7 @@ def stream(source: Path, target: Path, *, least_bytes: int = STREAM_BYTES, rows:
         source: PLY, PCD, LAS, LAZ, E57 or text.
         target: the same.
         least_bytes: size from which files are streamed.
-        rows: points held at a time.
+        rows: points in memory.
     """
     reader, writer = cloud_module(source), cloud_module(target)
     if not (hasattr(reader, "parts") and hasattr(writer, "write_parts")) or not source.is_file():

@@ -1,1 +1,1 @@
-"""Emulators of servos: the bus with its port, and how each family behaves on it."""
+"""Emulated servos of each family, on one bus."""

@@ -1,4 +1,4 @@
-"""Control table and motion: what a Dynamixel's registers ask of its motor, and what they show of its horn."""
+"""Conversion between the registers of a Dynamixel and the motion of its horn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scanwright.firmware_io.emulators.servo_plant import Actuation
 from scanwright.firmware_io.servo.bus.registers import ControlTable
 
 
-def wanted(table: ControlTable, memory: Memory, turns: int) -> Actuation:
+def requested_actuation(table: ControlTable, memory: Memory, turns: int) -> Actuation:
     """Return the actuation that the registers request; `turns`: of the axis when the servo began to count."""
     if not memory[table.torque.address]:
         return Actuation()
@@ -34,8 +34,8 @@ def wanted(table: ControlTable, memory: Memory, turns: int) -> Actuation:
     return Actuation("share", memory[100] / 885, torque_limit=limit) if mode == 16 else Actuation()
 
 
-def show(table: ControlTable, memory: Memory, turns: int, motion: Motion, now_ns: int) -> None:
-    """Update the registers of position, velocity, load and time; `turns` as in `wanted`."""
+def update_present(table: ControlTable, memory: Memory, turns: int, motion: Motion, now_ns: int) -> None:
+    """Update the registers of position, velocity, load and time; `turns` as in `requested_actuation`."""
     rate = round(motion.rate_rad_s / table.velocity.unit)
     milliseconds = now_ns // 1_000_000 % 32768
     memory[table.position.address] = count_of(table, memory, turns, motion.angle_rad)
@@ -54,7 +54,7 @@ def show(table: ControlTable, memory: Memory, turns: int, motion: Motion, now_ns
 
 
 def count_of(table: ControlTable, memory: Memory, turns: int, angle_rad: float) -> int:
-    """The count that the encoder, or the potentiometer, has at an angle of the horn; arguments as for `show`."""
+    """Return the count of the encoder or potentiometer at an angle of the horn; `turns` as above."""
     count = round(angle_rad / table.position.unit) + table.centre
     if table.protocol == "2.0":
         return count - 4096 * turns + memory[20]
@@ -65,5 +65,5 @@ def count_of(table: ControlTable, memory: Memory, turns: int, angle_rad: float) 
 
 
 def _bit10(count: int) -> int:
-    """A magnitude of ten bits, and its sign above them."""
+    """Encode a magnitude of ten bits and its sign above them."""
     return min(abs(count), 1023) | (1024 if count < 0 else 0)

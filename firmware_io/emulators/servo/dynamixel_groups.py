@@ -1,4 +1,4 @@
-"""Requests to several Dynamixels at once: who answers, and what each one is asked or told."""
+"""Requests to several Dynamixels: the addressed servos, and the part of each one."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ READS, FAST = (SYNC_READ, BULK_READ), (FAST_SYNC_READ, FAST_BULK_READ)
 
 
 def span(parameters: bytes, *, two: bool) -> tuple[int, int]:
-    """Address and length at the head of the parameters; `two` is for protocol 2.0, here and below."""
+    """Return address and length at the start of the parameters; `two`: protocol 2.0, here and below."""
     wide = 2 if two else 1
     return int.from_bytes(parameters[:wide], "little"), int.from_bytes(parameters[wide : 2 * wide], "little")
 
 
 def ids_in_turn(request: Request, *, two: bool) -> tuple[int, ...] | None:
-    """The servos that answer one after the other: those of sync and bulk reads; None to another request."""
+    """Return the servos that reply in turn, those of sync and bulk reads; None for another request."""
     if request.instruction in (SYNC_READ, FAST_SYNC_READ) and two:
         return tuple(request.parameters[4:])
     if request.instruction in (BULK_READ, FAST_BULK_READ):
@@ -25,7 +25,7 @@ def ids_in_turn(request: Request, *, two: bool) -> tuple[int, ...] | None:
 
 
 def fast_size(request: Request) -> int:
-    """Bytes that a fast read asks of all servos together, with 4 for each."""
+    """Return the bytes that a fast read requests of all servos, with 4 for each."""
     parameters = request.parameters
     if request.instruction == FAST_SYNC_READ:
         return len(parameters[4:]) * (span(parameters, two=True)[1] + 4)
@@ -49,7 +49,7 @@ def span_for(request: Request, servo_id: int, *, two: bool, bulk: bool) -> tuple
 
 
 def write_for(request: Request, servo_id: int, *, two: bool) -> tuple[int, bytes] | None:
-    """Address and data that a sync or bulk write has for one servo; None if it has none."""
+    """Return address and data of a sync or bulk write for one servo; None without any."""
     parameters = request.parameters
     if request.instruction == SYNC_WRITE:
         (address, size), rest = span(parameters, two=two), parameters[4 if two else 2 :]

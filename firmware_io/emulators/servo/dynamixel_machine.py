@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scanwright.firmware_io.emulators.servo import dynamixel_groups as groups
-from scanwright.firmware_io.emulators.servo.dynamixel_control import count_of, show, wanted
+from scanwright.firmware_io.emulators.servo.dynamixel_control import count_of, requested_actuation, update_present
 from scanwright.firmware_io.emulators.servo.dynamixel_memory import INDIRECT, ITEMS
 from scanwright.firmware_io.emulators.servo.dynamixel_packets import fast_status, status, take
 from scanwright.firmware_io.emulators.servo.machine import BROADCAST, OVERLOAD, Request, ServoMachine
@@ -33,7 +33,7 @@ class DynamixelMachine(ServoMachine):
 
     @property
     def baud(self) -> float:
-        """Bits per second that it understands."""
+        """Baud rate."""
         code = self.memory[8 if self._two else 4]
         return _BAUDS_2[code] if self._two else _BAUDS_1_FAST.get(code, 2_000_000 / (code + 1))
 
@@ -43,7 +43,7 @@ class DynamixelMachine(ServoMachine):
         return (34, 32, 31) if self._two else (12, 13, 11)
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
-        """Carry out a request; error byte and data of the answer, None if there is none."""
+        """Execute a request; return error byte and data of the reply, None without a reply."""
         if request.id not in (self.id, BROADCAST):
             return None
         self._spoken_ns = now_ns
@@ -51,21 +51,21 @@ class DynamixelMachine(ServoMachine):
         return None if error is None else (error | self._conditions(), data)
 
     def take(self, buffer: bytearray) -> Request | None:
-        """Take the next request off a buffer."""
+        """As `ServoMachine.take`."""
         return take(buffer, self.table.protocol)
 
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
-        """The servos that answer one after the other: those of sync and bulk reads."""
+        """As `ServoMachine.in_turn`."""
         return groups.ids_in_turn(request, two=self._two) if request.id == BROADCAST and request.intact else None
 
     def statuses(self, request: Request, answers: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
-        """The bytes of what servos say: one status each, or one of all to a fast read."""
+        """Encode one status of each servo, or a common one for a fast read."""
         if self._two and request.id == BROADCAST and request.instruction in groups.FAST:
             return [fast_status(groups.fast_size(request), answers)]
-        return [status(self.table.protocol, *one) for one in answers]
+        return [status(self.table.protocol, *answer) for answer in answers]
 
     def overload(self, now_ns: int) -> None:
-        """The overload protection trips."""
+        """Trip the overload protection."""
         self._trip(OVERLOAD, now_ns)
 
     def restart(self, now_ns: int) -> None:
@@ -77,7 +77,7 @@ class DynamixelMachine(ServoMachine):
         self._act(now_ns)
 
     def protect(self, now_ns: int) -> None:
-        """What the servo watches by itself, to be called often: voltage, heat, load, and the silence of its bus."""
+        """Check voltage, temperature, load, and the watchdog of its bus; call this often."""
         memory = self.memory
         if bits := self._state_bits():
             self._trip(bits, now_ns)
@@ -91,7 +91,7 @@ class DynamixelMachine(ServoMachine):
             self._act(now_ns)
 
     def _carry_out(self, request: Request, now_ns: int) -> tuple[int | None, bytes]:
-        """Error and data of the answer; error None if there is none."""
+        """Return error and data of the reply; error None without a reply."""
         level, to_all = self.memory[68 if self._two else 16], request.id == BROADCAST
         parameters = request.parameters
         if not request.intact:
@@ -108,7 +108,7 @@ class DynamixelMachine(ServoMachine):
         return (None if to_all or level < 2 else error), b""
 
     def _change(self, request: Request, now_ns: int) -> int:
-        """Carry out what is no reading; its error."""
+        """Execute a request other than a reading; return its error."""
         wide = 2 if self._two else 1
         parameters = request.parameters
         unknown = 2 if self._two else 64
@@ -149,13 +149,10 @@ class DynamixelMachine(ServoMachine):
         if not size or address + size > len(self.memory.data):
             return self._error(ACCESS), b""
         self._measure(now_ns)
-        return 0, self._gather(address, size)
-
-    def _gather(self, address: int, size: int) -> bytes:
-        """Bytes as a client sees them: indirect data are those of their targets."""
-        return bytes(self.memory.data[self._target(place)] for place in range(address, address + size))
+        return 0, bytes(self.memory.data[self._target(place)] for place in range(address, address + size))
 
     def _target(self, place: int) -> int:
+        """Return the address of the target of indirect data; of other data, its own."""
         pointer = self._pointers.get(place)
         return place if pointer is None else self.memory[pointer]
 
@@ -172,9 +169,11 @@ class DynamixelMachine(ServoMachine):
         goals = (
             self._two and memory[98] == 255 and any(goal in range(address, address + len(data)) for goal in (104, 116))
         )
-        if goals:  # the watchdog has stopped it: goals stay as they are until its error is cleared
+        if goals:  # the watchdog has stopped it: goals are rejected until its error is cleared
             return RANGE
-        if not self._two and address == 30 and not self._within_limits(data):
+        low, high = (0, 0) if self._two else (memory[6], memory[8])
+        goal = int.from_bytes(data[:2], "little")
+        if not self._two and address == 30 and not (low == high == 0 or low <= goal <= high):
             return 2
         if self._two and address == torque and data[0] and self._latched:
             return 1  # only a restart helps
@@ -183,41 +182,33 @@ class DynamixelMachine(ServoMachine):
             memory[torque] = 1  # a goal turns the torque on
         if not self._two and address == 34:
             self._latched &= ~OVERLOAD
-        if not was_on and memory[torque]:
-            self._begin_torque(now_ns)
+        if not was_on and memory[torque]:  # position mode begins within one turn
+            if not self._two or memory[11] == 3:
+                self._count_one_turn(now_ns)
+            if self._two:  # the goal is then the present position
+                self._measure(now_ns)
+                memory[116] = memory[132]
         self._act(now_ns)
         return 0
 
-    def _within_limits(self, data: bytes) -> bool:
-        low, high = self.memory[6], self.memory[8]
-        return low == high == 0 or low <= int.from_bytes(data[:2], "little") <= high
-
-    def _begin_torque(self, now_ns: int) -> None:
-        """Position mode begins within one turn; in protocol 2.0 the goal is then where the horn is."""
-        if not self._two or self.memory[11] == 3:
-            self._count_one_turn(now_ns)
-        if self._two:
-            self._measure(now_ns)
-            self.memory[116] = self.memory[132]
-
     def _measure(self, now_ns: int) -> None:
-        """Bring the present values up to date."""
-        show(self.table, self.memory, self._turns, self.axis.motion(now_ns), now_ns)
+        """Update the present values."""
+        update_present(self.table, self.memory, self._turns, self.axis.motion(now_ns), now_ns)
         self.memory[self.table.voltage.address] = round(self._supply * self._rated_v * 10)
         self.memory[self.table.temperature.address] = self._hot_degC
 
-    def wanted(self) -> Actuation:
-        """As `ServoMachine.wanted`."""
-        return wanted(self.table, self.memory, self._turns)
+    def actuation(self) -> Actuation:
+        """As `ServoMachine.actuation`."""
+        return requested_actuation(self.table, self.memory, self._turns)
 
     def _conditions(self) -> int:
-        """The fault bits that go with each answer."""
+        """Return the fault bits of each reply."""
         if self._two:
             return 0x80 if self.memory[70] else 0
         return self._latched | self._state_bits()
 
     def _trip(self, bits: int, now_ns: int) -> None:
-        """A fault: reported, and the torque taken if the servo is set to shut down for it."""
+        """Report a fault, and turn the torque off if the servo is set to shut down for it."""
         memory, table = self.memory, self.table
         self._latched |= bits & OVERLOAD if not self._two else bits & memory[63]
         if self._two:

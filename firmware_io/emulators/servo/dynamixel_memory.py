@@ -1,4 +1,4 @@
-"""Control tables of the emulators: every entry with its factory value, as the e-manual lists them."""
+"""Control tables of the emulators with the factory values of the e-manual."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _mx(number: int, firmware: int) -> list[TableItem]:
     ]
 
 
-_INDIRECT = ((168, 224, 28), (578, 634, 28))  # first address of the targets, of the data, how many
+_INDIRECT = ((168, 224, 28), (578, 634, 28))  # first address of the targets, of the data, and their number
 _INDIRECT_XL330 = ((168, 208, 20),)
 
 
@@ -41,9 +41,10 @@ def _protocol_2(
     acceleration: bool = False,
     indirect: tuple[tuple[int, int, int], ...] = _INDIRECT,
 ) -> list[TableItem]:
-    """Entries of protocol 2.0; without `current` it measures none, with `acceleration` it has a limit of it.
+    """Return the entries of protocol 2.0.
 
-    Indirect data are bytes that stand elsewhere: `indirect` tells where each stretch keeps its targets and its data.
+    `current`: its limit, if it is measured; `acceleration`: whether there is a limit of it; `indirect`: first address
+    of targets, of data, and number of each block of indirect data.
     """
     modes = (1, 3, 4, 16) if current is None else (0, 1, 3, 4, 5, 16)
     targets = [(low + 2 * k, data + k) for low, data, many in indirect for k in range(many)]
@@ -86,7 +87,7 @@ ITEMS: dict[int, list[TableItem]] = {  # by model number
     1200: _protocol_2(1200, speed=445, current=1750, volts=(35, 70), hot=70, position_p=400, indirect=_INDIRECT_XL330),
 }
 
-INDIRECT = {  # by model number: where the target of each byte of indirect data stands
+INDIRECT = {  # by model number: address of the target of each byte of indirect data
     number: {
         data + k: low + 2 * k
         for low, data, many in (_INDIRECT_XL330 if number == 1200 else _INDIRECT)

@@ -1,4 +1,4 @@
-"""Packets as a servo sees them: requests out of a byte stream, statuses into bytes.
+"""Packets on the side of a servo: decoding of requests, encoding of statuses.
 
 Written from the e-manual's pages protocol1 and protocol2, not from the SDK of the driver, so that each checks the
 other.
@@ -12,12 +12,12 @@ from scanwright.firmware_io.emulators.servo.machine import BROADCAST, Request
 
 
 def packet_checksum(body: bytes) -> int:
-    """Protocol 1.0: of everything between header and checksum."""
+    """Return the checksum of protocol 1.0 of all bytes between header and checksum."""
     return ~sum(body) & 0xFF
 
 
 def crc16(data: bytes) -> int:
-    """Protocol 2.0: polynomial 0x8005, from 0, not reflected, over everything before it."""
+    """Return the CRC of protocol 2.0: polynomial 0x8005, from 0, not reflected, over all bytes before it."""
     crc = 0
     for byte in data:
         crc ^= byte << 8
@@ -27,12 +27,12 @@ def crc16(data: bytes) -> int:
 
 
 def take(buffer: bytearray, protocol: str) -> Request | None:
-    """Take the next request off the buffer, and what lies before it; None until one is complete."""
+    """Remove the next request, and the bytes before it, from the buffer; None until one is complete."""
     return _take_2(buffer) if protocol == "2.0" else _take_1(buffer)
 
 
 def status(protocol: str, servo_id: int, error: int, data: bytes) -> bytes:
-    """The bytes of a status."""
+    """Encode a status."""
     if protocol == "2.0":
         return packet_2(servo_id, 0x55, bytes([error]) + data)
     body = bytes([servo_id, len(data) + 2, error]) + data
@@ -40,9 +40,10 @@ def status(protocol: str, servo_id: int, error: int, data: bytes) -> bytes:
 
 
 def fast_status(size: int, parts: Sequence[tuple[int, int, bytes]]) -> bytes:
-    """Return the common status of a fast read: each servo adds its part, without stuffing.
+    """Encode the common status of a fast read, without stuffing.
 
-    A part is error, id, data and the CRC of all before it. `size`: data of all servos, with 4 bytes for each.
+    The part of each servo is error, id, data and the CRC of all before it. `size`: data of all servos, with 4 bytes
+    for each.
     """
     packet = b"\xff\xff\xfd\x00" + bytes([BROADCAST]) + (size + 1).to_bytes(2, "little") + b"\x55"
     for servo_id, error, data in parts:
@@ -52,7 +53,7 @@ def fast_status(size: int, parts: Sequence[tuple[int, int, bytes]]) -> bytes:
 
 
 def packet_2(servo_id: int, instruction: int, parameters: bytes) -> bytes:
-    """A packet of protocol 2.0."""
+    """Encode a packet of protocol 2.0."""
     stuffed = (bytes([instruction]) + parameters).replace(b"\xff\xff\xfd", b"\xff\xff\xfd\xfd")
     packet = b"\xff\xff\xfd\x00" + bytes([servo_id]) + (len(stuffed) + 2).to_bytes(2, "little") + stuffed
     return packet + crc16(packet).to_bytes(2, "little")

@@ -1,8 +1,4 @@
-"""Emulator of a servo on a pseudo-terminal, with the timing of a real one.
-
-Bytes take their time at the baud rate, the return delay is kept, another baud rate is not understood. The
-`ServoMachine` of its family answers and turns. Methods cause faults.
-"""
+"""Emulator of a servo on a pseudo-terminal, with baud rate and return delay of a real one; methods cause faults."""
 
 from __future__ import annotations
 
@@ -29,24 +25,24 @@ from scanwright.firmware_io.emulators.servo.models import machine_of
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo.fitness import set_up_counts
 
-_TICK_S = 0.02  # between two looks of the servo at itself
+_TICK_S = 0.02  # between two checks of its protection
 
 
 class ServoEmulator:
-    """One servo, powered and on its bus; `port` is what a program opens. A context manager.
+    """One servo with power on its bus; a context manager.
 
     Attributes:
-        port: path of the serial port; the same after a re-plug.
-        axis: the true motion of the horn, by `time.monotonic_ns()`.
-        memory: the control table; factory values, to be changed before a program opens the port.
+        port: path of the serial port; the same after a reconnection.
+        axis: true motion of the horn, by `time.monotonic_ns()`.
+        memory: control table with factory values, to be changed before a program opens the port.
 
     Args:
-        model: name, as in the catalogue.
-        protocol: as the maker calls it, or None for the one that the model has from the factory.
-        load: what hangs on the horn.
-        angle_rad: of the horn when it is switched on.
-        others: other servos on the bus: model and number.
-        echo: whether the adapter returns what it sends.
+        model: catalogue name.
+        protocol: None for the factory setting.
+        load: of the horn.
+        angle_rad: of the horn at power-up.
+        others: model and id of other servos on the bus.
+        echo: whether the adapter has an echo.
         seed: of the bit errors.
     """
 
@@ -89,7 +85,7 @@ class ServoEmulator:
         self.close()
 
     def close(self) -> None:
-        """Take the emulator off its port. May be called again."""
+        """Remove the emulator from its port; can be called again."""
         if self._thread.is_alive():
             self._jobs.put(None)
             os.write(self._wake_write, b".")
@@ -100,56 +96,56 @@ class ServoEmulator:
             self._folder.cleanup()
 
     def set_up(self, *, spins: bool | None) -> None:
-        """Give the servo the settings of one that is ready for a scan; `spins` None leaves the mode as it is."""
+        """Configure the servo for a scan; `spins` None leaves the mode unchanged."""
         for register, count in set_up_counts(self._servo.table, round(self._servo.baud), spins=spins).items():
             self.memory[register.address] = count
 
     def bit_errors(self, rate: float) -> None:
-        """From now on, each byte of an answer has one bit flipped with this probability."""
+        """Flip one bit of each byte of a reply with this probability."""
         self._bit_error_rate = rate
 
     def stall(self) -> None:
-        """Something holds the horn."""
+        """Block the horn."""
         self._do(lambda: self.axis.change(time.monotonic_ns(), blocked=True))
 
     def release(self) -> None:
-        """Nothing holds the horn any more."""
+        """Unblock the horn."""
         self._do(lambda: self.axis.change(time.monotonic_ns(), blocked=False))
 
     def overload(self) -> None:
-        """The overload protection trips."""
+        """Trip the overload protection."""
         self._do(lambda: self._servo.overload(time.monotonic_ns()))
 
     def overheat(self) -> None:
-        """The motor is 5 degrees above its limit."""
+        """Heat the motor to 5 degrees above its limit."""
         self._do(self._servo.overheat)
 
     def set_voltage(self, volts: float) -> None:
-        """The supply gives another voltage; one that breaks down is a `brown_out`."""
+        """Set the supply voltage."""
         self._do(lambda: self._servo.set_voltage(volts, time.monotonic_ns()))
 
     def brown_out(self) -> None:
-        """The supply breaks down for a moment: the servo restarts, mute until it has."""
+        """Interrupt the supply: the servo restarts, without replies meanwhile."""
         self._do(lambda: self._servo.restart(time.monotonic_ns()))
 
     def cut(self) -> None:
-        """The bus is cut: no byte passes; power stays, so in protocol 1.0 the wheel turns on."""
+        """Cut the bus but not the power, so in protocol 1.0 a spin continues."""
         self._cut = True
 
     def reconnect_bus(self) -> None:
-        """The bus is whole again."""
+        """Repair the bus."""
         self._cut = False
 
     def unplug(self) -> None:
-        """The USB adapter is pulled: the port is gone, the servo keeps its power."""
+        """Unplug the USB adapter: the port is gone, the servo keeps its power."""
         self._do(self._pull)
 
     def replug(self) -> None:
-        """The adapter is back, under the same name."""
+        """Plug in the adapter, with the same name."""
         self._do(self._plug)
 
     def _do(self, job: Callable[[], None]) -> None:
-        """Let the emulator's own thread do it, which alone touches servo and port; wait until it is done."""
+        """Run a job in the emulator's thread, which alone uses servo and port, and wait for its end."""
         done = threading.Event()
         self._jobs.put((job, done))
         os.write(self._wake_write, b".")
@@ -168,7 +164,7 @@ class ServoEmulator:
         if self._master >= 0:
             Path(self.port).unlink()
             os.close(self._master)
-            os.close(self._slave)  # held open so far, as a port does not vanish when a program closes it
+            os.close(self._slave)  # open until now, as a port stays when a program closes it
         self._master = self._slave = -1
 
     def _run(self) -> None:
@@ -188,33 +184,32 @@ class ServoEmulator:
                 task[1].set()
             elif ready:
                 data = os.read(self._master, 4096)
-                if self._echo:  # the adapter does that, whatever the servo makes of it
+                if self._echo:
                     self._send(data)
                 if now_ns - received_ns > self._servo.forgets_ns:
                     buffer.clear()
                 received_ns = now_ns
-                if not self._cut and (hearing := self._hearing(now_ns)):
+                baud = _client_baud(self._master)
+                receivers = [
+                    servo for servo in self._servos if servo.listens(now_ns) and abs(baud / servo.baud - 1) < 0.03
+                ]
+                if receivers and not self._cut:
                     buffer += data
-                    self._serve(hearing, buffer, now_ns)
+                    self._serve(receivers, buffer, now_ns)
 
-    def _hearing(self, now_ns: int) -> list[ServoMachine]:
-        """The servos that are up, and whose baud rate is the client's within 3 %."""
-        baud = _client_baud(self._master)
-        return [servo for servo in self._servos if servo.listens(now_ns) and abs(baud / servo.baud - 1) < 0.03]
-
-    def _serve(self, hearing: Sequence[ServoMachine], buffer: bytearray, begin_ns: int) -> None:
-        """Let them answer the requests in the buffer, the first byte of which came at `begin_ns`."""
-        byte_ns = 10e9 / hearing[0].baud
-        while request := hearing[0].take(buffer):
+    def _serve(self, receivers: Sequence[ServoMachine], buffer: bytearray, begin_ns: int) -> None:
+        """Reply to the requests in the buffer, whose first byte arrived at `begin_ns`."""
+        byte_ns = 10e9 / receivers[0].baud
+        while request := receivers[0].take(buffer):
             arrived_ns = begin_ns + round(len(request.wire) * byte_ns)
-            delay_ns, begin_ns = hearing[0].return_delay_ns, arrived_ns
-            for answer in answers(hearing, request, arrived_ns):
+            delay_ns, begin_ns = receivers[0].return_delay_ns, arrived_ns
+            for answer in answers(receivers, request, arrived_ns):
                 begin_ns += delay_ns + round(len(answer) * byte_ns)
                 time.sleep(max(0.0, (begin_ns - time.monotonic_ns()) / 1e9))
                 self._send(self._damaged(answer))
 
     def _send(self, data: bytes) -> None:
-        with suppress(BlockingIOError):  # nobody reads: what does not fit is lost, as with a real port
+        with suppress(BlockingIOError):  # without a reader, bytes are lost as at a real port
             os.write(self._master, data)
 
     def _damaged(self, answer: bytes) -> bytes:
@@ -225,7 +220,7 @@ class ServoEmulator:
 
 
 def _client_baud(master: int) -> float:
-    """Baud rate that the client has set on its end."""
-    if sys.platform == "linux":  # TCGETS2: the only way to see rates beyond the standard ones
+    """Return the baud rate that the client has set."""
+    if sys.platform == "linux":  # TCGETS2: the only request with non-standard rates
         return float(struct.unpack("=36x2I", fcntl.ioctl(master, 0x802C542A, bytes(44)))[1])
     return float(termios.tcgetattr(master)[5])

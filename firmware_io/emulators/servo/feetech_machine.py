@@ -1,7 +1,7 @@
 """Emulated Feetech STS3215 without its bus: memory table, instructions, motion and protection at given times.
 
-Assumed, as not published: duration of a restart; no answer to a damaged request; values out of bounds are ignored; an
-overload leaves the torque of register 34 and ends when the torque is turned off. A goal turns the torque on: the
+Assumed, as not published: duration of a restart; no reply to a damaged request; values out of bounds are ignored; an
+overload leaves the torque of register 34 and ends when the torque is turned off. A goal turns the torque on, since the
 maker's examples move a servo without writing register 40.
 """
 
@@ -20,7 +20,7 @@ _BAUDS = (1_000_000, 500_000, 250_000, 128_000, 115_200, 76_800, 57_600, 38_400)
 _PING, _READ, _WRITE, _REG_WRITE, _ACTION, _SYNC_READ, _SYNC_WRITE = 1, 2, 3, 4, 5, 0x82, 0x83
 _ID, _BAUD, _DELAY, _LEVEL, _OFFSET, _MODE, _TORQUE, _LOCK, _PRESENT = 5, 6, 7, 8, 31, 33, 40, 55, 56
 _GOALS = 42, 46  # position, or speed of a wheel
-_TO_CENTRE = 128  # written to the torque: the horn stands at 2048 from now on
+_TO_CENTRE = 128  # written to the torque: the present position becomes 2048
 
 _ITEMS: tuple[TableItem, ...] = (
     *(
@@ -48,11 +48,11 @@ class FeetechMachine(ServoMachine):
 
     def __init__(self, table: ControlTable, load: Load, time_ns: int, angle_rad: float) -> None:
         super().__init__(table, _ITEMS, load, time_ns, angle_rad)
-        self._unsaved: dict[int, int] = {}  # written while locked: address -> the byte that comes back with the power
+        self._unsaved: dict[int, int] = {}  # address -> byte before a locked write, restored at power-up
 
     @property
     def baud(self) -> float:
-        """Bits per second that it understands."""
+        """Baud rate."""
         return _BAUDS[self.memory[_BAUD]]
 
     @property
@@ -61,20 +61,20 @@ class FeetechMachine(ServoMachine):
         return 15, 14, 13
 
     def take(self, buffer: bytearray) -> Request | None:
-        """Take the next request off a buffer."""
+        """As `ServoMachine.take`."""
         return feetech_packets.take(buffer)
 
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
-        """The servos of a sync read answer one after the other."""
+        """As `ServoMachine.in_turn`."""
         return tuple(request.parameters[2:]) if request.instruction == _SYNC_READ else None
 
     def statuses(self, request: Request, answers: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
-        """The bytes of what servos say."""
+        """As `ServoMachine.statuses`."""
         del request
-        return [feetech_packets.status(*one) for one in answers]
+        return [feetech_packets.status(*answer) for answer in answers]
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
-        """Carry out a request; status byte and data of the answer, None if there is none."""
+        """Execute a request; return status byte and data of the reply, None without a reply."""
         if request.id not in (self.id, BROADCAST) or not request.intact:
             return None
         parameters, to_all = request.parameters, request.id == BROADCAST
@@ -90,12 +90,12 @@ class FeetechMachine(ServoMachine):
         return None if to_all or not answers_all else (self._status(), b"")
 
     def overload(self, now_ns: int) -> None:
-        """The overload protection trips."""
+        """Trip the overload protection."""
         self._latched |= OVERLOAD
         self._act(now_ns)
 
     def restart(self, now_ns: int) -> None:
-        """Back to what was kept, and the values at power-up."""
+        """Restore the permanent values, and those at power-up."""
         super().restart(now_ns)
         for address, byte in self._unsaved.items():
             self.memory.data[address] = byte
@@ -104,7 +104,7 @@ class FeetechMachine(ServoMachine):
         self._act(now_ns)
 
     def protect(self, now_ns: int) -> None:
-        """What the servo watches by itself: voltage, heat, load."""
+        """Check voltage, temperature and load."""
         bits = self._state_bits()
         if bits & self.memory[19] and self.memory[_TORQUE]:
             self.memory[_TORQUE] = 0
@@ -164,8 +164,8 @@ class FeetechMachine(ServoMachine):
             self._count_one_turn(now_ns)
         self._act(now_ns)
 
-    def wanted(self) -> Actuation:
-        """As `ServoMachine.wanted`."""
+    def actuation(self) -> Actuation:
+        """As `ServoMachine.actuation`."""
         memory, table = self.memory, self.table
         if not memory[_TORQUE]:
             return Actuation()
@@ -183,11 +183,11 @@ class FeetechMachine(ServoMachine):
 
 
 def _signed(count: int, bit: int) -> int:
-    """The number that a size with a bit for its sign stands for."""
+    """Decode a magnitude with a sign bit."""
     size = count & (1 << bit) - 1
     return -size if count >> bit & 1 else size
 
 
 def _sized(number: int, bit: int) -> int:
-    """A number as its size with a bit for its sign; the inverse of `_signed`."""
+    """Encode a number as magnitude and sign bit; the inverse of `_signed`."""
     return min(abs(number), (1 << bit) - 1) | (1 << bit if number < 0 else 0)

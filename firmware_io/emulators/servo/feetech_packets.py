@@ -1,4 +1,4 @@
-"""Packets of the STS as the servo sees them: requests out of a byte stream, statuses into bytes.
+"""Packets of the STS on the side of the servo: decoding of requests, encoding of statuses.
 
 Written from Feetech's protocol manual, not from the driver, so that each checks the other.
 """
@@ -11,7 +11,7 @@ _LONGEST = 250  # of the length byte; more is damage
 
 
 def take(buffer: bytearray) -> Request | None:
-    """Take the next request off the buffer, and what lies before it; None until one is complete."""
+    """Remove the next request, and the bytes before it, from the buffer; None until one is complete."""
     while (at := buffer.find(b"\xff\xff")) >= 0:
         del buffer[:at]
         if len(buffer) < 4:
@@ -24,14 +24,14 @@ def take(buffer: bytearray) -> Request | None:
             return None
         wire = bytes(buffer[: 4 + length])
         del buffer[: 4 + length]
-        intact = (sum(wire[2:]) & 0xFF) == 0xFF  # with its sum, everything adds up to FF
+        intact = (sum(wire[2:]) & 0xFF) == 0xFF  # the checksum completes the sum to FF
         return Request(servo_id, wire[4], wire[5:-1], wire, intact)
     del buffer[: max(0, len(buffer) - 1)]
     return None
 
 
 def status(servo_id: int, error: int, data: bytes) -> bytes:
-    """The bytes of a status."""
+    """Encode a status."""
     packet = bytearray(b"\xff\xff") + bytes([servo_id, 2 + len(data), error]) + data
     packet.append(0xFF - sum(packet[2:]) % 256)
     return bytes(packet)

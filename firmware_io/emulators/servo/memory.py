@@ -1,17 +1,17 @@
-"""The control table of an emulator: its entries, and the bytes that a program reads and writes."""
+"""Control table of an emulator."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-# Errors of a request, as protocol 2.0 numbers them; 1.0 knows only some (see `ServoTwin`).
+# Errors of a request, numbered as in protocol 2.0; 1.0 has only some.
 RANGE, LENGTH, ACCESS = 4, 5, 7
 
 
 @dataclass(frozen=True, slots=True)
 class TableItem:
-    """One entry; a writable one takes counts from `low` to `high`, or only those of `only` if there are any."""
+    """One entry; a writable one accepts counts from `low` to `high`, or only those of `only` if there are any."""
 
     address: int
     size: int
@@ -23,22 +23,22 @@ class TableItem:
 
 
 def one_of(address: int, size: int, value: int, only: Collection[int]) -> TableItem:
-    """An entry to read and write that takes certain counts."""
+    """Return a writable entry that accepts certain counts."""
     return TableItem(address, size, value, min(only), max(only), True, frozenset(only))
 
 
 def rw(address: int, size: int, value: int, high: int | None = None, low: int = 0) -> TableItem:
-    """An entry to read and write, up to the most that its bytes hold unless told."""
+    """Return a writable entry; the default of `high` is the largest count of its bytes."""
     return TableItem(address, size, value, low, (1 << 8 * size) - 1 if high is None else high, True)
 
 
 def ro(address: int, size: int, value: int = 0) -> TableItem:
-    """An entry to read."""
+    """Return a read-only entry."""
     return TableItem(address, size, value)
 
 
 def signed(address: int, size: int, bound: int) -> TableItem:
-    """An entry to read and write, in two's complement."""
+    """Return a writable entry in two's complement."""
     return TableItem(address, size, 0, -bound, bound, True)
 
 
@@ -55,7 +55,7 @@ class Memory:
         self.reset(0)
 
     def reset(self, first: int) -> None:
-        """Factory values from an address on."""
+        """Restore the factory values from an address on."""
         for item in self.items.values():
             if item.address >= first:
                 self[item.address] = item.value
@@ -72,7 +72,7 @@ class Memory:
         return address in self.items
 
     def refuses(self, address: int, data: bytes, *, locked: bool) -> int:
-        """Why these bytes cannot be written there; 0 when they can. `locked`: nothing before the RAM can."""
+        """Return the error of a write of these bytes, 0 without one; `locked`: only the RAM is writable."""
         end = address + len(data)
         if not data or end > len(self.data):
             return ACCESS

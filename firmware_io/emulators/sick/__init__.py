@@ -1,1 +1,1 @@
-"""A SICK lidar in software, which answers CoLa A and B."""
+"""Emulated SICK lidars."""

@@ -1,4 +1,4 @@
-"""Emulator of a TiM or LMS1xx: requests, answers and scans at given times."""
+"""Emulator of a TiM or LMS1xx."""
 
 from __future__ import annotations
 
@@ -20,60 +20,55 @@ _NEVER_NS = 1 << 62  # 146 years
 _SEND_NS = 3_000_000  # from the last beam to the telegram: between the captures of an LMS100 and of a TiM55x
 _BOOT_NS = 1_000_000_000  # [assumed]
 _HEAD = 100  # bytes of a telegram before its ranges
-# of the access levels, from the factory; telegram listing 8014631
+# factory passwords of the access levels; telegram listing 8014631
 _PASSWORDS = {2: 0xB21ACE26, 3: 0xF4724744, 4: 0x81BE23AA}
-_CLIENT = 3  # the least level for writing and for starting; telegram listing 8014631
-# values of its filters, and those that leave the ranges as they are; telegram listing 8014631
+_CLIENT = 3  # lowest level for writing and for starting; telegram listing 8014631
+# types of the values of its filters; telegram listing 8014631
 _FILTERS: dict[str, tuple[Kind, ...]] = {
     "FREchoFilter": ("u8",),
     "LFPmeanfilter": ("u8", "u16", "u8"),
     "LFPparticle": ("u8", "u16"),
 }
-_FIELDS = [f"{number:03}" for number in range(30)]  # of an LMS1xx; sick_scan_xd reads so many
+_FIELDS = [f"{number:03}" for number in range(30)]  # of an LMS1xx, as read by sick_scan_xd
 _FILTERS_OFF = {"FREchoFilter": [2], "LFPmeanfilter": [0, 10, 0], "LFPparticle": [0, 500]}
 _ACCESS_DENIED, _UNKNOWN_METHOD, _UNKNOWN_VARIABLE, _INVALID = 1, 2, 3, 5
 
 
 @dataclass(slots=True)
 class _Scanning:
-    """Who is told of scans, and which turn is next."""
+    """Requested scans."""
 
-    binary: bool
-    turn: int
+    binary: bool  # in CoLa B
+    turn: int  # next one
 
 
 @dataclass
 class SickMachine:
-    """The state of one sensor.
+    """State of one sensor."""
 
-    Attributes:
-        stamps_end: its scan time is that of the last beam's end, not of the first beam; None for that of its model.
-        setting: scan rate, 0.01 Hz, and step, 1e-4 deg, that it reports; scans always have those of the catalogue.
-    """
-
-    lidar: Lidar  # which model
-    ranging: Ranging  # its surroundings
-    began_ns: int  # true time at which its clock showed `clock_us`
-    clock_us: int = 0  # clock at that time
+    lidar: Lidar
+    ranging: Ranging
+    began_ns: int  # true time at which its clock was `clock_us`
+    clock_us: int = 0
     rate_error: float = 0.0  # of its clock, 5e-5 is 50 ppm fast
-    stamps_end: bool | None = None
+    stamps_end: bool | None = None  # whether its scan time is the end of the last beam; None for that of its model
     status: int = 0  # second status byte of its scans: 2 dirt warning, 5 dirt error, 1 fault
     busy_until_ns: int = 0  # reports busy until then
     silent_until_ns: int = 0  # silent until then
     dialects: tuple[bool, ...] = (True, False)  # dialects understood; True is CoLa B
     refusals: list[int] = field(default_factory=list)  # error codes for the next requests, one each
-    filters: dict[str, list[float]] = field(default_factory=dict)  # values that were set, by name
+    filters: dict[str, list[float]] = field(default_factory=dict)  # values by name
     without: tuple[str, ...] = ()  # variables that this firmware does not have
     serial_number: int = 18_030_000
-    run_tenth_h: int = 6641  # how long it has run, tenths of an hour
+    run_tenth_h: int = 6641  # operating time in tenths of an hour
     starts: int = 597  # number of starts
-    scanning: _Scanning | None = None  # client and next turn; None if not requested
+    scanning: _Scanning | None = None
     intensity: bool = False
     interval: int = 1
     measuring: bool = False
     _level: int = 0
     _telegrams: int = 0
-    setting: tuple[int, int] = (0, 0)
+    setting: tuple[int, int] = (0, 0)  # reported scan rate, 0.01 Hz, and step, 1e-4 deg; scans have those of the model
     _output: list[int] = field(default_factory=lambda: [1, *[0] * 10, 1])
 
     def __post_init__(self) -> None:
@@ -89,11 +84,11 @@ class SickMachine:
 
     @property
     def beam_ns(self) -> float:
-        """From beam to beam."""
+        """Time between two beams."""
         return self.period_ns / self.lidar.steps_per_turn
 
-    def hear(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
-        """Answers to whole requests, and what is none yet."""
+    def receive(self, received: bytes, now_ns: int) -> tuple[bytes, bytes]:
+        """Return the replies to complete requests, and the bytes of an incomplete one."""
         splitter = TelegramSplitter()
         requests = splitter.feed(received)
         if now_ns < self.silent_until_ns:
@@ -102,14 +97,14 @@ class SickMachine:
         return b"".join(answers), splitter.rest
 
     def next_ns(self) -> int:
-        """When the next scan is sent."""
+        """Return the time of sending of the next scan."""
         if self.scanning is None:
             return _NEVER_NS
         beams = self.lidar.last_step - self.lidar.first_step + 1
         return self._first_beam_ns(self.scanning.turn) + round(beams * self.beam_ns) + _SEND_NS
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """The scan of the next turn."""
+        """Measure the next turn."""
         if self.scanning is None:
             return []
         sent_ns, turn, binary = self.next_ns(), self.scanning.turn, self.scanning.binary
@@ -117,14 +112,14 @@ class SickMachine:
         self.scanning.turn += self.interval
         return [(sent_ns, framed(telegram_of(scan, binary=binary)))]
 
-    def leave_out(self, before_ns: int) -> None:
-        """Passes over turns that were over before that time."""
+    def skip_to(self, before_ns: int) -> None:
+        """Skip the turns before a time."""
         while self.scanning is not None and self.next_ns() < before_ns:
             self.scanning.turn += self.interval
             self._telegrams += 1
 
     def power_cycle(self, now_ns: int) -> None:
-        """Its clock begins at 0, it scans for nobody, and answers after a second."""
+        """Restart: clock at 0, no scans, replies after a second."""
         self.began_ns, self.clock_us = now_ns, 0
         self.scanning, self.measuring, self._level = None, False, 0
         self.silent_until_ns = now_ns + _BOOT_NS
@@ -166,11 +161,11 @@ class SickMachine:
 
     @property
     def _span(self) -> int:
-        """From the first to the last beam, 1e-4 deg."""
+        """Angle from the first to the last beam, 1e-4 deg."""
         return (self.lidar.last_step - self.lidar.first_step) * 3_600_000 // self.lidar.steps_per_turn
 
     def _angles(self) -> tuple[int, int]:
-        """First angle and step, 1e-4 deg, cut to whole numbers as the sensor does."""
+        """Return first angle and step, 1e-4 deg, the step rounded down."""
         per_step = 3_600_000 / self.lidar.steps_per_turn
         return 900_000 + round((self.lidar.first_step - self.lidar.front_step) * per_step), int(per_step)
 
@@ -211,7 +206,7 @@ class SickMachine:
                 return self._output_range(request, values, out)
             case b"sRN", "LMDscandatacfg":
                 return out.numbers("u8", self._output[:11]).number("u16", self._output[11]).telegram()
-            case b"sWN", "EIHstCola":  # both dialects are understood all the same
+            case b"sWN", "EIHstCola":  # both dialects are understood anyway
                 values.number("u8")
                 return self._for_clients(request, out)
             case b"sRN", "LIDinputstate":
@@ -224,7 +219,7 @@ class SickMachine:
                 )
             case b"sRN", _ if name[:5] == "field" and name[5:] in _FIELDS and self.lidar.name.startswith("LMS"):
                 return self._field(int(name[5:]), out)
-            case b"sEN", "LIDinputstate" | "LIDoutputstate" | "LFErec":  # events, of which none happens
+            case b"sEN", "LIDinputstate" | "LIDoutputstate" | "LFErec":  # events that never occur
                 return out.number("u8", values.number("u8")).telegram()
             case b"sRN", "LMPscancfg":
                 return self._scan_setting(out, *self.setting)
@@ -239,14 +234,14 @@ class SickMachine:
             case b"sWN", "LMDscandatacfg":
                 return self._configured(request, values, out)
             case b"sEN", "LMDscandata":
-                wanted = values.number("u8")
+                on = values.number("u8")
                 turn = math.ceil((now_ns - self.began_ns) / self.period_ns)
-                self.scanning = _Scanning(request.binary, turn) if wanted and self.measuring else None
-                return out.number("u8", wanted).telegram()
+                self.scanning = _Scanning(request.binary, turn) if on and self.measuring else None
+                return out.number("u8", on).telegram()
         return _refused(request, _UNKNOWN_VARIABLE if word in (b"sRN", b"sWN") else _UNKNOWN_METHOD)
 
     def _filter(self, request: Telegram, name: str, values: Reader, out: Writer) -> Telegram:
-        """Read or set a filter; filters do nothing to the ranges here."""
+        """Read or set a filter, which has no effect."""
         kinds = _FILTERS[name]
         if request.word == b"sRN":
             for kind, value in zip(kinds, self.filters.get(name, _FILTERS_OFF[name]), strict=True):
@@ -258,17 +253,18 @@ class SickMachine:
         return out.telegram()
 
     def _for_clients(self, request: Telegram, out: Writer) -> Telegram:
-        """The answer, or its refusal below the level of an authorized client."""
+        """Return the reply, or an error below the level of an authorized client."""
         return _refused(request, _ACCESS_DENIED) if self._level < _CLIENT else out.telegram()
 
     def _output_range(self, request: Telegram, values: Reader, out: Writer) -> Telegram:
-        """Angles of the first and last beam that are sent; only the whole field can be set here."""
+        """Read or set the angles of the first and last beam; only the full field can be set."""
         start, step = self._angles()
         if request.word == b"sRN":
             return out.number("u16", 1).number("u32", step).numbers("i32", [start, start + self._span]).telegram()
         values.number("u16")
-        wanted = [values.number("u32"), *values.numbers("i32", 2)]
-        if max(abs(one - had) for one, had in zip(wanted, [step, start, start + self._span], strict=True)) > step:
+        requested = [values.number("u32"), *values.numbers("i32", 2)]
+        present = [step, start, start + self._span]
+        if max(abs(new - old) for new, old in zip(requested, present, strict=True)) > step:
             return _refused(request, _INVALID)
         return self._for_clients(request, out)
 
@@ -287,7 +283,7 @@ class SickMachine:
         return self._scan_setting(out.number("u8", code), *self.setting)
 
     def _field(self, number: int, out: Writer) -> Telegram:
-        """An evaluation field without points, in the layout of sick_scan_xd's test server."""
+        """Return an evaluation field without points, in the layout of sick_scan_xd's test server."""
         start, step = self._angles()
         out.number("f32", 1).number("f32", 0).number("u32", step).number("i32", start).numbers("u8", [2, number + 1])
         return out.numbers("u16", [1, 0, 0, 0, 0, 1]).text(f"Field{number + 1:03}").number("u16", 0).telegram()
@@ -295,7 +291,7 @@ class SickMachine:
     def _method(self, request: Telegram, name: str, out: Writer) -> Telegram:
         if self._level < _CLIENT:
             return _refused(request, _ACCESS_DENIED)
-        if name == "Run":  # it ends the login
+        if name == "Run":  # ends the login
             self._level = 0
             return out.number("u8", 1).telegram()
         self.measuring = name == "LMCstartmeas"
@@ -312,7 +308,7 @@ class SickMachine:
 def sick_emulator(
     lidar: Lidar, ranging: Ranging, seed: int = 0, *, jitter_s: float = 0.0, **state: Any
 ) -> LidarLine[SickMachine]:
-    """The emulator of a sensor of the catalogue, in a given state; scans arrive up to `jitter_s` late."""
+    """Return the emulator of a catalogue sensor in a given state; `jitter_s`: largest random delay of scans."""
     machine = SickMachine(lidar, ranging, time.monotonic_ns(), **state)
     return LidarLine(lidar.name, machine, jitter_s=jitter_s, head=_HEAD, seed=seed)
 

@@ -1,4 +1,4 @@
-"""An LMS 200 or LMS 291 in software. Written from documents; what no document describes is marked [assumed].
+"""Emulator of an LMS 200 or LMS 291, written from documents; undocumented values are marked [assumed].
 
 Source of modes, status (31) and configuration (74, 77): SickLMS2xx.cc of sicktoolbox.
 """
@@ -16,19 +16,19 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 
 _NEVER_NS = 1 << 62  # 146 years
-_BOOT_NS = 1_000_000_000  # [assumed]; a real one takes up to a minute until its motor is steady
+_BOOT_NS = 1_000_000_000  # [assumed]; a real one needs up to a minute until its motor is at speed
 _TURN_NS = 1e9 / 75  # of its mirror
-_MODES = (0x24, 0x25, 0x40, 0x41, 0x42, 0x48)  # of the command 0x20 that it knows, without a password
+_MODES = (0x24, 0x25, 0x40, 0x41, 0x42, 0x48)  # supported modes of the command 0x20 without a password
 _INSTALLATION, _PASSWORD = 0, b"SICK_LMS"
 _CONFIGURATION = 34  # bytes
-_STATUS = 152  # bytes of its answer to 0x31
+_STATUS = 152  # bytes of its reply to 0x31
 _BAUDS = {0x40: 38_400, 0x41: 19_200, 0x42: 9600, 0x48: 500_000}  # by mode
 _HEAD = 8  # bytes of a telegram before its ranges
 _NO_RANGE = 0x1FFF  # code: too far
 
 
 def remainder(data: bytes) -> int:
-    """The sum of a telegram: a shift register by x^16 + x^15 + x^2 + 1, to which pairs of bytes are added."""
+    """Return the checksum of a telegram: a shift register by x^16 + x^15 + x^2 + 1 with pairs of bytes added."""
     register = 0
     for low, high in zip(data, b"\0" + data[:-1], strict=True):
         register <<= 1
@@ -39,25 +39,21 @@ def remainder(data: bytes) -> int:
 
 
 def write_telegram(payload: bytes, address: int = 0x80) -> bytes:
-    """A telegram around its command and values."""
+    """Encode a telegram of command and values."""
     data = bytes([2, address]) + len(payload).to_bytes(2, "little") + payload
     return data + remainder(data).to_bytes(2, "little")
 
 
 @dataclass
 class LmsMachine:
-    """The state of one sensor; times are true ones.
+    """State of one sensor; times are true ones."""
 
-    Attributes:
-        status: that its answers end with.
-    """
-
-    lidar: Lidar  # of the catalogue
-    ranging: Ranging  # its surroundings
-    began_ns: int  # when it got its power
-    millimetres: bool = True  # unit of its ranges: millimetres (up to 8 m), else centimetres
-    status: int = 0x10  # [assumed] bits without a meaning to us
-    rate_error: float = 1e-3  # its motor turns this part too fast
+    lidar: Lidar
+    ranging: Ranging
+    began_ns: int  # end of its start
+    millimetres: bool = True  # unit of its ranges: millimetres (up to 8 m) or centimetres
+    status: int = 0x10  # last byte of its replies; bits of unknown meaning [assumed]
+    rate_error: float = 1e-3  # of its motor, positive if fast
 
     def __post_init__(self) -> None:
         self.scanning: object | None = None
@@ -69,16 +65,16 @@ class LmsMachine:
 
     @property
     def turns(self) -> int:
-        """Turns of the mirror, for one telegram."""
+        """Mirror turns per telegram."""
         return max(round(100 / self._step_centideg), 1)
 
     @property
     def period_ns(self) -> float:
-        """From telegram to telegram."""
+        """Time between two telegrams."""
         return self.turns * _TURN_NS / (1 + self.rate_error)
 
-    def hear(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
-        """Answers to whole requests; a sum that is wrong gets a 15."""
+    def receive(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
+        """As `Machine.receive`; the reply to a wrong checksum is 15."""
         answers = b""
         while (at := received.find(b"\x02\x00")) >= 0 and len(received) >= at + 4:
             size = 6 + int.from_bytes(received[at + 2 : at + 4], "little")
@@ -87,24 +83,24 @@ class LmsMachine:
                 continue
             if len(received) < at + size:
                 return answers, received[at:]
-            one, received = received[at : at + size], received[at + size :]
+            telegram, received = received[at : at + size], received[at + size :]
             if now_ns < self.began_ns:
                 continue
-            if int.from_bytes(one[-2:], "little") != remainder(one[:-2]):
+            if int.from_bytes(telegram[-2:], "little") != remainder(telegram[:-2]):
                 answers += b"\x15"
                 continue
-            answer = self._answer(one[4:-2], now_ns)
+            answer = self._answer(telegram[4:-2], now_ns)
             answers += b"\x06" + write_telegram(answer + bytes([self.status])) if answer else b"\x15"
         return answers, received[at:] if at >= 0 else received[-1:]
 
     def next_ns(self) -> int:
-        """When the last beam of the next telegram is measured."""
+        """Return the time of the last beam of the next telegram."""
         if self.scanning is None:
             return _NEVER_NS
         return self.began_ns + round((self._number + 1) * self.period_ns - _TURN_NS / 2)
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """The telegram of the next turns: beams between the degrees are measured in the turns after the first."""
+        """Measure the next telegram: beams between the degrees are measured in the turns after the first."""
         half_centideg = 50 * self._field_deg
         bearing_rad = np.radians(np.arange(-half_centideg, half_centideg + 1, self._step_centideg) / 100)
         turn = np.arange(bearing_rad.size) % self.turns
@@ -119,16 +115,16 @@ class LmsMachine:
         payload = b"\xb0" + struct.pack("<H", raw.size | (0x4000 if self.millimetres else 0)) + raw.tobytes()
         data = write_telegram(payload + bytes([self.status]))
         sent_ns = self.next_ns() + round(len(data) * 10 / self.baud * 1e9)
-        self._number += max(math.ceil(len(data) * 10 / self.baud * 1e9 / self.period_ns), 1)  # the line is taken
+        self._number += max(math.ceil(len(data) * 10 / self.baud * 1e9 / self.period_ns), 1)  # the line is busy
         return [(sent_ns, data)]
 
-    def leave_out(self, before_ns: int) -> None:
-        """Passes over what should have been measured before."""
+    def skip_to(self, before_ns: int) -> None:
+        """Skip the telegrams before a time."""
         if self.scanning is not None:
             self._number += max(math.floor((before_ns - self.next_ns()) / self.period_ns), 0)
 
     def power_cycle(self, now_ns: int) -> None:
-        """At 9600 baud, silent for as long as it starts; its variant is gone."""
+        """Restart at 9600 baud with the default variant, silent while it starts."""
         self.began_ns = now_ns + _BOOT_NS
         self.scanning, self.baud, self._mode = None, 9600, 0x25
         self._field_deg, self._step_centideg = 180, 100
@@ -162,17 +158,14 @@ class LmsMachine:
                 return b"\xba" + self.lidar.name.replace(" ", "").encode() + b";30106;V02.30"
             case 0x3B if len(request) == 5:
                 angle_deg, step_centideg = struct.unpack("<HH", request[1:])
-                known = (angle_deg in (100, 180) and step_centideg in (50, 100)) or (angle_deg, step_centideg) == (
-                    100,
-                    25,
-                )
+                known = step_centideg in {100: (25, 50, 100), 180: (50, 100)}.get(angle_deg, ())
                 if known:
                     self._field_deg, self._step_centideg = angle_deg, step_centideg
                 return b"\xbb" + struct.pack("<BHH", int(known), angle_deg, step_centideg)
         return b""
 
     def _status(self) -> bytes:
-        """The answer to a request for the status; what else it holds is 0 [assumed]."""
+        """Return the reply to a status request; its other bytes are 0 [assumed]."""
         status = bytearray(_STATUS)
         status[0:8] = b"\xb1V02.30 "
         status[8] = self._mode
@@ -184,6 +177,6 @@ class LmsMachine:
 
 
 def lms_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarLine[LmsMachine]:
-    """The emulator of a sensor of the catalogue."""
+    """Return the emulator of a catalogue sensor."""
     machine = LmsMachine(lidar, ranging, time.monotonic_ns())
     return LidarLine(lidar.name, machine, head=_HEAD, network=False, seed=seed)

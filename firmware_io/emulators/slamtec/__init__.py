@@ -1,1 +1,1 @@
-"""RPLIDARs in software: models and their scan modes, packets, and the sensor itself."""
+"""Emulated RPLIDARs: models, packets, and the sensor."""

@@ -1,6 +1,6 @@
-"""Emulator of RPLIDARs: requests, descriptors and streams, with a motor that spins up and wanders.
+"""Emulator of RPLIDARs with a motor of varying speed.
 
-Written from the maker's protocol manual and SDK; what they lack is marked [assumed].
+Written from the maker's protocol manual and SDK; undocumented values are marked [assumed].
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ _STOP, _RESET, _SCAN, _FORCE_SCAN, _EXPRESS_SCAN = 0x25, 0x40, 0x20, 0x21, 0x82
 _INFO, _HEALTH, _SAMPLE_TIMES, _GET_CONF = 0x50, 0x52, 0x59, 0x84
 _MOTOR_PWM, _MOTOR_RPM, _BOARD_FLAG = 0xF0, 0xA8, 0xFF
 
-_CHUNK_NS = 8_000_000  # measured at once: some ms cost a computer little and delay nothing
+_CHUNK_NS = 8_000_000  # measured together, to save time
 _BOOT_NS = 1_000_000_000  # [assumed]
-_POINTS_ERROR = 2e-3  # it measures this part faster than it states [assumed]
+_POINTS_ERROR = 2e-3  # relative, it measures faster than it states [assumed]
 _NEVER_NS = 1 << 62  # 146 years
-_POINTS: Final = {STANDARD: 8, EXPRESS: 32, ULTRA: 96, DENSE: 40}  # of a packet; nodes are sent 8 together
+_POINTS: Final = {STANDARD: 8, EXPRESS: 32, ULTRA: 96, DENSE: 40}  # of a packet; 8 nodes are sent together
 _SIZES: Final = {STANDARD: 5, EXPRESS: 84, ULTRA: 132, DENSE: 84}
-_MOST_MM: Final = {STANDARD: 16_383, EXPRESS: 16_383, ULTRA: 28_655, DENSE: 65_535}  # that a packet can hold
-_EIGHTHS = np.round(9 * np.sin(np.arange(32) / 3)).astype(int)  # of both signs, as triangulation has them
-_FAR_OFFSET_DEG = 8.0  # of a triangulated beam, as the SDK corrects it
-_OFFSET_WITHIN_DEG = 0.1  # between two estimates of it; at edges there is none, and no return
+_MOST_MM: Final = {STANDARD: 16_383, EXPRESS: 16_383, ULTRA: 28_655, DENSE: 65_535}  # largest range of a packet
+_EIGHTHS = np.round(9 * np.sin(np.arange(32) / 3)).astype(int)  # of both signs, as with triangulation
+_FAR_OFFSET_DEG = 8.0  # of a triangulated beam, as corrected by the SDK
+_OFFSET_WITHIN_DEG = 0.1  # largest difference of two estimates; edges exceed it and have no return
 
 
 @dataclass
 class SlamtecMachine:
-    """The state of one sensor; times are true ones."""
+    """State of one sensor; times are true ones."""
 
-    lidar: Lidar  # of the catalogue
-    ranging: Ranging  # its surroundings
-    began_ns: int  # when it got its power
-    points_error: float = 0.0  # it measures this part faster than it states
+    lidar: Lidar
+    ranging: Ranging
+    began_ns: int  # end of its start
+    points_error: float = 0.0  # relative, it measures faster than it states
     health: int = 0  # 0 good, 1 a warning, 2 a fault
 
     def __post_init__(self) -> None:
@@ -54,7 +54,7 @@ class SlamtecMachine:
         self._packet = 0
         self._from_ns = self._line_free_ns = 0
         self._first = False
-        self._ahead_mm: int | None = None  # the next capsule's first range, which an ultra capsule refers to
+        self._ahead_mm: int | None = None  # the next capsule's first range, to which an ultra capsule refers
         self._started_ns: int | None = None  # of the motor
         self._rest_deg = 0.0
 
@@ -63,8 +63,8 @@ class SlamtecMachine:
         """True time between two points."""
         return self._mode.point_us * 1e3 / (1 + self.points_error)
 
-    def hear(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
-        """Answer complete requests; a wrong sum, or anything else, gets no answer."""
+    def receive(self, received: bytes, now_ns: int, /) -> tuple[bytes, bytes]:
+        """As `Machine.receive`; there is no reply to a wrong checksum."""
         answers = b""
         while (at := received.find(b"\xa5")) >= 0 and len(received) >= at + 2:
             command, received = received[at + 1], received[at:]
@@ -85,13 +85,13 @@ class SlamtecMachine:
         return answers, received if at >= 0 else b""
 
     def next_ns(self) -> int:
-        """When the packets that it measures next are over."""
+        """Return the end of the next packets."""
         if self.scanning is None:
             return _NEVER_NS
         return self._from_ns + round((self._packet + self._chunk) * self._many * self.point_ns)
 
     def next_packets(self) -> list[tuple[int, bytes]]:
-        """Packets of the next milliseconds, each when its last byte is sent: no faster than its line."""
+        """Measure the packets of the next milliseconds, sent no faster than its line."""
         number = self._many * self._packet + np.arange(self._many * self._chunk + 1)
         time_ns = self._from_ns + np.rint(number * self.point_ns).astype(np.int64)
         angle_deg = self._turned_deg(time_ns)
@@ -106,8 +106,8 @@ class SlamtecMachine:
         self._packet += self._chunk
         return sent
 
-    def leave_out(self, before_ns: int) -> None:
-        """Skip what should have been measured before."""
+    def skip_to(self, before_ns: int) -> None:
+        """Skip the packets before a time."""
         if self.scanning is not None:
             behind = math.floor((before_ns - self.next_ns()) / (self._many * self.point_ns))
             if behind > 0:
@@ -115,7 +115,7 @@ class SlamtecMachine:
                 self._ahead_mm = None
 
     def power_cycle(self, now_ns: int) -> None:
-        """Stop, and give no answer while it boots."""
+        """Restart, without replies meanwhile."""
         self._turn_motor(now_ns, on=False)
         self.began_ns, self.scanning = now_ns + _BOOT_NS, None
 
@@ -158,7 +158,7 @@ class SlamtecMachine:
         return b""
 
     def _mode_of(self, command: int, payload: bytes) -> ScanMode | None:
-        """The scan mode that a request starts; None for a request of another kind, or a mode that it does not have."""
+        """Return the scan mode that a request starts; None for another request, or an unsupported mode."""
         identity = self.identity
         if command in (_SCAN, _FORCE_SCAN):
             return identity.modes[0] if identity.modes else ScanMode("", STANDARD, 2 * identity.legacy.point_us, 0.0)
@@ -169,7 +169,7 @@ class SlamtecMachine:
         return identity.modes[payload[0]] if payload[0] < len(identity.modes) else None
 
     def _begin(self, mode: ScanMode, now_ns: int) -> bytes:
-        """Begin to scan, unless it reports a fault; the descriptor of the stream."""
+        """Start to scan, unless it has a fault; return the descriptor of the stream."""
         if self.health == 2:
             return b""
         if self.identity.motor != "pwm":
@@ -184,14 +184,14 @@ class SlamtecMachine:
             self._started_ns = now_ns if on else None
 
     def _turned_deg(self, time_ns: Times) -> Floats:
-        """Angle of the motor, which nears its speed exponentially."""
+        """Return the angle of the motor, which approaches its speed exponentially."""
         if self._started_ns is None:
             return np.full(time_ns.size, self._rest_deg)
         since_s = np.maximum((time_ns - self._started_ns) / 1e9, 0.0)
         return self._rest_deg + turned_deg(self.lidar.scan_rate_hz, spun_up(since_s)[0])[0]
 
     def _seen_mm(self, time_ns: Times, angle_deg: Floats) -> Times:
-        """Whole millimetres, 0 without a return."""
+        """Return ranges in integer millimetres, 0 without a return."""
         range_mm = self.ranging(time_ns, -np.radians(angle_deg % 360))[0] * 1e3
         measured = np.isfinite(range_mm) & (range_mm > 0) & (range_mm <= _MOST_MM[self._mode.kind])
         return np.rint(np.where(measured, range_mm, 0.0)).astype(np.int64)
@@ -227,13 +227,13 @@ class SlamtecMachine:
 
 
 def triangulation_offset_deg(range_mm: Times) -> Floats:
-    """By how much beams of an ultra capsule lie before their even places, as rplidar_sdk corrects them."""
+    """Return the angle by which beams of an ultra capsule precede their even places, as corrected by rplidar_sdk."""
     ratio = 98_361 // np.maximum(4 * range_mm, 1)
     return np.where(range_mm >= 50, _FAR_OFFSET_DEG - np.degrees((64 * ratio + ratio**3 / 98_304) / 65_536), 7.5)
 
 
 def slamtec_emulator(lidar: Lidar, ranging: Ranging, seed: int = 0) -> LidarLine[SlamtecMachine]:
-    """The emulator of a sensor of the catalogue; a DeviceError if there is none."""
+    """Return the emulator of a catalogue sensor, or raise DeviceError."""
     if lidar.name not in IDENTITIES:
         raise DeviceError(f"no RPLIDAR emulator of the lidar '{lidar.name}'{suggest(lidar.name, IDENTITIES)}")
     machine = SlamtecMachine(lidar, ranging, time.monotonic_ns(), _POINTS_ERROR)

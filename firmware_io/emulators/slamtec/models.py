@@ -1,7 +1,7 @@
-"""Models of RPLIDAR: identity, line, motor and scan modes, as the maker's SDK and logs of its users list them.
+"""Models of RPLIDAR: identity, baud rate, motor and scan modes.
 
 Sources: GET_LIDAR_CONF in sl_lidar_cmd.h of rplidar_sdk 2.1; the modes that rplidar_ros prints for real sensors (issues
-68 and 84 of robopeak/rplidar_ros, 48 of Slamtec/rplidar_ros). What no source gives is marked [assumed].
+68 and 84 of robopeak/rplidar_ros, 48 of Slamtec/rplidar_ros). Undocumented values are marked [assumed].
 """
 
 from __future__ import annotations
@@ -29,18 +29,14 @@ class ScanMode:
 
 @dataclass(frozen=True, slots=True)
 class SlamtecIdentity:
-    """A model.
-
-    Attributes:
-        motor: what starts the motor: a scan, the duty cycle of an accessory board, or a speed command.
-    """
+    """A model."""
 
     model: int  # byte of INFO; its upper half is the series
-    baud: int  # of its line
-    motor: Literal["scan", "pwm", "rpm"]
-    modes: tuple[ScanMode, ...]  # by number; empty for firmware before 1.24, which does not answer GET_CONF
+    baud: int
+    motor: Literal["scan", "pwm", "rpm"]  # started by a scan, the duty cycle of an accessory board, or a speed command
+    modes: tuple[ScanMode, ...]  # by number; empty for firmware before 1.24, without GET_CONF
     typical: int  # number of the mode that the maker's programs choose
-    legacy: ScanMode  # the mode of EXPRESS_SCAN with number 0
+    legacy: ScanMode  # mode of EXPRESS_SCAN with number 0
     firmware: tuple[int, int] = (1, 29)  # major and minor version
 
     @property
@@ -49,7 +45,7 @@ class SlamtecIdentity:
         return self.modes[self.typical] if self.modes else self.legacy
 
     def configuration(self, payload: bytes) -> bytes | None:
-        """Answer GET_CONF; None for an entry that it does not have."""
+        """Return the reply to GET_CONF; None for an unsupported entry."""
         key, number = int.from_bytes(payload[:4], "little"), int.from_bytes(payload[4:6], "little")
         mode = self.modes[number] if number < len(self.modes) else None
         if not self.modes or (mode is None and key in (_SAMPLE_US, _MAX_DISTANCE, _ANSWER, _NAME)):

@@ -1,6 +1,6 @@
-"""Packets that an RPLIDAR sends: answers, nodes, capsules, ultra capsules and dense capsules; numbers little-endian.
+"""Packets sent by an RPLIDAR: replies, nodes, capsules, ultra capsules and dense capsules; numbers little-endian.
 
-Written from the maker's protocol manual (LR001) and the decoder in rplidar_sdk 2.1, apart from our own decoder.
+Written from the maker's protocol manual (LR001) and the decoder in rplidar_sdk 2.1, not from the driver.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ _LAST_PREDICTED = 510  # steps; 511 and -512 mean no return
 
 
 def reply(kind: int, data: bytes) -> bytes:
-    """Return an answer after its descriptor."""
+    """Encode a reply with its descriptor."""
     return b"\xa5\x5a" + struct.pack("<IB", len(data), kind) + data
 
 
 def stream_begins(kind: int, size: int) -> bytes:
-    """Return the descriptor of packets without end."""
+    """Encode the descriptor of a stream."""
     return b"\xa5\x5a" + struct.pack("<IB", 1 << 30 | size, kind)
 
 
 def node(angle_deg: float, range_mm: float, *, first: bool) -> bytes:
-    """Return one point with its own angle; `first` marks the first of a turn."""
+    """Encode one point with its angle; `first` marks the first of a turn."""
     quality = 47 if range_mm else 0
     angle = math.floor(angle_deg * 64) % 23_040 << 1 | 1
     return struct.pack("<BHH", quality << 2 | (1 if first else 2), angle, round(range_mm * 4))
 
 
 def capsule(angle_deg: float, range_mm: Sequence[int], eighths: Sequence[int], *, first: bool) -> bytes:
-    """Return 32 points; `eighths` of a degree by which each lies before its even place."""
+    """Encode 32 points; `eighths` of a degree by which each precedes its even place."""
     data = _start(angle_deg, first=first)
-    for one in range(0, 32, 2):
-        for k in (one, one + 1):
+    for at in range(0, 32, 2):
+        for k in (at, at + 1):
             data += (range_mm[k] << 2 | (eighths[k] >> 4) & 3).to_bytes(2, "little")
-        data.append((eighths[one] & 15) | (eighths[one + 1] & 15) << 4)
+        data.append((eighths[at] & 15) | (eighths[at + 1] & 15) << 4)
     return summed(data)
 
 
 def ultra(angle_deg: float, range_mm: Sequence[int], *, first: bool) -> bytes:
-    """Return 96 points of 97 ranges, the last of which is the next capsule's first."""
+    """Encode 96 points of 97 ranges, the last of which is the next capsule's first."""
     data = _start(angle_deg, first=first)
     for at in range(0, 96, 3):
         major, base, bits = _scaled(range_mm[at])
@@ -56,12 +56,12 @@ def ultra(angle_deg: float, range_mm: Sequence[int], *, first: bool) -> bytes:
 
 
 def dense(angle_deg: float, range_mm: Sequence[int], *, first: bool) -> bytes:
-    """Return 40 points at even angles."""
+    """Encode 40 points at even angles."""
     return summed(_start(angle_deg, first=first) + struct.pack("<40H", *range_mm))
 
 
 def summed(data: bytearray) -> bytes:
-    """Return a capsule: its sum in two halves before it."""
+    """Prepend the checksum of a capsule in two halves."""
     total = 0
     for byte in data:
         total ^= byte
@@ -73,7 +73,7 @@ def _start(angle_deg: float, *, first: bool) -> bytearray:
 
 
 def _scaled(range_mm: int) -> tuple[int, int, int]:
-    """Return count, range of that count [mm] and bits that a count stands for."""
+    """Return count, range of that count [mm] and bits of a count."""
     first, first_mm, bits = next(part for part in _PARTS if range_mm >= part[1])
     count = min(first + (range_mm - first_mm >> bits), 4095)
     return count, first_mm + (count - first << bits), bits

@@ -1,1 +1,1 @@
-"""LD06, LD19 and STL27L: sensors that talk all the time, one way."""
+"""LDROBOT LD06, LD19, STL-19P and STL27L, which only send."""

@@ -1,6 +1,6 @@
 """LDROBOT lidar on a serial line. It sends from power-up and accepts no commands, so nothing is started or stopped.
 
-It reports no model or serial number. Its points per second tell the STL27L from the LD06 and LD19, which are alike.
+It reports no model or serial number. The rate of points distinguishes the STL27L from the LD06 and LD19.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from scanwright.firmware_io.lidar.turn import Points, TurnQueue, timed_scan
 FAMILY = "ldrobot"
 
 _BAUDS = {"LD06": 230_400, "LD19": 230_400, "STL-19P": 230_400, "STL27L": 921_600}  # data sheets of LDROBOT
-_FIRST_PACKETS_S = 0.5  # it talks hundreds of times a second
+_FIRST_PACKETS_S = 0.5  # it sends hundreds of packets a second
 _SILENCE_NS = 500_000_000  # after which the sensor may have restarted
-_PAUSE_S = 0.5  # of the reader, across which the sensor's stamps tell which packets waited or were lost
-_FIRST_PAUSE_S = 0.1  # the same, before there is a line to tell what is late
-_FIRST = 3  # packets that must agree on how fast it measures
-_STAMPS = 64  # packets over which the sensor's milliseconds are evened out
+_PAUSE_S = 0.5  # pause of the reader across which timestamps show which packets waited or were lost
+_FIRST_PAUSE_S = 0.1  # the same, before the clock is known
+_FIRST = 3  # packets that must agree on the rate of points
+_STAMPS = 64  # packets over which timestamps are averaged
 
 
 class _PacketClock:
@@ -46,7 +46,7 @@ class _PacketClock:
 
     @property
     def is_known(self) -> bool:
-        """Whether its times are as fine as they get."""
+        """Whether enough stamps are averaged."""
         return len(self._begin) == _STAMPS
 
     def sensor_ns(self, stamp_ms: int, lost: int, arrival_ns: int) -> float:
@@ -59,18 +59,18 @@ class _PacketClock:
         unwrapped_ms = last_ms + step_ms if self._begin else stamp_ms
         self._last = (unwrapped_ms, arrival_ns)
         self._number += 1 + lost
-        if abs(step_ms - (1 + lost) * self._period_ms) > 2 * self._period_ms + 2:  # whole turns are missing
+        if abs(step_ms - (1 + lost) * self._period_ms) > 2 * self._period_ms + 2:  # entire turns are missing
             self._begin.clear()
-        # a stamp is a whole millisecond: on the mean the time lies half of one behind it
+        # stamps are rounded down: on average the time is half a millisecond later
         self._begin.append(unwrapped_ms + 0.5 - self._number * self._period_ms)
         return (sum(self._begin) / len(self._begin) + self._number * self._period_ms) * 1e6
 
 
 class LdrobotLidar(LineDriver):
-    """An LDROBOT lidar, which tells no serial number and no version."""
+    """An LDROBOT lidar; it reports no serial number and no version."""
 
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
-        """Listen to it; without a model of the catalogue it is the first whose speed of measuring fits."""
+        """Open it; without `model`, choose the first product of the catalogue whose rate of points fits."""
         self.address = address
         self._bad_before = 0
         self._splitter = protocol.LdrobotSplitter()
@@ -80,24 +80,23 @@ class LdrobotLidar(LineDriver):
 
     @property
     def dropped(self) -> int:
-        """Turns that are missing between those that were read."""
+        """Missing turns between those read."""
         return self._turns.dropped
 
     @property
     def bad_packets(self) -> int:
-        """Runs of bytes that were no packet."""
+        """Packets dropped."""
         return self._bad_before + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
-        """Return turns from now on; it measures all the time."""
         self._intensity = intensity
-        self._turns.begin_anew(skip)
+        self._turns.restart(skip)
         self._resume()
 
     def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._arrivals)) is None:
             pause_s = _PAUSE_S if self._clock.is_known else _FIRST_PAUSE_S
-            packets, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, pause_s)
+            packets, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, pause_s)
             if packets and self._arrivals.is_behind:
                 self._line.drop_waiting()
                 packets = []
@@ -106,17 +105,16 @@ class LdrobotLidar(LineDriver):
                 self._resume()
                 return None
             for packet in packets:
-                self._take(packet, arrival_ns)
+                self._add(packet, arrival_ns)
         uncertainty_ns = self._line.widened(self._arrivals.uncertainty_ns)
         return timed_scan(turn[0], self._arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
 
     def _find(self) -> None:
-        """Open the same port again."""
         self._line.reopen()
         self._lidar = self._recognised(self.model)
 
     def _recognised(self, model: str | None) -> Lidar:
-        """Find the model and baud rate of the sensor that sends; close the line if none does."""
+        """Detect model and baud rate; close the line if nothing is received."""
         products = [product for product in load_catalogue() if isinstance(product, Lidar) and product.name in _BAUDS]
         named = [product for product in products if model in (None, product.name)]
         self._bad_before = self.bad_packets
@@ -126,7 +124,7 @@ class LdrobotLidar(LineDriver):
                     self._line.serial.baud = baud
                 self._splitter = protocol.LdrobotSplitter()
                 points_s = self._points_s()
-                self._splitter.bad = 0  # where we cut in is nobody's fault
+                self._splitter.bad = 0  # the first packet was cut by opening the port
                 if points_s is None:
                     continue
                 by_speed = [(abs(math.log(points_s / _points_s(product))), product) for product in products]
@@ -140,19 +138,19 @@ class LdrobotLidar(LineDriver):
             raise DeviceTimeoutError(f"{self.address}: no LDROBOT sensor answers; check power, cable and port")
 
     def _points_s(self) -> float | None:
-        """Points per second by angles and speed; None if nothing talks."""
+        """Return the received points per second, from angles and speed; None if nothing is received."""
         deadline_s = time.monotonic() + _FIRST_PACKETS_S
         rates: list[float] = []
         while len(rates) < _FIRST:
             try:
-                packets, _ = self._line.hear(self._splitter.feed, deadline_s)
+                packets, _ = self._line.receive(self._splitter.feed, deadline_s)
             except DeviceTimeoutError:
                 return None
             rates += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
         return float(np.median(rates)) or None
 
     def _resume(self) -> None:
-        """Nothing of what came before is of use: a new line, a new clock, a new turn."""
+        """Start a new clock and a new turn."""
         baud = _BAUDS[self.model]
         self._arrivals = ArrivalLine(
             smallest_delay_ns=round(protocol.SIZE * 10 / baud * 1e9),
@@ -163,10 +161,10 @@ class LdrobotLidar(LineDriver):
         self._turns.resume()
         self._next_deg = self._last_ns = math.nan
 
-    def _take(self, packet: protocol.LdrobotPacket, arrival_ns: int) -> None:
+    def _add(self, packet: protocol.LdrobotPacket, arrival_ns: int) -> None:
         span_deg = packet.step_deg * protocol.POINTS
         most_deg = 1.5 * protocol.POINTS * packet.speed_deg_s / _points_s(self._lidar)
-        if not 0 < span_deg <= most_deg:  # a start and an end that do not belong together
+        if not 0 < span_deg <= most_deg:  # start and end are of different packets
             self._bad_before += 1
             return
         if arrival_ns - self._last_ns > _SILENCE_NS:
@@ -193,6 +191,6 @@ def _points_s(lidar: Lidar) -> float:
 
 
 def _grain_ns(lidar: Lidar) -> float:
-    """What the mean of the stamps leaves unknown, standard deviation: packets begin at few phases of a millisecond."""
+    """Standard uncertainty of the mean of the stamps: packets begin at few phases of a millisecond."""
     phases = Fraction(round(protocol.POINTS * 1e3), round(_points_s(lidar))).denominator
     return 1e6 / math.sqrt(12) * math.hypot(1 / phases, 1 / _STAMPS)

@@ -1,9 +1,8 @@
 """Packets of LDROBOT lidars: pure functions of bytes.
 
 47 bytes, little-endian: 54 2C, speed [deg/s], start [0.01 deg], 12 times range [mm] and intensity, end [0.01 deg],
-time [ms, from 0 again at 30000], CRC-8 (polynomial 4D, from 0, not reflected) of all before it. Angles grow clockwise.
-
-Bytes that mean something else raise ProtocolError.
+time [ms, wraps at 30000], CRC-8 (polynomial 4D, from 0, not reflected) of all before it. Angles grow clockwise.
+Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ class LdrobotPacket:
     """Content of one packet."""
 
     speed_deg_s: int  # of the motor
-    angle_deg: Float64[ndarray, " 12"]  # of each point, clockwise from the front, 0 to 360, shape (12,)
-    step_deg: float  # from one point to the next
+    angle_deg: Float64[ndarray, " 12"]  # clockwise from the front, 0 to 360, shape (12,)
+    step_deg: float  # between two points
     range_m: Float32s  # shape (12,), NaN without a return
     intensity: Float32s  # shape (12,)
-    stamp_ms: int  # the sensor's time
+    stamp_ms: int  # sensor time
 
 
 def _table() -> bytes:
@@ -52,7 +51,7 @@ _CRC = _table()
 
 
 def crc8(data: bytes) -> int:
-    """The checksum of a packet without its last byte."""
+    """Return the checksum of a packet without its last byte."""
     crc = 0
     for byte in data:
         crc = _CRC[crc ^ byte]
@@ -60,9 +59,9 @@ def crc8(data: bytes) -> int:
 
 
 def packet(data: bytes) -> LdrobotPacket:
-    """What the 47 bytes of a packet tell."""
+    """Decode the 47 bytes of a packet."""
     if len(data) != SIZE or data[:2] != HEAD:
-        raise ProtocolError(f"LDROBOT: {len(data)} bytes that begin with {data[:2].hex()}: no packet")
+        raise ProtocolError(f"LDROBOT: {len(data)} bytes that begin with {data[:2].hex()}: not a packet")
     if crc8(data[:-1]) != data[-1]:
         raise ProtocolError("LDROBOT: the checksum of a packet is wrong")
     speed, start = struct.unpack_from("<HH", data, 2)
@@ -82,23 +81,19 @@ def packet(data: bytes) -> LdrobotPacket:
 
 
 class LdrobotSplitter:
-    """Cuts packets out of a stream, and skips other bytes.
-
-    Attributes:
-        bad: packets that were lost to something else: one for each run of bytes that are none, and for each further 47.
-    """
+    """Splitter of a byte stream into packets; skips other bytes."""
 
     def __init__(self) -> None:
-        self.bad = 0
+        self.bad = 0  # packets lost: one for each started 47 bytes of a run that contains none
         self._rest = b""
         self._passed = 0
 
     def cut_in(self) -> None:
-        """What comes next may begin in the middle of a packet, which is not counted as bad."""
+        """Expect the middle of a packet next, and do not count it as bad."""
         self._rest, self._passed = b"", 1
 
     def feed(self, data: bytes) -> list[LdrobotPacket]:
-        """The packets that these bytes complete."""
+        """Return the packets that these bytes complete."""
         self._rest += data
         packets: list[LdrobotPacket] = []
         at = 0
@@ -107,7 +102,7 @@ class LdrobotSplitter:
                 packets.append(packet(self._rest[at : at + SIZE]))
             except ProtocolError:
                 following = self._rest.find(HEAD, at + 1)
-                # without a head all is nothing, but for a last byte that may be half of one
+                # without a head skip all but the last byte, which can be the first half of one
                 step = (following if following >= 0 else max(len(self._rest) - 1, at + 1)) - at
                 self.bad += -(-(self._passed + step) // SIZE) - -(-self._passed // SIZE)
                 self._passed += step

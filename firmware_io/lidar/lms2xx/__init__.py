@@ -1,1 +1,1 @@
-"""SICK LMS 2xx, which speak telegrams of their own over RS-422."""
+"""SICK LMS 2xx, with their own telegrams over RS-422."""

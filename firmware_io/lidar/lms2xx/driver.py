@@ -1,7 +1,7 @@
 """SICK LMS 200 or LMS 291 on its serial line, with a field of 180 deg.
 
-A telegram holds whole and half degrees, measured in two consecutive turns; each turn becomes one scan. The sensor sends
-no timestamps: telegrams are evenly spaced, and their count is the clock. Written from documents, not tried on a sensor.
+A telegram contains integer and half degrees, measured in two consecutive turns; each turn becomes one scan. The sensor
+sends no timestamps: telegrams are evenly spaced, and their count is the clock. Not tested on a sensor.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from scanwright.firmware_io.samples import Scan
 
 FAMILY = "lms2xx"
 
-_ANSWER_S = 0.5  # 15 times what the bytes of an answer take at 9600 baud
+_REPLY_S = 0.5  # 15 times the duration of a reply at 9600 baud
 _STREAM_S = 0.1  # several turns of its mirror
-_MODE_S = 3.0  # it stops its stream, or answers at its new speed, after some turns
-_TRIES = 2  # the first may meet its stream
+_MODE_S = 3.0  # it changes its mode after some turns
+_TRIES = 2  # the first reply can be lost in the stream
 _FAST_BAUD, _USUAL_BAUD = 500_000, 38_400
 _POWER_UP_BAUD = 9600  # after each power-up
-_BAUDS = (_POWER_UP_BAUD, _FAST_BAUD, _USUAL_BAUD, 19_200)  # all that it has, the likeliest first
+_BAUDS = (_POWER_UP_BAUD, _FAST_BAUD, _USUAL_BAUD, 19_200)  # all supported, the most probable first
 _TURN_S = 1 / 75  # of its mirror
 _PATIENCE = 8  # telegrams: a fifth of a second
 
 
 class LmsLidar(LineDriver):
-    """An LMS 2xx, which tells no serial number."""
+    """An LMS 2xx; it reports no serial number."""
 
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop its stream; `model`: catalogue name, or None for the reported one."""
@@ -46,16 +46,16 @@ class LmsLidar(LineDriver):
         self._count: TelegramCount | None = None
         self._line = SensorLine(address, 2 * protocol.LONGEST)
         self._recognise(model, _BAUDS)
-        self._baud_before = self._baud  # at which it was last in order
+        self._baud_before = self._baud  # of the last successful start
 
     @property
     def scan_rate_hz(self) -> float:
-        """Turns of its mirror per second."""
+        """Mirror turns per second."""
         return self._lidar.scan_rate_hz * self._interlaced
 
     @property
     def dropped(self) -> int:
-        """Turns that are missing between those that were read, by the time that went by."""
+        """Missing turns between those read, by the elapsed time."""
         return self._lost_before + self._count.lost * self._interlaced if self._count else self._lost_before
 
     @property
@@ -64,7 +64,6 @@ class LmsLidar(LineDriver):
         return self._bad_before + self._bad_scans + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
-        """As finely as the catalogue says, at the speed that the port can."""
         if intensity:
             raise DeviceError(f"{self._line.name}: intensity: a {self.model} sends none; omit it")
         step_centideg = round(36_000 / self._lidar.steps_per_turn)
@@ -79,41 +78,36 @@ class LmsLidar(LineDriver):
         self._waiting.clear()
         beams = self._lidar.last_step - self._lidar.first_step + 1
         telegram_ns = round((2 * beams + 10) * 10 / self._baud * 1e9)
-        patience = _PATIENCE if self._baud == _FAST_BAUD else 1  # on a slow line every one is behind lost ones
+        patience = _PATIENCE if self._baud == _FAST_BAUD else 1  # a slow line loses telegrams all the time
         self._count = TelegramCount(self._interlaced * _TURN_S * 1e9, telegram_ns, patience)
         self._baud_before = self._baud
 
     def _turn(self, deadline_s: float) -> TimedScan | None:
         assert self._count is not None
         while not self._waiting:
-            telegrams, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._count.pause_s)
+            telegrams, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, self._count.pause_s)
             if not telegrams:
                 self._splitter.cut_in()
                 self._count.resume()
                 return None
             for reply in telegrams:
                 if reply.command == protocol.SCAN:
-                    self._take(reply, arrival_ns)
+                    self._add(reply, arrival_ns)
         return self._waiting.popleft()
 
     def _halt(self) -> None:
-        """Stop its stream; its laser stays on as long as it has power."""
+        """Stop its stream; its laser cannot be switched off."""
         self._mode(protocol.ON_REQUEST)
 
     def _find(self) -> None:
-        """Open the same port again."""
         self._line.reopen()
         before = self._baud_before
-        # the plug was out, and it streams on, or the power was; to look for it at all four costs a second more
-        streams = self._receives_at(before)
-        self._recognise(self.model, (before, _POWER_UP_BAUD) if streams else (_POWER_UP_BAUD, before))
-
-    def _receives_at(self, baud: int) -> bool:
-        """Whether anything comes at this speed, within some turns."""
         if self._line.serial is not None:
-            self._line.serial.baud = baud
+            self._line.serial.baud = before
+        # it still streams if only the plug was out; to try all four baud rates takes a second longer
         with self._line.closed_on_error(), self._line.broken_line_as_error():
-            return bool(self._line.stream.read(_STREAM_S))
+            streams = bool(self._line.stream.read(_STREAM_S))
+        self._recognise(self.model, (before, _POWER_UP_BAUD) if streams else (_POWER_UP_BAUD, before))
 
     def _recognise(self, model: str | None, bauds: tuple[int, ...]) -> None:
         """Stop its stream at one of these baud rates and read its type; close the line if none answers."""
@@ -127,28 +121,28 @@ class LmsLidar(LineDriver):
                 for _ in range(_TRIES):
                     before = self._line.received
                     try:
-                        self._mode(protocol.ON_REQUEST, _ANSWER_S)
+                        self._mode(protocol.ON_REQUEST, _REPLY_S)
                         reply = self._ask(protocol.telegram(protocol.TYPE), protocol.TYPE)
                     except DeviceTimeoutError:
                         if self._line.received == before and baud != _POWER_UP_BAUD:
                             break
                         continue
                     self._accept(reply.values[:-1].decode("ascii", "replace"), model)
-                    self._splitter.bad = 0  # what was on its way when we came is nobody's fault
+                    self._splitter.bad = 0  # a telegram was cut by opening the port
                     return
             raise DeviceTimeoutError(f"{self.address}: no SICK LMS 2xx answers; check power, cable and port")
 
     def _accept(self, type_text: str, model: str | None) -> None:
-        lidars = [one for one in load_catalogue() if isinstance(one, Lidar) and one.family == FAMILY]
-        product = next((one for one in lidars if type_text.startswith(one.name.replace(" ", ""))), None)
+        lidars = [product for product in load_catalogue() if isinstance(product, Lidar) and product.family == FAMILY]
+        product = next((lidar for lidar in lidars if type_text.startswith(lidar.name.replace(" ", ""))), None)
         if product is None or model not in (None, product.name):
-            wanted = model or "LMS that is known"
-            raise DeviceError(f"{self._line.name}: it calls itself '{type_text.strip()}': not a {wanted}")
+            expected = model or "known LMS"
+            raise DeviceError(f"{self._line.name}: it reports type '{type_text.strip()}': not a {expected}")
         self._lidar, self.firmware = product, type_text.rpartition(";")[2].strip()
         self._interlaced = max(round(_TURN_S**-1 / product.scan_rate_hz), 1)
 
     def _speed_up(self) -> None:
-        """The fastest speed that both ends can: what is slower than its scans loses turns."""
+        """Set the highest baud rate that both ends support: below that of its scans, turns are lost."""
         port = self._line.serial
         if port is None:
             return
@@ -165,18 +159,18 @@ class LmsLidar(LineDriver):
         if reply.values[:1] != b"\0":
             raise DeviceError(f"{self._line.name}: it rejects mode {mode:02X}")
 
-    def _ask(self, request: bytes, command: int, timeout_s: float = _ANSWER_S) -> protocol.LmsTelegram:
+    def _ask(self, request: bytes, command: int, timeout_s: float = _REPLY_S) -> protocol.LmsTelegram:
         self._line.send(request)
         deadline_s = time.monotonic() + timeout_s
         while True:
-            telegrams, _ = self._line.hear(self._splitter.feed, deadline_s)
+            telegrams, _ = self._line.receive(self._splitter.feed, deadline_s)
             for reply in telegrams:
                 if reply.command == command | protocol.ANSWER:
                     return reply
-            if time.monotonic() > deadline_s:  # it streams on, and answers nothing
+            if time.monotonic() > deadline_s:  # it only streams
                 raise DeviceTimeoutError(f"{self._line.name}: no answer to {command:02X}")
 
-    def _take(self, reply: protocol.LmsTelegram, arrival_ns: int) -> None:
+    def _add(self, reply: protocol.LmsTelegram, arrival_ns: int) -> None:
         try:
             measured = protocol.scan(reply)
         except ProtocolError:
@@ -190,18 +184,18 @@ class LmsLidar(LineDriver):
             fault = f"it reports a fault (status {measured.status:02X})"
             raise DeviceFaultError(f"{self._line.name}: {fault}: check its lamps")
         assert self._count is not None
-        for ready, over_ns, came_ns in self._count.add(measured, arrival_ns):
+        for ready, end_ns, ready_ns in self._count.add(measured, arrival_ns):
             for turn in range(self._interlaced):
                 self._skipped += 1
                 if self._skipped > self._skip:
                     self._skipped = 0
                     before_ns = (self._interlaced - 1 - turn + 0.5) * 1e9 * _TURN_S
-                    self._waiting.append(self._scan_of(ready, turn, self._count, over_ns - before_ns, came_ns))
+                    self._waiting.append(self._scan_of(ready, turn, self._count, end_ns - before_ns, ready_ns))
 
     def _scan_of(
         self, measured: protocol.LmsScan, turn: int, count: TelegramCount, begin_ns: float, arrival_ns: int
     ) -> TimedScan:
-        """The beams of one turn, which begins at -90 deg at `begin_ns`."""
+        """Return the scan of one turn, which begins at -90 deg at `begin_ns`."""
         bearing_rad = self._lidar.bearings_rad()[turn :: self._interlaced]
         first_ns = begin_ns + (bearing_rad[0] + np.pi / 2) / (2 * np.pi) * _TURN_S * 1e9
         step_rad = float(bearing_rad[1] - bearing_rad[0])

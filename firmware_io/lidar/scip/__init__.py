@@ -1,1 +1,1 @@
-"""Hokuyo's SCIP 2: protocol, driver, and the clock behind its ticks."""
+"""Protocol and driver of Hokuyo's SCIP 2.0."""

@@ -12,18 +12,17 @@ from scanwright.firmware_io.lidar.byte_stream import FIRST_BAUD
 from scanwright.firmware_io.lidar.scip import measurement, protocol
 from scanwright.firmware_io.lidar.sensor_line import SensorLine
 
-_ANSWER_S = 0.5  # a sensor answers within milliseconds; while it scans, after the scan that it is sending
-_TRIES = 3  # a first request may be glued to what a client before us left half said, which is answered by a refusal
+_REPLY_S = 0.5  # a sensor replies within milliseconds, or after the scan that it is sending
+_TRIES = 3  # the first request can be appended to an incomplete one of another client, and is then rejected
 _BAUDS = (FIRST_BAUD, 19_200, 57_600, 250_000, 500_000, 750_000)  # SCIP 2.0, p. 4; 19200 after power-up
 _FASTER_BAUDS = (250_000, 500_000, 750_000)  # SCIP 2.0, request SS
 
 
 class ScipDialogue:
-    """Dialogue with one sensor; it is opened with its laser put out."""
+    """Dialogue with one sensor, whose laser is switched off first."""
 
     def __init__(self, address: str) -> None:
-        """Open the port and put the laser out, whatever the sensor is doing."""
-        self.line = SensorLine(address, protocol.LONGEST_REPLY)  # to the sensor
+        self.line = SensorLine(address, protocol.LONGEST_REPLY)
         self._bad_before = 0
         self._begin()
 
@@ -33,40 +32,40 @@ class ScipDialogue:
         return self._bad_before + self._splitter.bad
 
     def reopen(self, address: str) -> None:
-        """Begin anew, there or elsewhere; raises as opening does."""
+        """Open the line again, at the same or another address."""
         self._bad_before = self.bad
         self.line.reopen(address)
         self._begin()
 
     def ask(self, request: bytes, timeout_s: float | None = None) -> protocol.Reply:
-        """Return the reply to a request; raises DeviceTimeoutError if none comes."""
+        """Return the reply to a request, or raise DeviceTimeoutError."""
         return self.ask_timed(request, timeout_s)[0]
 
     def ask_timed(self, request: bytes, timeout_s: float | None = None) -> tuple[protocol.Reply, int]:
-        """The reply to a request and when it came; what comes before it is older and dropped. Raises as `ask`."""
+        """Return the reply to a request and its arrival; drops all replies before it. Raises as `ask`."""
         self._waiting.clear()
         self.line.send(request + b"\n")
-        deadline_s = time.monotonic() + (_ANSWER_S if timeout_s is None else timeout_s)
+        deadline_s = time.monotonic() + (_REPLY_S if timeout_s is None else timeout_s)
         while True:
             reply, arrival_ns = self.next(deadline_s)
             if reply.echo == request and not measurement.is_scan(reply):
                 return reply, arrival_ns
 
     def insist(self, request: bytes, *statuses: str) -> None:
-        """Ask, and take no other status for an answer."""
+        """Send a request; DeviceError if its status is another."""
         reply = self.ask(request)
         if reply.status not in statuses:
             raise DeviceError(f"{self.line.name}: {reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
 
     def next(self, deadline_s: float) -> tuple[protocol.Reply, int]:
-        """What it says next and when that came; raises as `SensorLine.hear` does."""
+        """Return the next reply and its arrival; raises as `SensorLine.receive`."""
         if not self._waiting:
-            replies, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
+            replies, arrival_ns = self.line.receive(self._splitter.feed, deadline_s)
             self._waiting.extend((reply, arrival_ns) for reply in replies)
         return self._waiting.popleft()
 
     def speed_up(self, bytes_s: float, without_speed: Callable[[], Iterable[str]]) -> None:
-        """Raise the baud rate for `bytes_s`, if sensor and adapter can; not on the ports `without_speed`."""
+        """Raise the baud rate for `bytes_s`, if sensor and adapter support it; not on the ports `without_speed`."""
         port = self.line.serial
         if port is None or self.line.address in without_speed():
             return
@@ -80,7 +79,7 @@ class ScipDialogue:
             with suppress(DeviceTimeoutError):
                 self.insist(b"QT", "00")
                 return
-            port.baud = usual  # the line is not good for it: the sensor is at one of the two
+            port.baud = usual  # the line fails at this rate: the sensor uses one of the two
             with suppress(DeviceTimeoutError):
                 self.insist(b"QT", "00")
                 continue
@@ -91,10 +90,10 @@ class ScipDialogue:
         self._waiting: deque[tuple[protocol.Reply, int]] = deque()
         with self.line.closed_on_error():
             self._quiet()
-        self._splitter.bad = 0  # what was on its way when we came is nobody's fault
+        self._splitter.bad = 0  # a reply was cut by opening the port
 
     def _quiet(self) -> None:
-        """Stop whatever it does, at whatever speed and in whatever version of SCIP it listens."""
+        """Switch the laser off, at any baud rate and in any version of SCIP."""
         port = self.line.serial
         for baud in _BAUDS if port is not None else (0,):
             if port is not None and port.baud != baud:
@@ -102,7 +101,7 @@ class ScipDialogue:
             for _ in range(_TRIES):
                 before = self.line.received
                 try:
-                    reply = self.ask(b"QT", timeout_s=_ANSWER_S / 2)
+                    reply = self.ask(b"QT", timeout_s=_REPLY_S / 2)
                 except DeviceTimeoutError:
                     if self.line.received == before and baud != _BAUDS[0]:
                         break
@@ -112,6 +111,6 @@ class ScipDialogue:
                         self.insist(b"SS%06d" % FIRST_BAUD, "00", "03", "04")
                         port.baud = FIRST_BAUD
                     return
-                # SCIP 1.1 knows no QT; a sensor that is adjusting its time knows nothing but TM.
+                # SCIP 1.1 has no QT; a sensor that adjusts its time accepts only TM.
                 self.ask(protocol.SCIP_2 if len(reply.status) == 1 else b"TM2")
         raise DeviceTimeoutError(f"{self.line.address}: no SCIP sensor answers; check power, cable and port")

@@ -2,7 +2,7 @@
 
 with ScipLidar("/dev/ttyACM0") as lidar:
     lidar.start(intensity=True)
-    scan = lidar.read().scan    # on the host's clock
+    scan = lidar.read().scan
 """
 
 from __future__ import annotations
@@ -20,18 +20,14 @@ from scanwright.firmware_io.lidar.scip.dialogue import ScipDialogue
 from scanwright.firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
 from scanwright.firmware_io.lidar.sensor_line import TURN_S, LineDriver
 
-_EXCHANGES = 60  # a second or so of them
-# of its captures, and of firmware of the EW and UST; what else a sensor says of its state is trouble
-_WELL = ("sensor works well", "stable 000 no error", "sensor is working normally")
-_WRONG_TIMES = ("1.16.02(19/Jan./2010)",)  # this firmware of the UTM-30LX answers TM1 with times 23 ms off its stamps
+_EXCHANGES = 60  # about a second
+# states without a fault, from captures and from firmware of the EW and UST
+_NORMAL = ("sensor works well", "stable 000 no error", "sensor is working normally")
+_WRONG_TIMES = ("1.16.02(19/Jan./2010)",)  # this firmware of the UTM-30LX replies to TM1 23 ms off its stamps
 
 
 class ScipLidar(LineDriver):
-    """A SCIP lidar.
-
-    Attributes:
-        sync: its clock against the host's when it was opened or found again; None from one that cannot tell.
-    """
+    """A SCIP lidar; `sync` is its clock's offset at the last connection, None without time replies."""
 
     _clusters = True
 
@@ -43,12 +39,12 @@ class ScipLidar(LineDriver):
         *,
         search: Callable[[], Iterable[str]] = lidar_ports,
     ) -> None:
-        """Open it; it says itself which model it is. Raises as `open_lidar`.
+        """Open it; raises as `open_lidar`.
 
         Args:
-            address: where it is.
-            stamp_at: which moment of a turn its stamps mean.
-            search: the ports where it may turn up after a re-plug, besides its own address.
+            address: serial port, or HOST:PORT.
+            stamp_at: step of its timestamps.
+            search: returns further ports to search after an unplug.
         """
         self.address = address
         self.dropped = 0  # missing scans between those read, by their stamps
@@ -61,19 +57,19 @@ class ScipLidar(LineDriver):
         self._dialogue = ScipDialogue(address)
         self._line = self._dialogue.line
         with self._line.closed_on_error():
-            self.parameters = parameters.parameters(self.information("PP"))  # steps, ranges, speed
+            self.parameters = parameters.parameters(self.information("PP"))
             version = self.information("VV")
             self.serial_number, self.firmware = version.get("SERI", ""), version.get("FIRM", "")
             self._begin_clock()
 
     @property
     def model(self) -> str:
-        """Name of its type."""
+        """Reported model."""
         return self.parameters.model
 
     @property
     def scan_rate_hz(self) -> float:
-        """Turns per second, as it says."""
+        """Reported turns per second."""
         return 1 / self.parameters.scan_period_s
 
     @property
@@ -82,18 +78,17 @@ class ScipLidar(LineDriver):
         return self._bad_scans + self._dialogue.bad
 
     def information(self, command: str) -> dict[str, str]:
-        """Keys and texts of VV (version), PP (parameters) or II (state). While it scans, scans are lost meanwhile."""
+        """Return keys and texts of VV (version), PP (parameters) or II (state); drops scans meanwhile."""
         return protocol.information(self._dialogue.ask(command.encode()))
 
     def condition(self) -> tuple[str, ...]:
-        """What it says of its state where that is well (STAT of II); trouble comes with its scans."""
+        """Return its state if that is normal (STAT of II); other states are warnings of its scans."""
         status = self.information("II").get("STAT", "")
-        return (f"status: {status}",) if _is_well(status) else ()
+        return (f"status: {status}",) if _is_normal(status) else ()
 
     def read_raw(self, timeout_s: float | None = None) -> RawScan:
-        """The next scan as the sensor sent it; raises as `read` does, whose clock it passes by."""
-        deadline_s = time.monotonic() + (TURN_S if timeout_s is None else timeout_s)
-        return self._raw_by(deadline_s)
+        """Return the next scan as sent, without host time; raises as `read`."""
+        return self._raw_by(time.monotonic() + (TURN_S if timeout_s is None else timeout_s))
 
     def _begin(self, intensity: bool, skip: int) -> None:
         window = replace(self.parameters.window, cluster=self._cluster, intensity=intensity)
@@ -103,7 +98,7 @@ class ScipLidar(LineDriver):
         self._period_ms = self.parameters.scan_period_s * 1e3 * (skip + 1)
         self._stamp_ms = -1
         status = self.information("II").get("STAT", "")
-        self._warning = f"status: {status}; switch it off and on" if status and not _is_well(status) else ""
+        self._warning = f"status: {status}; switch it off and on" if status and not _is_normal(status) else ""
         self._dialogue.insist(self._request, "00")
 
     def _turn(self, deadline_s: float) -> TimedScan:
@@ -125,15 +120,15 @@ class ScipLidar(LineDriver):
                     self._bad_scans += 1
 
     def _halt(self) -> None:
-        """Put the laser out; a scan that was on its way is dropped."""
+        """Switch the laser off."""
         self._request = b""
         try:
             self._dialogue.insist(b"QT", "00")
-        except DeviceTimeoutError:  # the answer may have been glued to noise
+        except DeviceTimeoutError:  # the reply may have been merged with noise
             self._dialogue.insist(b"QT", "00")
 
     def _find(self) -> None:
-        """Look for this very sensor at every port, by its serial number."""
+        """Search all ports for its serial number."""
         errors = []
         for address in dict.fromkeys([self.address, *self._search()]):
             try:
@@ -141,7 +136,7 @@ class ScipLidar(LineDriver):
                 with self._line.closed_on_error():
                     if self.information("VV").get("SERI") != self.serial_number:
                         raise DeviceError(f"{address}: another lidar answers")
-                    self._counter.restart()  # a sensor that takes its power from the port has begun anew
+                    self._counter.restart()  # a sensor powered by the port has restarted
                     self._begin_clock()
                 self.address = address
                 return
@@ -150,22 +145,22 @@ class ScipLidar(LineDriver):
         raise errors[0]
 
     def _synchronise(self) -> TimeSync | None:
-        """Compare the clocks by questions and answers. It puts the laser out, so it comes before all scans."""
+        """Compare the clocks by requests; this switches the laser off."""
         if self.firmware in _WRONG_TIMES or self._dialogue.ask(b"TM0").status not in ("00", "02"):
             return None
         try:
             exchanges = []
             for _ in range(_EXCHANGES):
                 sent_ns = time.monotonic_ns()
-                reply, answered_ns = self._dialogue.ask_timed(b"TM1")
-                stamp_ms = self._counter.unwrap(measurement.stamp(reply), answered_ns)
-                exchanges.append(Exchange(sent_ns, stamp_ms, answered_ns))
+                reply, arrival_ns = self._dialogue.ask_timed(b"TM1")
+                stamp_ms = self._counter.unwrap(measurement.stamp(reply), arrival_ns)
+                exchanges.append(Exchange(sent_ns, stamp_ms, arrival_ns))
         finally:
             self._dialogue.insist(b"TM2", "00", "03")
         return synchronised(exchanges)
 
     def _begin_clock(self) -> None:
-        """Compare the clocks and start a new one for the times of the first beams.
+        """Compare the clocks and start a new one.
 
         Nothing arrives before the end of the last step. On a serial line all times are late by its bytes' duration.
         """
@@ -198,5 +193,5 @@ class ScipLidar(LineDriver):
         )
 
 
-def _is_well(status: str) -> bool:
-    return status.rstrip(". ").lower() in _WELL
+def _is_normal(status: str) -> bool:
+    return status.rstrip(". ").lower() in _NORMAL

@@ -13,12 +13,12 @@ _SCAN_ECHO = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?(?:;.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Which steps to measure and how to send them."""
+    """Measured steps and their encoding."""
 
-    first_step: int  # the first one
-    last_step: int  # the last one, included
-    cluster: int = 1  # steps that share one value, the least range among them
-    characters: int = 3  # 3 for 18 bit, 2 for 12 bit (ranges to 4095 mm)
+    first_step: int
+    last_step: int  # inclusive
+    cluster: int = 1  # steps that share one value, the smallest range among them
+    characters: int = 3  # per value: 3 for 18 bit, 2 for 12 bit (ranges to 4095 mm)
     intensity: bool = False  # a second value after each range
 
     def __post_init__(self) -> None:
@@ -36,7 +36,7 @@ class Window:
 
     @property
     def full_clusters(self) -> int:
-        """Number of ranges of a sensor that sends none for steps that fill no cluster: which do is not known."""
+        """Number of ranges of a sensor that omits an incomplete last cluster; which sensors do is undocumented."""
         return (self.last_step - self.first_step + 1) // self.cluster
 
     @property
@@ -53,29 +53,30 @@ class Window:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """What a scan reply carries."""
+    """Content of a scan reply."""
 
-    window: Window  # which steps
-    remaining: int  # scans still to come; 0 for the last one and where there is no end
-    stamp_ms: int  # the sensor's clock, 24 bit
+    window: Window
+    remaining: int  # further scans; 0 for the last one and without a limit
+    stamp_ms: int  # sensor time, 24 bit
     value: Integers  # shape (n,), millimetres or error codes
     intensity: Integers  # shape (n,) or (0,)
 
 
 def continuous(window: Window, *, skip: int = 0, count: int = 0) -> bytes:
-    """The request (without LF) for scan after scan; `skip` are left out between two; count 0 has no end."""
+    """Encode the request (without LF) for `count` scans (0: no limit), with `skip` dropped after each."""
     if not (0 <= skip <= 9 and 0 <= count <= 99):
         raise ProtocolError(f"skip = {skip}, count = {count}: not within 0..9 and 0..99")
-    return f"M{window.letter}{_steps(window)}{skip}{count:02d}".encode()
+    steps = f"{window.first_step:04d}{window.last_step:04d}{window.cluster:02d}"
+    return f"M{window.letter}{steps}{skip}{count:02d}".encode()
 
 
 def is_scan(reply: Reply) -> bool:
-    """Whether a reply carries a scan, and is not the word that scans will come or will not."""
+    """Whether a reply contains a scan; other replies only accept or reject the request."""
     return (reply.echo[:1] == b"M" and reply.status == "99") or (reply.echo[:1] == b"G" and reply.status == "00")
 
 
 def measurement(reply: Reply) -> Measurement:
-    """The numbers of a scan reply."""
+    """Decode a scan reply."""
     match = _SCAN_ECHO.fullmatch(reply.echo)
     if match is None or not is_scan(reply):
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
@@ -99,11 +100,7 @@ def measurement(reply: Reply) -> Measurement:
 
 
 def stamp(reply: Reply) -> int:
-    """The sensor's clock [ms, 24 bit] from a TM1 reply."""
+    """Return the sensor time [ms, 24 bit] of a TM1 reply."""
     if reply.echo[:3] != b"TM1" or reply.status != "00" or len(reply.lines) != 1 or len(reply.lines[0]) != 4:
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
     return int(decode(reply.lines[0], 4)[0])
-
-
-def _steps(window: Window) -> str:
-    return f"{window.first_step:04d}{window.last_step:04d}{window.cluster:02d}"

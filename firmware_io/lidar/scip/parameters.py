@@ -19,13 +19,13 @@ from scanwright.firmware_io.lidar.scip.protocol import Integers
 class Parameters:
     """A sensor's PP reply."""
 
-    model: str  # name of the type, without the maker
+    model: str  # without the maker
     range_min_mm: int  # smaller numbers are error codes
     range_max_mm: int  # larger numbers are error codes
-    steps_per_turn: int  # steps that a full circle would have
-    first_step: int  # first one that is measured; step 0 is the sensor's own zero
-    last_step: int  # last one that is measured
-    front_step: int  # the one straight ahead
+    steps_per_turn: int
+    first_step: int  # first measured one; step 0 is the sensor's zero
+    last_step: int  # last measured one
+    front_step: int  # straight ahead
     rpm: int  # turns per minute
 
     @property
@@ -49,17 +49,17 @@ class Parameters:
         return Window(first_step=self.first_step, last_step=self.last_step)
 
     def since_stamp_s(self, step: float, stamp_at: StampAt | None) -> float:
-        """Time from the moment that a stamp means to a step.
+        """Return the time from a timestamp to a step.
 
-        The specification puts the stamp at step 0 (p. 12); drivers put it where the beam points backward, as other
-        documents of the maker do. The two differ by 3.1 ms for the UTM-30LX and 12.5 ms for the URG-04LX.
+        The specification puts the stamp at step 0 (p. 12); drivers put it at the rear beam, as other documents of the
+        maker do. The two differ by 3.1 ms for the UTM-30LX and 12.5 ms for the URG-04LX.
         """
         rear_step = self.front_step - self.steps_per_turn / 2
         return (step - (rear_step if stamp_at == "rear" else 0.0)) * self.step_s
 
 
 def parameters(fields: Mapping[str, str]) -> Parameters:
-    """The record of a PP reply."""
+    """Decode a PP reply."""
     try:
         known = Parameters(
             model=fields["MODL"].partition("(")[0].strip(),
@@ -82,6 +82,6 @@ def parameters(fields: Mapping[str, str]) -> Parameters:
 
 
 def ranges_m(value: Integers, of: Parameters) -> Float32s:
-    """Ranges of numbers as sent, shape (n,); NaN if they are error codes."""
+    """Return ranges of sent numbers, shape (n,); NaN for error codes."""
     valid = (value >= of.range_min_mm) & (value <= of.range_max_mm)
     return np.where(valid, value / 1e3, np.nan).astype(np.float32)

@@ -25,7 +25,7 @@ Integers = NDArray[np.int32]
 
 SCIP_2 = b"SCIP2.0"
 LINE_CHARACTERS = 64  # of data in a line; SCIP 2.0
-LONGEST_REPLY = 1 << 16  # five times the longest one, range and intensity of 2161 steps
+LONGEST_REPLY = 1 << 16  # five times the longest reply, range and intensity of 2161 steps
 _REQUEST = rb"(?:VV|PP|II|BM|QT|R[STB]|TM\d|SS\d{6}|CR\d\d|HS\d|DB\d\d|SCIP2\.0|%S[LT]|[GH][DSE]\d{10}|[MN][DSE]\d{13})"
 _ECHO = re.compile(_REQUEST + rb"(?:;[\w .+@]{0,16})?")
 _ECHO_LINE = re.compile(rb"^(?:" + _ECHO.pattern + rb")$", re.MULTILINE)
@@ -51,17 +51,17 @@ STATUS = {
 class Reply:
     """One checked reply."""
 
-    echo: bytes  # the request it answers; in a scan, the last two digits count down
+    echo: bytes  # the request; in a scan, its last two digits count down
     status: str  # two characters, one in SCIP 1.1
     lines: tuple[bytes, ...]  # text without semicolon and sum, or data without sum
 
     @property
     def command(self) -> bytes:
-        """The two letters that say what it is."""
+        """The two letters of the request."""
         return self.echo[:2]
 
     def meaning(self) -> str:
-        """The status in words."""
+        """Return the description of the status."""
         if self.status.isdigit() and 21 <= int(self.status) <= 49:
             return "the sensor stopped to check itself"
         if self.status.isdigit() and 50 <= int(self.status) <= 97:
@@ -70,26 +70,26 @@ class Reply:
 
 
 def checksum(text: bytes) -> int:
-    """The character that follows a text."""
+    """Return the checksum character of a text."""
     return (sum(text) & 0x3F) + 0x30
 
 
 def summed(text: bytes) -> bytes:
-    """A text with its sum."""
+    """Append the checksum to a text."""
     return text + bytes([checksum(text)])
 
 
 def encode(values: Iterable[int], characters: int) -> bytes:
-    """Numbers of 6 bits a character, the upper bits first."""
+    """Encode numbers with 6 bits per character, upper bits first."""
     column = np.fromiter(values, np.int64)[:, None] >> (6 * np.arange(characters - 1, -1, -1))
     return ((column & 0x3F) + 0x30).astype(np.uint8).tobytes()
 
 
 def decode(text: bytes, characters: int) -> Integers:
-    """Numbers of a text that was written by `encode`."""
+    """Decode numbers written by `encode`."""
     sixes = np.frombuffer(text, np.uint8).astype(np.int32) - 0x30
     if len(text) % characters:
-        raise ProtocolError(f"{len(text)} characters are no numbers of {characters}")
+        raise ProtocolError(f"{len(text)} characters: not a multiple of {characters}")
     if sixes.size and not (sixes.min() >= 0 and sixes.max() <= 0x3F):
         raise ProtocolError("data with a character outside 0x30..0x6F")
     return (sixes.reshape(-1, characters) << (6 * np.arange(characters - 1, -1, -1, dtype=np.int32))).sum(
@@ -98,18 +98,18 @@ def decode(text: bytes, characters: int) -> Integers:
 
 
 def reply(echo: bytes, status: str, lines: Sequence[bytes] = ()) -> bytes:
-    """The bytes of a reply whose lines are complete."""
+    """Encode a reply whose lines have their sums."""
     return b"\n".join([echo, summed(status.encode()), *lines, b"", b""])
 
 
 def text_lines(pairs: Iterable[tuple[str, str]]) -> list[bytes]:
-    """Lines of VV, PP and II."""
+    """Encode the lines of VV, PP and II."""
     texts = [f"{key}:{text}".encode() for key, text in pairs]
     return [text + b";" + bytes([checksum(text)]) for text in texts]
 
 
 def data_lines(stamp_ms: int, payload: bytes) -> list[bytes]:
-    """Lines of a scan."""
+    """Encode the lines of a scan."""
     cuts = range(0, len(payload), LINE_CHARACTERS)
     return [summed(encode([stamp_ms], 4)), *(summed(payload[cut : cut + LINE_CHARACTERS]) for cut in cuts)]
 
@@ -119,7 +119,7 @@ def parse(block: bytes) -> Reply:
     echo, _, after = block.partition(b"\n")
     status, *rest = after.split(b"\n")
     if not _ECHO.fullmatch(echo):
-        raise ProtocolError(f"no reply: {_shown(block)}")
+        raise ProtocolError(f"not a reply: {_shown(block)}")
     if len(status) == 1 and not rest and status.isalnum():  # SCIP 1.1
         return Reply(echo, status.decode(), ())
     if len(status) != 3:
@@ -133,14 +133,14 @@ def parse(block: bytes) -> Reply:
 
 
 class Splitter:
-    """Cuts a stream into replies, and finds the next one after garbage, cut lines and merged lines."""
+    """Splitter of a byte stream into replies; skips garbage, cut lines and merged lines."""
 
     def __init__(self) -> None:
         self.bad = 0  # replies dropped
         self._pending = b""
 
     def feed(self, received: bytes) -> list[Reply]:
-        """The replies that end in `received`, in order."""
+        """Return the replies that end in `received`, in order."""
         *blocks, self._pending = (self._pending + received).split(b"\n\n")
         if len(self._pending) > LONGEST_REPLY:
             self.bad += 1
@@ -150,7 +150,7 @@ class Splitter:
     def _parsed(self, block: bytes) -> list[Reply]:
         if not block:
             return []
-        # What stands before the last echo is a reply whose own end was lost.
+        # Bytes before the last echo are a reply whose end was lost.
         echo = max((match.start() for match in _ECHO_LINE.finditer(block)), default=0)
         self.bad += echo > 0
         try:
@@ -161,7 +161,7 @@ class Splitter:
 
 
 def information(reply: Reply) -> dict[str, str]:
-    """Keys and texts of a VV, PP or II reply."""
+    """Return keys and texts of a VV, PP or II reply."""
     if reply.status != "00":
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
     pairs = [line.decode("ascii", "replace").partition(":") for line in reply.lines]
@@ -178,7 +178,7 @@ def _unsummed(line: bytes, echo: bytes) -> bytes:
 
 def _text(line: bytes, echo: bytes) -> bytes:
     text, semicolon, total = line[:-2], line[-2:-1], line[-1:]
-    # Some firmware of the UTM-30LX leaves what follows "<-" out of the sum, and other sensors take the semicolon in.
+    # Some firmware of the UTM-30LX ends the sum at "<-"; other sensors include the semicolon.
     sums = {checksum(text), checksum(text + b";"), checksum(text.partition(b"<-")[0])}
     if semicolon != b";" or total[0] not in sums:
         raise ProtocolError(f"{echo.decode()}: wrong sum: {_shown(line)}")

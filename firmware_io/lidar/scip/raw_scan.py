@@ -1,4 +1,4 @@
-"""One scan as a sensor sent it, and the LaserScan that it is."""
+"""Scan of a SCIP lidar before its conversion to host time."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from scanwright.firmware_io.samples import Scan
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RawScan:
-    """One scan as it came."""
+    """One scan as received."""
 
     stamp_ms: int  # sensor time, unwrapped
-    restarts: int  # how often the sensor's clock began anew since the lidar was opened: stamps compare within one only
-    arrival_ns: int  # time.monotonic_ns() when the last byte came
+    restarts: int  # of the sensor's clock since the lidar was opened; stamps across a restart do not compare
+    arrival_ns: int  # time.monotonic_ns() of the last byte
     first_step: int  # step of the first value
     cluster: int  # steps per value
     range_m: Float32[ndarray, " n"]  # shape (n,), NaN without a return
-    intensity: Float32[ndarray, " m"]  # shape (n,), or (0,) where none was asked for
+    intensity: Float32[ndarray, " m"]  # shape (n,), or (0,) if not measured
 
 
 def to_laser_scan(raw: RawScan, of: Parameters, stamp_ns: int) -> Scan:
-    """Return the LaserScan of a raw scan whose first step has the time `stamp_ns`."""
+    """Convert a raw scan whose first step has the time `stamp_ns`."""
     middle = (raw.cluster - 1) / 2
     return Scan(
         stamp_ns=stamp_ns + round(middle * of.step_s * 1e9),

@@ -1,1 +1,1 @@
-"""SICK's CoLa: framing in both dialects, the scan telegram, and the driver of TiM and LMS1xx."""
+"""CoLa protocol and driver of SICK TiM and LMS1xx."""

@@ -3,8 +3,8 @@
     CoLa A    02  sRN DeviceIdent  03                      numbers are upper-case hex, separated by one space
     CoLa B    02 02 02 02  length  sRN DeviceIdent  xor    numbers are big-endian, length and xor of the payload only
 
-The content is the same: a word of three letters, a name, and values in a fixed order of types, which `Writer` and
-`values.Reader` encode and decode. CoLa A has no checksum: only invalid hex or a short telegram shows damage.
+The content is the same: a command type of three letters, a name, and values in a fixed order of types, which `Writer`
+and `values.Reader` encode and decode. CoLa A has no checksum: only invalid hex or a short telegram shows damage.
 Sources: SICK LMS4000 manual 8023198 (framing), TiM781 manual 8024232 (error codes), LMS500 instructions 8013796.
 Invalid bytes raise ProtocolError.
 """
@@ -58,12 +58,12 @@ ERRORS = {  # telegram listing 8014631, codes of sFA
 class Telegram:
     """One checked telegram."""
 
-    payload: bytes  # from the first letter of its word to the last byte of its values
+    payload: bytes  # command type, name and values
     binary: bool  # CoLa B
 
     @property
     def word(self) -> bytes:
-        """Read sRN, write sWN, method sMN, event sEN; their answers sRA, sWA, sAN, sEA; data sSN, error sFA."""
+        """Command type: read sRN, write sWN, method sMN, event sEN; replies sRA, sWA, sAN, sEA; data sSN, error sFA."""
         return self.payload[:3]
 
     @property
@@ -72,7 +72,7 @@ class Telegram:
         return b"" if self.word == b"sFA" else self.payload[4:].split(b" ", 1)[0]
 
     def values(self) -> Reader:
-        """What follows the name."""
+        """Return a reader of the values."""
         return Reader(self.payload[5 + len(self.name) :], self.binary)
 
 
@@ -87,7 +87,7 @@ def framed(telegram: Telegram) -> bytes:
 
 
 def error_code(telegram: Telegram) -> int:
-    """Return the number of an sFA: one or two bytes, with or without a space before it."""
+    """Return the code of an sFA: one or two bytes, with or without a space before it."""
     rest = telegram.payload[3:]
     if telegram.binary:
         rest = rest[1:] if rest[:1] == b" " else rest
@@ -98,15 +98,15 @@ def error_code(telegram: Telegram) -> int:
 
 
 def error_words(code: int) -> str:
-    """What an error means, with its number."""
+    """Return the description of an error with its code."""
     return f"error {code:X}: {ERRORS.get(code, 'not in the manual')}"
 
 
 class Writer:
-    """Encoder of a telegram: word and name, then values."""
+    """Encoder of a telegram: command type and name, then values."""
 
     def __init__(self, command: str, *, binary: bool) -> None:
-        """`command` is word and name: "sRN DeviceIdent"."""
+        """`command`: command type and name, such as "sRN DeviceIdent"."""
         self._binary = binary
         self._parts = [command.encode("ascii")]
 
@@ -115,11 +115,9 @@ class Writer:
         try:
             packed = struct.pack(FORMAT[kind], value)
         except (struct.error, OverflowError) as error:
-            raise ValueError(f"{value} is no {kind}") from error
-        if kind == "f32":
-            self._parts.append(packed if self._binary else packed.hex().upper().encode())
-        else:
-            self._parts.append(packed if self._binary else b"%X" % int.from_bytes(packed, "big"))
+            raise ValueError(f"{value}: not a {kind}") from error
+        digits = packed.hex().upper().encode() if kind == "f32" else b"%X" % int.from_bytes(packed, "big")
+        self._parts.append(packed if self._binary else digits)
         return self
 
     def numbers(self, kind: Kind, values: list[int]) -> Writer:
@@ -129,7 +127,7 @@ class Writer:
         return self
 
     def name(self, text: str) -> Writer:
-        """Append a name of fixed length, as of a channel."""
+        """Append a name of fixed length."""
         self._parts.append(text.encode("ascii"))
         return self
 
@@ -147,22 +145,22 @@ class Writer:
 
 
 class TelegramSplitter:
-    """Cuts a stream into telegrams of both dialects, and finds the next one after garbage."""
+    """Splitter of a byte stream into telegrams of both dialects; skips garbage."""
 
     def __init__(self) -> None:
         self.bad = 0  # telegrams and runs of garbage dropped
-        self._buffer = b""
+        self.rest = b""  # received bytes of an incomplete telegram
         self._lost = False
 
     def feed(self, received: bytes) -> list[Telegram]:
-        """The telegrams that are whole now."""
-        self._buffer += received
+        """Return the telegrams that these bytes complete."""
+        self.rest += received
         telegrams: list[Telegram] = []
-        while self._buffer:
-            used, telegram, broken = _first(self._buffer)
+        while self.rest:
+            used, telegram, broken = _first(self.rest)
             if not used:
                 break
-            self._buffer = self._buffer[used:]
+            self.rest = self.rest[used:]
             if telegram is not None:
                 telegrams.append(telegram)
                 self._lost = False
@@ -170,11 +168,6 @@ class TelegramSplitter:
                 self.bad += broken or not self._lost
                 self._lost = True
         return telegrams
-
-    @property
-    def rest(self) -> bytes:
-        """What is no whole telegram yet."""
-        return self._buffer
 
 
 def _first(buffer: bytes) -> tuple[int, Telegram | None, bool]:

@@ -1,4 +1,4 @@
-"""Requests to a SICK lidar in its dialect of CoLa, and its answers; failures raise DeviceError."""
+"""Requests to a SICK lidar in its dialect of CoLa, and its replies; failures raise DeviceError."""
 
 from __future__ import annotations
 
@@ -22,12 +22,11 @@ from scanwright.firmware_io.lidar.sick.values import Reader
 
 T = TypeVar("T")
 
-POLL_S = 0.1  # between two questions for a state
-
-_ANSWER_S = 0.5  # long for Ethernet [assumed]
+POLL_S = 0.1  # between two requests for a state
+_REPLY_S = 0.5  # long for Ethernet [assumed]
 _BUSY, _CONDITION = 0x0D, 0x04
 _UNKNOWN = (0x02, 0x03, 0x0B, 0x0C)  # codes of sFA: method, variable or command
-_ANSWERS = {b"sRN": b"sRA", b"sWN": b"sWA", b"sMN": b"sAN", b"sEN": b"sEA"}
+_REPLIES = {b"sRN": b"sRA", b"sWN": b"sWA", b"sMN": b"sAN", b"sEN": b"sEA"}
 
 
 class RefusedError(DeviceError):
@@ -35,7 +34,7 @@ class RefusedError(DeviceError):
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
-        self.code = code  # its number, see `cola.ERRORS`
+        self.code = code  # see `cola.ERRORS`
 
     @property
     def unknown(self) -> bool:
@@ -49,11 +48,10 @@ class RefusedError(DeviceError):
 
 
 class ColaDialogue:
-    """Dialogue with one sensor; it is opened with its telegrams stopped."""
+    """Dialogue with one sensor, whose dialect is detected and whose telegrams are stopped first."""
 
     def __init__(self, address: str) -> None:
-        """Open the port, find the dialect, and stop its telegrams."""
-        self.line = SensorLine(address, LONGEST)  # to the sensor
+        self.line = SensorLine(address, LONGEST)
         self._bad_before = 0
         self._begin()
 
@@ -63,22 +61,22 @@ class ColaDialogue:
         return self._bad_before + self._splitter.bad
 
     def reopen(self) -> None:
-        """Open the line again; raises as opening does."""
+        """Open the line again."""
         self._bad_before = self.bad
         self.line.reopen()
         self._begin()
 
     def writer(self, command: str) -> Writer:
-        """Begin a request: word and name."""
+        """Begin a request; `command`: command type and name."""
         return Writer(command, binary=self._binary)
 
     def ask(self, out: Writer) -> Reader:
-        """Return the values of the answer; repeats a busy method. An sFA raises RefusedError."""
+        """Return the values of the reply; repeats a busy method. An sFA raises RefusedError."""
         request = out.telegram()
         name = request.name.decode()
-        deadline_s = time.monotonic() + _ANSWER_S
+        deadline_s = time.monotonic() + _REPLY_S
         while True:
-            reply = self._answer(request, deadline_s)
+            reply = self._reply(request, deadline_s)
             if reply.word != b"sFA":
                 return reply.values()
             code = self.checked(name, error_code, reply)
@@ -87,34 +85,34 @@ class ColaDialogue:
             time.sleep(POLL_S / 2)
 
     def insist(self, out: Writer, expect: int) -> None:
-        """Send a request whose answer must begin with `expect`."""
+        """Send a request whose reply must begin with `expect`."""
         name = out.telegram().name.decode()
         got = self.checked(name, self.ask(out).number, "u8")
         if got != expect:
             what = "its password was changed, or this access is switched off" if name == "SetAccessMode" else "refused"
             raise DeviceError(f"{self.line.name}: {name} answered {got}, not {expect}: {what}")
 
-    def checked(self, name: str, take: Callable[..., T], *of: object) -> T:
-        """Return `take(*of)`; a ProtocolError gets the names of sensor and request."""
+    def checked(self, name: str, decode: Callable[..., T], *arguments: object) -> T:
+        """Return `decode(*arguments)`; a ProtocolError gets the names of sensor and request."""
         try:
-            return take(*of)
+            return decode(*arguments)
         except ProtocolError as error:
             raise ProtocolError(f"{self.line.name}: {name}: {error}") from error
 
     def next(self, deadline_s: float) -> tuple[Telegram, int]:
-        """Return the next telegram and its arrival; raises as `SensorLine.hear`."""
+        """Return the next telegram and its arrival; raises as `SensorLine.receive`."""
         if not self._waiting:
-            telegrams, arrival_ns = self.line.hear(self._splitter.feed, deadline_s)
+            telegrams, arrival_ns = self.line.receive(self._splitter.feed, deadline_s)
             self._waiting.extend((reply, arrival_ns) for reply in telegrams)
         return self._waiting.popleft()
 
-    def _answer(self, request: Telegram, deadline_s: float) -> Telegram:
+    def _reply(self, request: Telegram, deadline_s: float) -> Telegram:
         self._waiting.clear()
         self.line.send(framed(request))
         while True:
             reply, _ = self.next(deadline_s)
             if reply.binary == request.binary and (
-                reply.word == b"sFA" or (reply.word, reply.name) == (_ANSWERS[request.word], request.name)
+                reply.word == b"sFA" or (reply.word, reply.name) == (_REPLIES[request.word], request.name)
             ):
                 return reply
 

@@ -1,4 +1,4 @@
-"""SICK TiM5xx, TiM7xx or LMS1xx over TCP in CoLa A or B. Written from documents, not tried on a sensor."""
+"""SICK TiM5xx, TiM7xx or LMS1xx over TCP in CoLa A or B. Not tested on a sensor."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
 from scanwright.firmware_io.lidar.sick.values import Kind
 from scanwright.firmware_io.samples import Scan
 
-_READY_S = 30.0  # a motor that was off takes ten seconds
-_CLIENT, _PASSWORD = 3, 0xF4724744  # of all these sensors from the factory
+_READY_S = 30.0  # the motor needs ten seconds to start
+_CLIENT, _PASSWORD = 3, 0xF4724744  # factory setting
 _ECHOES = {0: "first echo", 1: "all echoes", 2: "last echo"}  # of FREchoFilter; telegram listing 8014631
 SICK_STAMPS: tuple[StampAt, ...] = ("first_beam", "last_beam")
 _STLMS_READY = 7  # state of STlms; telegram listing 8014631
@@ -33,11 +33,11 @@ class SickLidar(LineDriver):
         """Open it.
 
         Args:
-            address: where it is.
-            model: name in the catalogue; None for the name that it reports, if the catalogue has that.
+            address: HOST:PORT.
+            model: catalogue name; None for the reported one.
             stamp_at: beam of its scan time. None decides by its telegrams: the first beam, unless one was sent sooner
-                after its scan time than a scan takes. Captures: LMS100 23 ms and LMS511 41 ms, longer than their scans
-                (15 and 21 ms); TiM55x 3.8 ms, TiM56x 4.9 and 5.1 ms, shorter (50 ms).
+                after its scan time than the duration of a scan. Captures: LMS100 23 ms and LMS511 41 ms, longer than
+                their scans (15 and 21 ms); TiM55x 3.8 ms, TiM56x 4.9 and 5.1 ms, shorter (50 ms).
         """
         self.address = address
         self.dropped = 0  # missing telegrams between those read, by their counter
@@ -45,23 +45,24 @@ class SickLidar(LineDriver):
         self._stamps_last = stamp_at == "last_beam"
         self._measuring = False
         self._bad_scans = 0
-        self._wanted_echo: int | None = None
+        self._requested_echo: int | None = None
         self._mean_filter_off = False
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
         self._dialogue = ColaDialogue(address)
         self._line = self._dialogue.line
         with self._line.closed_on_error():
-            identity = self._identity()
+            reply = self._dialogue.ask(self._dialogue.writer("sRN DeviceIdent"))
+            identity = [self._dialogue.checked("DeviceIdent", reply.text).strip() for _ in range(2)]  # name, version
             known = [lidar.name for lidar in load_catalogue() if isinstance(lidar, Lidar) and lidar.family == "sick"]
             if model is None and identity[0] not in known:
                 raise DeviceError(
-                    f"{self._name} calls itself '{identity[0]}', which leaves open what it is: name its model; "
+                    f"{self._line.name}: it reports type '{identity[0]}', which is ambiguous: name its model; "
                     f"known: {', '.join(sorted(known))}"
                 )
             self.firmware = identity[1]
             self.serial_number = self._serial_number()
         self._lidar = load_catalogue().get(model or identity[0], Lidar)
-        self._forget()
+        self._reset()
 
     @property
     def bad_packets(self) -> int:
@@ -69,26 +70,25 @@ class SickLidar(LineDriver):
         return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
-        """Return operating hours, number of starts and filters, as far as the sensor reports them."""
-        hours, starts = self._counter("ODoprh"), self._counter("ODpwrc")
-        age = [] if hours is None else [f"it has run for {hours / 10:,.1f} h"]
-        switched = [] if starts is None else [f"it was switched on {starts:,} times"]
-        echo, averaged = self._values("FREchoFilter", "u8"), self._averaged_scans()
-        echoes = [f"echo filter: {_ECHOES.get(echo[0], echo[0])}"] if echo else []
+        """Return the reported operating hours, number of starts and filters."""
+        lines = [f"it has run for {hours / 10:,.1f} h" for hours in self._values("ODoprh", "u32")]
+        lines += [f"it was switched on {starts:,} times" for starts in self._values("ODpwrc", "u32")]
+        lines += [f"echo filter: {_ECHOES.get(echo, echo)}" for echo in self._values("FREchoFilter", "u8")]
+        averaged = self._averaged_scans()
         means = {None: [], 0: ["mean filter: off"]}
-        return (*age, *switched, *echoes, *means.get(averaged, [f"mean filter: {averaged} scans"]))
+        return (*lines, *means.get(averaged, [f"mean filter: {averaged} scans"]))
 
     def set_filters(self, echo: Echo | None, *, mean_filter_off: bool) -> None:
-        """Set filters at the next start; a sensor without them refuses then."""
-        self._wanted_echo = None if echo is None else {"first": 0, "last": 2}[echo]
+        """Set filters at the next start, which fails if the sensor has none."""
+        self._requested_echo = None if echo is None else {"first": 0, "last": 2}[echo]
         self._mean_filter_off = mean_filter_off
 
     def _begin(self, intensity: bool, skip: int) -> None:
         """Start at the rate and resolution of the catalogue."""
         self._login()
         set_rate(self._dialogue, self._lidar)
-        if self._wanted_echo is not None:
-            self._dialogue.ask(self._dialogue.writer("sWN FREchoFilter").number("u8", self._wanted_echo))
+        if self._requested_echo is not None:
+            self._dialogue.ask(self._dialogue.writer("sWN FREchoFilter").number("u8", self._requested_echo))
         if self._mean_filter_off:
             off = self._dialogue.writer("sWN LFPmeanfilter").number("u8", 0).number("u16", 2).number("u8", 0)
             self._dialogue.ask(off)
@@ -96,13 +96,13 @@ class SickLidar(LineDriver):
         smeared = f"its mean filter averages {averaged} scans, which smears a turning scan: use --mean-filter-off"
         self._warning = smeared if averaged else ""
         # channels, intensity, its resolution, unit, encoders, position, name, comment, time of day
-        wanted = self._dialogue.writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
-        self._dialogue.ask(wanted.number("u16", skip + 1))
+        content = self._dialogue.writer("sWN LMDscandatacfg").numbers("u8", [1, 0, intensity, 1, 0, 0, 0, 0, 0, 0, 0])
+        self._dialogue.ask(content.number("u16", skip + 1))
         self._measuring = True
         self._dialogue.insist(self._dialogue.writer("sMN LMCstartmeas"), 0)
         self._wait_until_ready(min(_READY_S, max(self._until_s - time.monotonic(), 0.0)))
         self._dialogue.insist(self._dialogue.writer("sMN Run"), 1)
-        self._forget()
+        self._reset()
         self._dialogue.ask(self._dialogue.writer("sEN LMDscandata").number("u8", 1))
         self._every = skip + 1
 
@@ -133,35 +133,23 @@ class SickLidar(LineDriver):
         self._dialogue.reopen()
         with self._line.closed_on_error():
             if self._serial_number() != self.serial_number:
-                raise DeviceError(f"{self._name}: it has another serial number")
-
-    def _identity(self) -> tuple[str, str]:
-        """Name and version, as the sensor writes them."""
-        reply = self._dialogue.ask(self._dialogue.writer("sRN DeviceIdent"))
-        return self._dialogue.checked("DeviceIdent", reply.text).strip(), self._dialogue.checked(
-            "DeviceIdent", reply.text
-        ).strip()
+                raise DeviceError(f"{self._line.name}: it has another serial number")
 
     def _serial_number(self) -> str:
-        """Empty if the sensor does not report it."""
+        """Return the serial number; empty if unreported."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer("sRN SerialNumber"))
         except RefusedError:
             return ""
         return self._dialogue.checked("SerialNumber", reply.text).strip()
 
-    def _counter(self, name: str) -> int | None:
-        """Return a counter; None if the sensor does not have it or refuses it."""
-        values = self._values(name, "u32")
-        return values[0] if values else None
-
     def _averaged_scans(self) -> int | None:
-        """Return how many scans the mean filter averages, 0 if it is off; None without such a filter."""
+        """Return the number of scans that the mean filter averages, 0 if it is off; None without such a filter."""
         values = self._values("LFPmeanfilter", "u8", "u16")
         return values[0] and values[1] if values else None
 
     def _values(self, name: str, *kinds: Kind) -> list[int]:
-        """Return the first values of a variable; none if the sensor refuses."""
+        """Return the first values of a variable; none if the sensor rejects the request."""
         try:
             reply = self._dialogue.ask(self._dialogue.writer(f"sRN {name}"))
         except RefusedError:
@@ -173,15 +161,15 @@ class SickLidar(LineDriver):
         self._dialogue.insist(out, 1)
 
     def _wait_until_ready(self, patience_s: float) -> None:
-        """Wait for a sensor that starts its motor or serves another client."""
+        """Wait until the motor is at speed and no other client is served."""
         deadline_s = time.monotonic() + patience_s
         while not self._ready():
             if time.monotonic() > deadline_s:
-                raise DeviceTimeoutError(f"{self._name}: it is still busy after {patience_s:.0f} s")
+                raise DeviceTimeoutError(f"{self._line.name}: it is still busy after {patience_s:.0f} s")
             time.sleep(POLL_S)
 
     def _ready(self) -> bool:
-        """Read the device state as the TiM has it, else as the LMS has it."""
+        """Read the device state of a TiM, or of an LMS."""
         try:
             state = self._dialogue.ask(self._dialogue.writer("sRN SCdevicestate"))
         except RefusedError as refused:
@@ -191,8 +179,8 @@ class SickLidar(LineDriver):
             return self._dialogue.checked("STlms", state.number, "u16") == _STLMS_READY
         return self._dialogue.checked("SCdevicestate", state.number, "u8") == 1
 
-    def _forget(self) -> None:
-        """Forget clock and counter: the next telegram is of another run."""
+    def _reset(self) -> None:
+        """Reset clock and counter before the next telegram."""
         self._stamps.restart()
         self._count: int | None = None
         self._clock: ArrivalLine | None = None
@@ -200,8 +188,8 @@ class SickLidar(LineDriver):
     def _timed(self, scan: ScanData, arrival_ns: int) -> TimedScan:
         if scan.status & FAULT:
             if scan.status & DIRT:
-                raise DeviceFaultError(f"{self._name}: its window is too dirty to measure: clean it")
-            raise DeviceFaultError(f"{self._name}: it reports a fault (status {scan.status:X})")
+                raise DeviceFaultError(f"{self._line.name}: its window is too dirty to measure: clean it")
+            raise DeviceFaultError(f"{self._line.name}: it reports a fault (status {scan.status:X})")
         first = scan.channel("DIST1")
         if first is None:
             raise ProtocolError("no DIST1")
@@ -217,12 +205,14 @@ class SickLidar(LineDriver):
             )
         self._clock.add(1e3 * sent_us, arrival_ns)
         start_deg, step_deg = first.bearing_deg
+        exact_deg = 360 / self._lidar.steps_per_turn  # a third of a degree is sent as 0.3333: 0.027 deg in 811 beams
+        step_deg = exact_deg if abs(step_deg - exact_deg) < 1e-4 else step_deg
         shown = scan.channel("RSSI1")
         intensity = shown.raw * shown.scale + shown.offset if shown else np.empty(0)
         turn = Scan(
             stamp_ns=self._clock.host_ns(1e3 * sent_us) - round(self._first_beam_before_sent_us(scan) * 1e3),
             angle_min_rad=float(np.radians(start_deg)),
-            angle_increment_rad=self._step_rad(step_deg),
+            angle_increment_rad=float(np.radians(step_deg)),
             time_increment_s=scan.beam_us / 1e6,
             scan_time_s=1 / scan.scan_rate_hz,
             range_min_m=self._lidar.range_min_mm / 1e3,
@@ -235,21 +225,12 @@ class SickLidar(LineDriver):
 
     def _first_beam_before_sent_us(self, scan: ScanData) -> float:
         """Return the time from first beam to sending; DeviceError if the requested `first_beam` is impossible."""
-        after_us, took_us = scan.sent_after_us, scan.wide[0].raw.size * scan.beam_us
-        if after_us < took_us:
+        after_us, duration_us = scan.sent_after_us, scan.wide[0].raw.size * scan.beam_us
+        if after_us < duration_us:
             if self._stamp_at == "first_beam":
                 raise DeviceError(
-                    f"{self._name}: stamp_at = 'first_beam': it sends {after_us / 1e3:.1f} ms after the scan time, but "
-                    f"a scan takes {took_us / 1e3:.1f} ms; use last_beam"
+                    f"{self._line.name}: stamp_at = 'first_beam': sent {after_us / 1e3:.1f} ms after the scan time, "
+                    f"but a scan takes {duration_us / 1e3:.1f} ms; use last_beam"
                 )
             self._stamps_last = True
-        return after_us + took_us if self._stamps_last else after_us
-
-    def _step_rad(self, step_deg: float) -> float:
-        """A step of a third of a degree is sent as 0.3333: 0.027 deg are missing at the end of 811 beams."""
-        exact_deg = 360 / self._lidar.steps_per_turn
-        return float(np.radians(exact_deg if abs(step_deg - exact_deg) < 1e-4 else step_deg))
-
-    @property
-    def _name(self) -> str:
-        return self._line.name
+        return after_us + duration_us if self._stamps_last else after_us

@@ -1,7 +1,7 @@
 """LMDscandata, the telegram of a scan: channels, encoders, times and state of the sensor.
 
-Layout: SICK TiM5xx technical information 8015883; LMS4000 manual 8023198 for CoLa B. What follows the 8-bit channels
-(position, name, comment, time of day, event) is not read. Invalid bytes raise ProtocolError.
+Layout: SICK TiM5xx technical information 8015883; LMS4000 manual 8023198 for CoLa B. Fields after the 8-bit channels
+(position, name, comment, time of day, event) are not read. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -32,58 +32,58 @@ DIRT = 0x04  # bit of the device status
 class Channel:
     """One number per beam."""
 
-    name: str  # DIST1 range of the first echo, RSSI1 its intensity,
+    name: str  # DIST1: range of the first echo, RSSI1: its intensity
     scale: float  # of the numbers; mm for DIST
     offset: float  # added to the scaled numbers
     start: int  # angle of the first beam, 1e-4 deg, 90 deg straight ahead, counter-clockwise from above
-    step: int  # from beam to beam, 1e-4 deg
-    raw: ndarray  # as they came, shape (n,)
+    step: int  # between two beams, 1e-4 deg
+    raw: ndarray  # unscaled, shape (n,)
 
     @property
     def bearing_deg(self) -> tuple[float, float]:
-        """Bearing of the first beam, 0 straight ahead, and from beam to beam."""
+        """Bearing of the first beam, 0 straight ahead, and step between two beams."""
         return self.start * _ANGLE_UNIT_DEG - _FRONT_DEG, self.step * _ANGLE_UNIT_DEG
 
     def range_m(self) -> Float32[ndarray, " n"]:
-        """Ranges of a DIST channel, NaN without a return (0), shape (n,)."""
+        """Return the ranges of a DIST channel, NaN without a return (0), shape (n,)."""
         range_mm = self.raw * self.scale + self.offset
         return np.where(self.raw == 0, np.nan, range_mm / 1e3).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanData:
-    """One scan as the sensor sent it."""
+    """One scan as sent."""
 
     serial_number: int
     status: int  # second byte of its state: bits FAULT, DIRT_WARNING, DIRT (with FAULT)
-    telegram_count: int  # of the telegrams, 16 bits
-    scan_count: int  # of the turns, 16 bits
-    scan_us: int  # time since power-up of the scan, 32 bits
-    sent_us: int  # time since power-up when the telegram was sent, 32 bits
-    layer: int  # angle of the scan plane, 1/200 deg or as its model says; 0 for one plane
+    telegram_count: int  # 16 bits
+    scan_count: int  # turns, 16 bits
+    scan_us: int  # time of the scan since power-up, 32 bits
+    sent_us: int  # time of sending since power-up, 32 bits
+    layer: int  # angle of the scan plane, 1/200 deg or a unit of the model; 0 for one plane
     scan_rate_hz: float  # turns per second
-    measuring_rate_hz: float  # beams per second, all around
+    measuring_rate_hz: float  # beams per second of a full circle
     encoders: tuple[tuple[int, int], ...]  # position and speed of each
     wide: tuple[Channel, ...]  # channels of 16 bits
     narrow: tuple[Channel, ...]  # channels of 8 bits
 
     def channel(self, name: str) -> Channel | None:
-        """A channel by its name."""
+        """Return a channel by its name."""
         return next((channel for channel in (*self.wide, *self.narrow) if channel.name == name), None)
 
     @property
     def beam_us(self) -> float:
-        """From beam to beam of the first channel: its part of a turn."""
+        """Time between two beams of the first channel."""
         return self.wide[0].step * _ANGLE_UNIT_DEG / 360 / self.scan_rate_hz * 1e6
 
     @property
     def sent_after_us(self) -> float:
-        """From the time of the scan to the sending of the telegram."""
+        """Time from the scan to the sending of the telegram."""
         return (self.sent_us - self.scan_us) % WRAP_US
 
 
 def scan_data(telegram: Telegram) -> ScanData:
-    """The scan in an sSN or sRA LMDscandata."""
+    """Decode an sSN or sRA LMDscandata."""
     if telegram.word not in (b"sSN", b"sRA") or telegram.name != b"LMDscandata":
         raise ProtocolError("no LMDscandata")
     values = telegram.values()
@@ -111,7 +111,7 @@ def scan_data(telegram: Telegram) -> ScanData:
 
 
 def telegram_of(scan: ScanData, *, binary: bool) -> Telegram:
-    """Return the event that holds a scan; raises ValueError if a number does not fit."""
+    """Encode a scan; raises ValueError if a number does not fit."""
     out = Writer("sSN LMDscandata", binary=binary).numbers("u16", [1, 1]).number("u32", scan.serial_number)
     out.numbers("u8", [0, scan.status]).numbers("u16", [scan.telegram_count, scan.scan_count])
     out.numbers("u32", [scan.scan_us, scan.sent_us]).numbers("u8", [0, 0, 0, 0]).number("i16", scan.layer)

@@ -1,4 +1,4 @@
-"""Values of a CoLa telegram, decoded one by one in either dialect; invalid bytes raise ProtocolError."""
+"""Decoder of the values of a CoLa telegram in either dialect; invalid bytes raise ProtocolError."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ class Reader:
         self._values, self._binary, self._at = values, binary, 0
 
     def number(self, kind: Kind) -> int:
-        """One whole number."""
+        """Return one integer."""
         bits = _bits(kind)
         if self._binary:
             value = int.from_bytes(self._next(bits // 8), "big")
         else:
             token = self._token()
             if not _TOKEN.fullmatch(token):
-                raise ProtocolError(f"no number: {token[:20]!r}")
+                raise ProtocolError(f"not a number: {token[:20]!r}")
             if token[:1] in b"+-":
                 value = int(token)
                 if kind.startswith("i"):
                     if not -(1 << bits - 1) <= value < 1 << bits - 1:
-                        raise ProtocolError(f"{value} is no {kind}")
+                        raise ProtocolError(f"{value}: not a {kind}")
                     return value
             else:
                 value = int(token, 16)
@@ -42,40 +42,42 @@ class Reader:
         if kind.startswith("i") and value >= 1 << bits - 1:
             value -= 1 << (32 if value >> bits else bits)
             if value < -(1 << bits - 1):
-                raise ProtocolError(f"{value} is no {kind}")
+                raise ProtocolError(f"{value}: not a {kind}")
         elif not 0 <= value < 1 << bits:
-            raise ProtocolError(f"{value} is no {kind}")
+            raise ProtocolError(f"{value}: not a {kind}")
         return value
 
     def real(self) -> float:
-        """One number of IEEE 754, 32 bits."""
+        """Return one float of 32 bits."""
         if not self._binary and self._values[self._at : self._at + 1] == b"+":
-            raise ProtocolError("a decimal where a float stands")
+            raise ProtocolError("a decimal number instead of a float")
         value = float(struct.unpack(">f", struct.pack(">I", self.number("u32")))[0])
         if not abs(value) < 1e9:
-            raise ProtocolError(f"{value} is no scale")
+            raise ProtocolError(f"{value}: not a scale")
         return value
 
     def numbers(self, kind: Kind, count: int) -> list[int]:
-        """Several of one type; raises as `number` does."""
+        """Return several integers of one type."""
         if count * (_bits(kind) // 8 if self._binary else 2) > len(self._values) - self._at + 1:
-            raise ProtocolError(f"{count} values announced, fewer came")
+            raise ProtocolError(f"{count} values announced, fewer received")
         if self._binary:
             raw = self._next(count * _bits(kind) // 8)
             return list(struct.unpack(f">{count}{FORMAT[kind][1]}", raw))
         return [self.number(kind) for _ in range(count)]
 
     def name(self, length: int) -> str:
-        """A name of fixed length."""
+        """Return a name of fixed length."""
         raw = self._next(length)
-        if not self._binary:
-            self._skip_space()
+        if not self._binary and self._at < len(self._values):
+            if self._values[self._at] != 0x20:
+                raise ProtocolError("a name that is longer than its length")
+            self._at += 1
         if not (raw.isascii() and raw.decode("ascii").isprintable()):
-            raise ProtocolError(f"no name: {raw[:20]!r}")
+            raise ProtocolError(f"not a name: {raw[:20]!r}")
         return raw.decode("ascii")
 
     def text(self) -> str:
-        """A text of any length, its length before it; raises as `name` does."""
+        """Return a text, which its length precedes."""
         return self.name(self.number("u16"))
 
     def _next(self, length: int) -> bytes:
@@ -92,12 +94,6 @@ class Reader:
         token = self._values[self._at : end]
         self._at = end + 1
         return token
-
-    def _skip_space(self) -> None:
-        if self._at < len(self._values):
-            if self._values[self._at] != 0x20:
-                raise ProtocolError("a name that is longer than its length")
-            self._at += 1
 
 
 def _bits(kind: Kind) -> int:

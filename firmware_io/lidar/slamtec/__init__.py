@@ -1,1 +1,1 @@
-"""RPLIDAR A, S and C: requests, descriptors, and streams of nodes, capsules or dense capsules."""
+"""Protocol and driver of Slamtec RPLIDAR A, S and C."""

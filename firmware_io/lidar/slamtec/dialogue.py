@@ -1,4 +1,4 @@
-"""Requests to an RPLIDAR, its answers, and the choice of its scan mode; failures raise DeviceError."""
+"""Requests to an RPLIDAR, its replies, and the choice of its scan mode; failures raise DeviceError."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from scanwright.design.errors import DeviceTimeoutError, ProtocolError
 from scanwright.firmware_io.lidar.sensor_line import SensorLine
 from scanwright.firmware_io.lidar.slamtec import protocol
 
-_ANSWER_S = 0.5  # the SDK waits 2 s, long for a silent port
-
+_REPLY_S = 0.5  # the SDK waits 2 s, long for a silent port
 Answer = TypeVar("Answer")
 
 
@@ -22,47 +21,44 @@ class SlamtecDialogue:
     """Dialogue with one sensor."""
 
     def __init__(self, address: str) -> None:
-        """Open the line."""
-        self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))  # to the sensor
+        self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))
         self._replies = protocol.ReplySplitter()
         self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
 
     def ask(self, command: int, kind: int, read: Callable[[bytes], Answer], payload: bytes = b"") -> Answer:
-        """Send a request with its payload, and read the answer of one kind."""
+        """Send a request and decode the first reply of type `kind` by `read`."""
         self.request(command, payload)
-        deadline_s = time.monotonic() + _ANSWER_S
+        deadline_s = time.monotonic() + _REPLY_S
         while True:
-            descriptor, data = self._reply(deadline_s)
+            descriptor, data = self.reply(deadline_s)
             if descriptor.kind == kind:
                 return read(data)
 
     def request(self, command: int, payload: bytes = b"") -> None:
-        """Send a request, and drop what came before it."""
+        """Drop waiting replies and send a request."""
         self._replies = protocol.ReplySplitter()
         self._waiting = []
         self.line.send(protocol.request(command, payload))
 
-    def reply(self) -> tuple[protocol.Descriptor, bytes]:
-        """The next answer, and what follows it; raises as `SensorLine.hear` does."""
-        return self._reply(time.monotonic() + _ANSWER_S)
-
-    def _reply(self, deadline_s: float) -> tuple[protocol.Descriptor, bytes]:
+    def reply(self, deadline_s: float | None = None) -> tuple[protocol.Descriptor, bytes]:
+        """Return the next descriptor and its data; raises as `SensorLine.receive`."""
         if not self._waiting:
-            self._waiting, _ = self.line.hear(self._replies.feed, deadline_s)
+            deadline_s = time.monotonic() + _REPLY_S if deadline_s is None else deadline_s
+            self._waiting, _ = self.line.receive(self._replies.feed, deadline_s)
         return self._waiting.pop(0)
 
 
 @dataclass(frozen=True, slots=True)
 class StreamMode:
-    """How it streams: its number, the type of its packets, and between two points [ns]."""
+    """One scan mode."""
 
     number: int
-    kind: int
-    point_ns: float
+    kind: int  # type of its packets
+    point_ns: float  # time between two points
 
 
 def typical_mode(dialogue: SlamtecDialogue) -> StreamMode:
-    """The mode that it streams best in; firmware without modes has express scans."""
+    """Return the recommended mode; of firmware without modes, express or standard scans."""
     with suppress(DeviceTimeoutError):
         number = _configured(dialogue, protocol.CONF_TYPICAL, b"", "<H")
         of_mode = struct.pack("<H", number)
@@ -77,8 +73,6 @@ def typical_mode(dialogue: SlamtecDialogue) -> StreamMode:
 
 
 def _configured(dialogue: SlamtecDialogue, key: int, payload: bytes, layout: str) -> int:
-    """A number of its configuration."""
-
     def value(data: bytes) -> int:
         if len(data) < 4 + struct.calcsize(layout) or int.from_bytes(data[:4], "little") != key:
             raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not the configuration {key:#x}")

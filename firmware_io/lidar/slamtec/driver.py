@@ -1,6 +1,6 @@
-"""RPLIDAR on its serial line: it is identified, its motor started, its typical mode streamed.
+"""RPLIDAR on its serial line.
 
-These modes have no timestamps: points are evenly spaced, and their count is the clock.
+Its streams have no timestamps: points are evenly spaced, and their count is the clock.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
 from scanwright.firmware_io.lidar.slamtec.series import SERIES
 from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
 
-_START_S = 3.0  # the first turn: the motor takes its time
-_TRIES = 3  # the first may meet its stream
+_START_S = 3.0  # longest wait for the first turn while the motor starts
+_TRIES = 3  # the first reply can be lost in the stream
 _SILENCE_NS = 500_000_000  # five turns: it may have restarted
-_PAUSE_S = 0.1  # of the reader: what is lost in less than a turn is told by the angles
+_PAUSE_S = 0.1  # pause of the reader, shorter than a turn, so that angles show the lost points
 _BUFFER_BYTES = 4095  # of a terminal (Linux, n_tty.c): nothing is lost before it is full
 _PWM = 660  # the SDK's default
 _RPM = 600  # the SDK's default
@@ -32,7 +32,7 @@ class SlamtecLidar(LineDriver):
     """An RPLIDAR."""
 
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
-        """Open it and stop what it does; `model` is a name of the catalogue, None for whatever answers."""
+        """Open it and stop its stream; `model`: catalogue name, or None for any."""
         self.address = address
         self._bad_before = 0
         self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
@@ -45,7 +45,7 @@ class SlamtecLidar(LineDriver):
 
     @property
     def dropped(self) -> int:
-        """Turns that are missing between those that were read."""
+        """Missing turns between those read."""
         return self._turns.dropped
 
     @property
@@ -72,7 +72,7 @@ class SlamtecLidar(LineDriver):
         self._turning = False
         self._bad_before = self.bad_packets
         self._splitter = protocol.SlamtecSplitter(self._mode.kind)
-        self._turns.begin_anew(skip)
+        self._turns.restart(skip)
         self._line.drop_waiting()
         self._resume()
 
@@ -81,32 +81,31 @@ class SlamtecLidar(LineDriver):
 
     def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._count.arrivals)) is None:
-            received, arrival_ns = self._line.hear(self._splitter.feed, deadline_s, self._pause_s)
+            received, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, self._pause_s)
             if not received:
                 self._resume()
                 return None
-            self._take(received, arrival_ns)
+            self._add(received, arrival_ns)
         self._turning = True
         arrivals = self._count.arrivals
         uncertainty_ns = self._line.widened(arrivals.uncertainty_ns)
         return timed_scan(turn[0], arrivals, self._lidar, turn[1], uncertainty_ns, intensity=self._intensity)
 
     def _halt(self) -> None:
-        """Laser and motor off."""
+        """Switch off laser and motor."""
         self._dialogue.request(protocol.STOP)
         self._turn_motor(on=False)
 
     def _find(self) -> None:
-        """Open the same port again."""
         self._line.reopen()
         self._recognise(self.model)
 
     def _recognise(self, model: str | None) -> None:
-        """Stop what it does, and hear who it is; the line is closed where no one answers."""
-        wanted = [series for series in SERIES.values() if model in (None, series.model)]
+        """Stop its stream and identify it; close the line if nothing replies."""
         with self._line.closed_on_error():
-            bauds = list(dict.fromkeys(baud for series in wanted for baud in series.bauds))
-            bauds = bauds if self._line.serial is not None else bauds[:1]  # a server has set its own line
+            possible = [series for series in SERIES.values() if model in (None, series.model)]
+            bauds = list(dict.fromkeys(baud for series in possible for baud in series.bauds))
+            bauds = bauds if self._line.serial is not None else bauds[:1]  # a serial server sets its own baud rate
             for baud in bauds:
                 if self._line.serial is not None:
                     self._line.serial.baud = baud
@@ -143,13 +142,13 @@ class SlamtecLidar(LineDriver):
             self._dialogue.request(protocol.MOTOR_RPM, struct.pack("<H", _RPM if on else 0))
 
     def _resume(self) -> None:
-        """What comes next was just measured, and continues nothing: a new count, a new turn."""
+        """Start a new count and a new turn at the next packet."""
         self._splitter.cut_in()
         self._turns.resume()
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
         self._last_ns = 0
 
-    def _take(self, received: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
+    def _add(self, received: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> None:
         silent = self._last_ns and arrival_ns - self._last_ns > _SILENCE_NS
         self._last_ns = arrival_ns
         for points in [] if silent else self._count.placed(received, arrival_ns):

@@ -1,4 +1,4 @@
-"""Points of an RPLIDAR's packets, with angles and times: they are evenly spaced, and their count is the clock."""
+"""Angles and times of an RPLIDAR's points, which are evenly spaced: their count is the clock."""
 
 from __future__ import annotations
 
@@ -11,33 +11,29 @@ from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
 from scanwright.firmware_io.lidar.slamtec import protocol
 from scanwright.firmware_io.lidar.turn import Points
 
-_RATE_MAX = 0.05  # of points per second beside what it states: A1s measure 4 to 8 thousand
-_JUMP_DEG = 20.0  # from node to node: some were lost; angles that are triangulated go to and fro by less
-_UNEVEN = 0.1  # of a capsule's span, which a motor at speed does not change so fast: something was lost between two
+_RATE_MAX = 0.05  # relative error of the stated rate of points: A1s measure 4 to 8 thousand a second
+_JUMP_DEG = 20.0  # between two nodes if some were lost; triangulated angles vary by less
+_UNEVEN = 0.1  # relative change of a capsule's span that a motor at speed does not reach: some were lost
 _BEYOND = 1.5  # times the span at full speed: between one capsule and two
-_EVEN = 5  # capsules with even spans that show a motor at speed: 60 ms of an A1, 6 ms of an S2
+_EVEN = 5  # capsules with equal spans that show a motor at speed: 60 ms of an A1, 6 ms of an S2
 
 
 class PointCount:
-    """What was measured since the stream began.
-
-    Attributes:
-        arrivals: the sensor's time, by the count, on the host's clock.
-    """
+    """Numbers points since the stream began; `arrivals` converts their count to host time."""
 
     def __init__(self, kind: int, point_ns: float, baud: int) -> None:
-        """`kind`: type of the packets; `point_ns`: between two points, as the sensor states it."""
+        """`kind`: type of the packets; `point_ns`: stated time between two points."""
         self._kind, self._point_ns = kind, point_ns
         packet_ns = round(protocol.SIZES[kind] * 10 / baud * 1e9)
         self.arrivals = ArrivalLine(smallest_delay_ns=packet_ns, rate_max=_RATE_MAX, grain_ns=point_ns)
-        self.broken = False  # an unknown number of points was lost; what comes next needs a new count
+        self.broken = False  # an unknown number of points was lost: start a new count
         self._before: protocol.SlamtecPacket | None = None
         self._points = 0
         self._spans_deg: deque[float] = deque(maxlen=_EVEN)  # of the last capsules
         self._fastest_deg = 0.0  # span at the highest even speed
 
     def placed(self, packets: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> list[Points]:
-        """Return the points known now, up to a break; `packets` come with the bytes skipped before each."""
+        """Return the completed points, up to a break; `packets` have the number of bytes skipped before each."""
         if self.arrivals.is_behind:
             self.broken = True
             return []
@@ -53,7 +49,7 @@ class PointCount:
         return placed
 
     def _nodes(self, packets: list[tuple[protocol.SlamtecPacket, int]], arrival_ns: int) -> list[Points]:
-        """Points with angles of their own; what was passed over was some of them, a jump tells of others."""
+        """Place nodes; skipped bytes and jumps of the angle are lost ones."""
         before = [packets[0][0] if self._before is None else self._before, *(packet for packet, _ in packets)]
         self._before = packets[-1][0]
         steps_deg = np.diff([packet.start_deg for packet in before])
@@ -91,18 +87,17 @@ class PointCount:
         return points
 
     def _lost(self, span_deg: float, after_garbage: bool, arrival_ns: int) -> int:
-        """Return how many capsules were lost between two starts; sets `broken` if unknown.
+        """Return the number of capsules lost between two starts; sets `broken` if unknown.
 
-        At full speed the span shows it, except for whole turns. A capsule half a turn late follows lost ones; one too
-        early follows none: the motor changes its speed. While it spins up, capsules with contiguous bytes have lost
-        none.
+        At full speed the span shows it, except for entire turns. A capsule half a turn late follows lost ones; one too
+        early follows none: the motor changes its speed. While the motor starts, none are lost between contiguous bytes.
         """
         if len(self._spans_deg) < _EVEN or max(self._spans_deg) > (1 + _UNEVEN) * min(self._spans_deg):
             self.broken = after_garbage
             return 0
         usual_deg = sum(self._spans_deg) / _EVEN
         self._fastest_deg = max(self._fastest_deg, usual_deg)
-        if not usual_deg:  # the motor stands
+        if not usual_deg:  # the motor is at rest
             return 0
         many_ns = protocol.POINTS[self._kind] * self._point_ns
         capsules = span_deg / usual_deg

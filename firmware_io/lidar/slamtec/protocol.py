@@ -1,8 +1,8 @@
 """Protocol of Slamtec lidars as pure functions of bytes. Numbers are little-endian, angles grow clockwise.
 
-A request is A5 and a command, with a payload also its length and the xor of all. A reply begins with a descriptor:
-A5 5A, length (30 bits) and mode (2 bits), type. A stream has one descriptor, then nodes of 5 bytes, capsules of 84 or
-ultra capsules of 132. Invalid bytes raise ProtocolError.
+A request is A5 and a command, with a payload also its length and the xor of all bytes. A reply begins with a
+descriptor: A5 5A, length (30 bits) and mode (2 bits), type. A stream has one descriptor, then nodes of 5 bytes,
+capsules of 84 or ultra capsules of 132. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -47,54 +47,50 @@ _CAPSULE_SIZE, _ULTRA_SIZE = 84, 132
 _NODE_SIZE = 5  # rplidar_sdk 2.1
 SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, ULTRA: _ULTRA_SIZE, DENSE: _CAPSULE_SIZE}
 POINTS: Final = {NODES: 1, CAPSULES: 32, ULTRA: 96, DENSE: 40}
-_SCALE_COUNT = np.array([0, 512, 1280, 1792, 3328])  # of an ultra capsule: where each part of its scale begins,
-_SCALE_MM = np.array([0, 512, 2048, 4096, 16_384])  # at which range, in steps of 1, 2, 4, 8 and 16 mm
+_SCALE_COUNT = np.array([0, 512, 1280, 1792, 3328])  # of an ultra capsule: start of each part of its scale,
+_SCALE_MM = np.array([0, 512, 2048, 4096, 16_384])  # and its range, in steps of 1, 2, 4, 8 and 16 mm
 _NO_RETURN = (-512, 511)  # of a predicted range
 _CABINS = np.dtype([("distance", "<u2", 2), ("offsets", "u1")])
 
 
 @dataclass(frozen=True, slots=True)
 class Descriptor:
-    """What comes: bytes of one reply or packet, whether packets follow without end, and of which type."""
+    """Header of a reply or stream."""
 
-    size: int
-    stream: bool
-    kind: int
+    size: int  # bytes of the reply or of each packet
+    stream: bool  # whether packets follow without end
+    kind: int  # type
 
 
 @dataclass(frozen=True, slots=True)
 class Info:
-    """Who answers: byte of the model (its higher half the series), firmware and serial number."""
+    """Identity of a sensor."""
 
-    model: int
+    model: int  # upper four bits: the series
     firmware: str
     serial_number: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamtecPacket:
-    """One packet of a stream.
-
-    Attributes:
-        offset_deg: by how much each point lies before its place between this start and the next, shape (n,).
-    """
+    """One packet of a stream."""
 
     start_deg: float  # clockwise from the front
-    first: bool  # whether the stream begins, or of a node, whether a turn does
+    first: bool  # whether it begins the stream, or of a node, a turn
     range_m: Float32s  # shape (n,), NaN without a return
-    quality: Float32s  # shape (n,), 0 in capsules, which have none
-    offset_deg: Float64[ndarray, " n"]
+    quality: Float32s  # shape (n,), 0 in capsules
+    offset_deg: Float64[ndarray, " n"]  # of each point before its even place between two starts, shape (n,)
     words: Int64[ndarray, " cabins"] | None = None  # of an ultra capsule, shape (32,); None for the others
 
     def before(self, after: SlamtecPacket) -> SlamtecPacket:
-        """Return this packet as the next one completes it: an ultra capsule's last range refers to the next first."""
+        """Return this packet completed by the next one, to which an ultra capsule's last range refers."""
         if self.words is None or after.words is None:
             return self
         return _ultra(self.start_deg, self.words, int(after.words[0]), first=self.first)
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
-    """A command, with its payload and their sum where it takes one."""
+    """Encode a command, with payload and checksum if it has a payload."""
     head = bytes([0xA5, command])
     if not command & 0x80:
         return head
@@ -103,38 +99,38 @@ def request(command: int, payload: bytes = b"") -> bytes:
 
 
 def descriptor(data: bytes) -> Descriptor:
-    """What the 7 bytes before a reply say."""
+    """Decode the 7 bytes before a reply."""
     if len(data) != _DESCRIPTOR_SIZE or data[:2] != _MARK:
-        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no descriptor")
+        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not a descriptor")
     word, kind = struct.unpack_from("<IB", data, 2)
     return Descriptor(word & 0x3FFF_FFFF, bool(word >> 30 & 1), kind)
 
 
 def info(data: bytes) -> Info:
-    """The reply to INFO."""
+    """Decode the reply to INFO."""
     if len(data) != 20:
-        raise ProtocolError(f"RPLIDAR: {len(data)} bytes about itself, not 20")
+        raise ProtocolError(f"RPLIDAR: {len(data)} bytes of device information, not 20")
     return Info(data[0], f"{data[2]}.{data[1]:02d}", data[4:].hex().upper())
 
 
 def health(data: bytes) -> tuple[int, int]:
-    """The reply to HEALTH: 0 good, 1 a warning, 2 a fault; and its number."""
+    """Decode the reply to HEALTH: 0 good, 1 warning, 2 fault; and its code."""
     if len(data) != 3 or data[0] > 2:
-        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no state of health")
+        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not a health state")
     return data[0], data[1] | data[2] << 8
 
 
 def sample_times(data: bytes) -> tuple[int, int]:
-    """The reply to SAMPLE_TIMES: between two points of a standard and of an express scan [us]."""
+    """Decode the reply to SAMPLE_TIMES: time between two points of a standard and an express scan [us]."""
     if len(data) != 4:
         raise ProtocolError(f"RPLIDAR: {len(data)} bytes of sample times, not 4")
     return struct.unpack("<HH", data)
 
 
 def node(data: bytes) -> SlamtecPacket:
-    """A node: one point with its own angle."""
+    """Decode a node: one point with its angle."""
     if len(data) != _NODE_SIZE or (data[0] ^ data[0] >> 1) & 1 == 0 or not data[1] & 1:
-        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: no node")
+        raise ProtocolError(f"RPLIDAR: {data.hex(' ')}: not a node")
     angle, distance = struct.unpack_from("<HH", data, 1)
     if angle >> 1 > 360 * 64 + 64:
         raise ProtocolError(f"RPLIDAR: a node at {(angle >> 1) / 64:.1f} deg")
@@ -148,7 +144,7 @@ def node(data: bytes) -> SlamtecPacket:
 
 
 def capsule(data: bytes) -> SlamtecPacket:
-    """An express capsule: 32 points between its start and the next one's."""
+    """Decode an express capsule: 32 points between its start and the next one's."""
     start_deg, first = _capsule_start(data, _CAPSULE_SIZE)
     cabins = np.frombuffer(data, _CABINS, 16, 4)
     distance = cabins["distance"].astype(np.int64)
@@ -161,13 +157,13 @@ def capsule(data: bytes) -> SlamtecPacket:
 
 
 def ultra(data: bytes) -> SlamtecPacket:
-    """An ultra capsule: 96 points between its start and the next one's; see `SlamtecPacket.before`."""
+    """Decode an ultra capsule: 96 points between its start and the next one's; see `SlamtecPacket.before`."""
     start_deg, first = _capsule_start(data, _ULTRA_SIZE)
     return _ultra(start_deg, np.frombuffer(data, "<u4", 32, 4).astype(np.int64), 0, first=first)
 
 
 def dense(data: bytes) -> SlamtecPacket:
-    """A dense capsule: 40 points, evenly between its start and the next one's."""
+    """Decode a dense capsule: 40 points, evenly between its start and the next one's."""
     start_deg, first = _capsule_start(data, _CAPSULE_SIZE)
     range_mm = np.frombuffer(data, "<u2", 40, 4)
     return SlamtecPacket(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))
@@ -177,13 +173,13 @@ _READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: cap
 
 
 class ReplySplitter:
-    """Cuts replies out of what comes before a stream begins, and skips other bytes."""
+    """Splitter of the bytes before a stream into replies; skips other bytes."""
 
     def __init__(self) -> None:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[tuple[Descriptor, bytes]]:
-        """The replies that these bytes complete; with the descriptor of a stream come the bytes that followed it."""
+        """Return the replies that these bytes complete; that of a stream has all bytes after its descriptor."""
         self._rest += data
         packets: list[tuple[Descriptor, bytes]] = []
         while (at := self._rest.find(_MARK)) >= 0 and len(self._rest) >= at + _DESCRIPTOR_SIZE:
@@ -203,27 +199,27 @@ class ReplySplitter:
 
 
 class SlamtecSplitter:
-    """Cuts the packets of one type out of a stream, and skips other bytes."""
+    """Splitter of a byte stream into packets of one type; skips other bytes."""
 
     def __init__(self, kind: int) -> None:
-        self.bad = 0  # packets that were lost to something else
+        self.bad = 0  # packets lost
         self._size, self._read = SIZES[kind], _READ[kind]
         self._rest = b""
         self._passed = 0
 
     def cut_in(self) -> None:
-        """What comes next may begin in the middle of a packet, which is not counted as bad."""
+        """Expect the middle of a packet next, and do not count it as bad."""
         self._rest, self._passed = b"", 1
 
     def feed(self, data: bytes) -> list[tuple[SlamtecPacket, int]]:
-        """The packets that these bytes complete, each with how many bytes were passed over before it."""
+        """Return the packets that these bytes complete, each with the number of bytes skipped before it."""
         self._rest += data
         packets: list[tuple[SlamtecPacket, int]] = []
         at = 0
         while at + self._size <= len(self._rest):
             try:
                 packet = self._read(self._rest[at : at + self._size])
-                if self._passed and self._size == _NODE_SIZE:  # two bits tell a node: believed where three follow
+                if self._passed and self._size == _NODE_SIZE:  # only three bits are checked: require three more nodes
                     if at + 4 * _NODE_SIZE > len(self._rest):
                         break
                     for following in range(at + _NODE_SIZE, at + 4 * _NODE_SIZE, _NODE_SIZE):
@@ -261,9 +257,9 @@ def _ultra(start_deg: float, words: Int64[ndarray, " cabins"], next_word: int, *
 
 def _capsule_start(data: bytes, size: int) -> tuple[float, bool]:
     if len(data) != size or data[0] >> 4 != 0xA or data[1] >> 4 != 0x5:
-        raise ProtocolError(f"RPLIDAR: {len(data)} bytes that begin with {data[:2].hex()}: no capsule")
+        raise ProtocolError(f"RPLIDAR: {len(data)} bytes that begin with {data[:2].hex()}: not a capsule")
     if reduce(xor, data[2:]) != (data[0] & 0xF | (data[1] & 0xF) << 4):
-        raise ProtocolError("RPLIDAR: the sum of a capsule is wrong")
+        raise ProtocolError("RPLIDAR: the checksum of a capsule is wrong")
     word = data[2] | data[3] << 8
     if word & 0x7FFF > 360 * 64 + 64:
         raise ProtocolError(f"RPLIDAR: a capsule at {(word & 0x7FFF) / 64:.1f} deg")

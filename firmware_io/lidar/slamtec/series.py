@@ -1,4 +1,4 @@
-"""Series of RPLIDARs by the byte of their model: speeds of the line, and what starts the motor."""
+"""Series of RPLIDARs: baud rates and motor control."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A series: name in the catalogue, speeds of the line (A2M8: 115,200), and what starts the motor."""
+    """One series."""
 
-    model: str
-    bauds: tuple[int, ...]
-    motor: Literal["dtr", "pwm", "rpm", "scan"]
+    model: str  # catalogue name
+    bauds: tuple[int, ...]  # A2M8: 115,200
+    motor: Literal["dtr", "pwm", "rpm", "scan"]  # signal or request that starts the motor
 
 
-# by the upper half of the model's byte, as rplidar_sdk 2.1 lists them
+# by the upper half of the model byte (rplidar_sdk 2.1)
 SERIES = {
     1: Series("RPLIDAR A1", (115_200,), "dtr"),
     2: Series("RPLIDAR A2", (256_000, 115_200), "pwm"),

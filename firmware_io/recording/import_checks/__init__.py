@@ -1,1 +1,1 @@
-"""Checks of other people's recordings at import, and the corrections that they offer."""
+"""Checks of imported bags, and their corrections."""

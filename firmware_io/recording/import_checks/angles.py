@@ -1,4 +1,4 @@
-"""Angles of the axis: values that no axis can have between its neighbours, and repeated stamps."""
+"""Checks of the angles of the axis: outliers, jumps and repeated stamps."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
 
 _REACH = 4  # neighbours on each side
-_FAR_SHARE = 0.85  # of the neighbours: at a step of an axis that stops half of them are far
-_LEAST_RAD = math.radians(0.5)  # steps of encoders and command rounding are smaller
-_STEPS = 3.0  # usual steps: a turning point is up to 1.5 off its neighbours
-_SIGMAS = 8.0  # of the differences to the neighbours: noise alone never gets there
-_USUAL, _USUAL_SHARE = 8.0, 0.85  # times what most angles keep: whole degrees at uneven times are off their lines
-_FARTHEST_STEPS = 3.0  # times their distance a line through two angles is extended
+_FAR_SHARE = 0.85  # of the neighbours; at a step of an axis that stops, half of them are far
+_LEAST_RAD = math.radians(0.5)  # above the steps of encoders and rounded commands
+_STEPS = 3.0  # median steps; a turning point is up to 1.5 off its neighbours
+_SIGMAS = 8.0  # of the differences to the neighbours, above noise
+_USUAL, _USUAL_SHARE = 8.0, 0.85  # times this quantile: integer degrees at uneven times are off their lines
+_FARTHEST_STEPS = 3.0  # largest extrapolation of a line through two angles, in their distance
 _MOVING_RAD_S = math.radians(1.0)  # slower than any sweep
-_RESTS, _CAUGHT_UP = 5, 1.8  # steps of 0, and times the usual speed after them: no servo starts so fast
-_FASTEST = 4.0  # times the usual speed: no servo jumps to it for one sample
+_RESTS, _CAUGHT_UP = 5, 1.8  # steps of 0, and times the median speed after them, above the start of a servo
+_FASTEST = 4.0  # times the median speed, above that of a servo in one sample
 
 
 def usual_speed_rad_s(log: JointLog) -> float:
@@ -35,7 +35,7 @@ def usual_speed_rad_s(log: JointLog) -> float:
 
 
 def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"], Floats]:
-    """Return which positions are far off their neighbours, and by how much [rad], shape (n,) each.
+    """Return which positions are far off their neighbours, and their deviation [rad], shape (n,) each.
 
     A good position is near the median of its neighbours, or on the line through the two before or after it (turning
     points).
@@ -47,7 +47,7 @@ def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"],
     inner = np.arange(_REACH, count - _REACH)
     near = [k for k in range(-_REACH, _REACH + 1) if k]
     apart = np.stack([_wrapped(position_rad[inner + k] - position_rad[inner]) for k in near])
-    # Differences of about half a turn have both signs, which cancel in a median.
+    # Differences of about half a turn have both signs and cancel in a median.
     half_turn = np.abs(apart).min(axis=0) > np.pi / 2
     off[inner] = np.where(half_turn, np.median(np.abs(apart), axis=0), np.abs(np.median(apart, axis=0)))
     usual = float(np.median(np.abs(_wrapped(np.diff(position_rad)))))
@@ -61,7 +61,7 @@ def outliers(time_ns: Times, position_rad: Floats) -> tuple[Bool[ndarray, " n"],
 
 
 def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
-    """Return how far positions lie off the nearer of the lines through two before and two after them, shape (n,)."""
+    """Return the distance to the nearer of the lines through two positions before and two after, shape (n,)."""
     off = np.zeros(time_ns.size)
     if off.size < 5:
         return off
@@ -72,11 +72,11 @@ def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
         near, far = here + side, here + 2 * side
         apart_s = seconds[near] - seconds[far]
         steps = (seconds[here] - seconds[near]) / np.where(apart_s == 0, np.inf, apart_s)
-        steps = np.where(steps <= _FARTHEST_STEPS, steps, 0)  # two angles at almost one time show no rate
+        steps = np.where(steps <= _FARTHEST_STEPS, steps, 0)  # two angles at almost the same time give no rate
         line = position_rad[near] + _wrapped(position_rad[near] - position_rad[far]) * steps
         sides.append(np.abs(_wrapped(position_rad[here] - line)))
     apart_s = np.diff(seconds)
-    gap_s = np.max([apart_s[k : k + here.size] for k in range(4)], axis=0)  # beyond a gap the axis may be anywhere
+    gap_s = np.max([apart_s[k : k + here.size] for k in range(4)], axis=0)  # after a gap the position is unknown
     off[here] = np.where(gap_s > _FARTHEST_STEPS * np.median(apart_s), 0, np.minimum(*sides))
     return off
 
@@ -131,7 +131,7 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
         return
     far = step_rad > max(_LEAST_RAD, _FASTEST * float(np.median(step_rad[moving])))
     jump = far & (speed > _FASTEST * np.median(speed[moving]))
-    if np.mean(moving) > 0.5:  # one that turns, whose angle stays for some samples and then catches up
+    if np.mean(moving) > 0.5:  # of a turning axis: repeated angles, and then a jump to the true one
         caught_up = (step_rad > max(_LEAST_RAD, _CAUGHT_UP * float(np.median(step_rad[moving])))) & (
             speed > _CAUGHT_UP * np.median(speed[moving])
         )
@@ -151,7 +151,7 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
 
 
 def _rests_before(step_rad: Floats) -> Ints:
-    """Return how many steps of exactly 0 are right before each step, shape (n,)."""
+    """Return the number of steps of exactly 0 directly before each step, shape (n,)."""
     number = np.arange(step_rad.size)
     last_moved = np.maximum.accumulate(np.where(step_rad > 0, number, -1))
     return number - 1 - np.concatenate([[-1], last_moved[:-1]])

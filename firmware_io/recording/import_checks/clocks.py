@@ -1,4 +1,4 @@
-"""Clocks of scans and angles: what stamps and times of receipt tell about them."""
+"""Checks of the clocks of scans and angles, by stamps and receive times."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from scanwright.firmware_io.lidar.tick_line import half_hull, middle_slope
 from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 
-_JITTER_S = 1e-3  # clocks that agree by NTP or PTP are nearer than this
-_LATE_S = 0.01  # scans that arrive so much later than angles: another clock, or a driver that holds them back
-_BLOCKS = 12  # of a recording, in which the shortest delays are compared
+_JITTER_S = 1e-3  # above the error of NTP and PTP
+_LATE_S = 0.01  # delay of scans relative to angles that shows another clock, or a driver that delays them
+_BLOCKS = 12  # of a recording, whose shortest delays are compared
 _LEAST = 5  # messages in a block
-_OF_SPREAD = 0.9  # by how much of the jitter in a block the shortest delays of 12 blocks of 7 messages differ by chance
-_TREND_SIGMAS = 3.5  # of the mean delays; in 400 harmless recordings 2.5 was the most
-_ALIKE = 0.3  # share of the trend of the mean delays that the shortest ones must have
-_LEAST_MM = 5.0  # at AT_M: smaller costs are not worth a warning
+_OF_SPREAD = 0.9  # random difference of the shortest delays of 12 blocks of 7 messages, relative to their jitter
+_TREND_SIGMAS = 3.5  # of the mean delays; the largest in 400 good recordings was 2.5
+_ALIKE = 0.3  # smallest trend of the shortest delays, relative to that of the mean delays
+_LEAST_MM = 5.0  # at AT_M, to warn
 
 
 def clock_findings(
     scans: Stamps, angles: Stamps, arc_ns: Ints, speed_rad_s: float, *, same_clock: bool
 ) -> Iterator[Finding]:
-    """Check the stamps of scans and angles that are to be on one clock.
+    """Check the stamps of scans and angles, in the order of their receipt.
 
     Args:
-        scans: times of the scans, in the order of their receipt.
-        angles: times of the angles, in the order of their receipt.
+        scans: times of the scans.
+        angles: times of the angles.
         arc_ns: from the first to the last beam of each scan, shape (n,).
         speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        same_clock: they are known to share one, such as that of one message.
+        same_clock: whether they share a clock, such as that of one message.
     """
     for name, stamps in (("scans", scans), ("angles", angles)):
         yield from _steps_back(name, stamps, speed_rad_s)
@@ -74,7 +74,7 @@ def clock_findings(
 
 
 def _drift(scans: Stamps, angles: Stamps, speed_rad_s: float) -> Iterator[Finding]:
-    """Compare the shortest delays in blocks of time: a clock that drifts or steps changes them."""
+    """Compare the shortest delays in blocks of time, which a drifting or stepping clock changes."""
     edges = np.linspace(float(scans.receive_ns.min()), float(scans.receive_ns.max()), _BLOCKS + 1)
     least, spread = [], [2 * _JITTER_S]
     for stamps in (scans, angles):
@@ -88,7 +88,7 @@ def _drift(scans: Stamps, angles: Stamps, speed_rad_s: float) -> Iterator[Findin
     apart_s = (least[0] - least[1])[np.isfinite(least[0] - least[1])]
     if apart_s.size < 3:
         return
-    # one block alone may be a stall; a clock that changed shows in two
+    # a single block may be a stall; a changed clock shows in two
     low, high = np.sort(apart_s)[[1, -2]] if apart_s.size > 4 else np.sort(apart_s)[[0, -1]]
     change_s = float(high - low)
     if change_s <= max(spread):
@@ -101,7 +101,7 @@ def _drift(scans: Stamps, angles: Stamps, speed_rad_s: float) -> Iterator[Findin
 
 
 def _trend_s(scans: Stamps, angles: Stamps) -> float:
-    """Return how far delays of scans and angles drift apart; mean and least must agree, or it is chance or a stall."""
+    """Return the drift between the delays of scans and angles; 0 if mean and shortest delays disagree."""
     begin_ns, end_ns = int(scans.receive_ns.min()), int(scans.receive_ns.max())
     means, sigmas, least = [], [], []
     for stamps in (scans, angles):

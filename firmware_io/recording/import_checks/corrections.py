@@ -1,7 +1,4 @@
-"""Corrections of other people's recordings: chosen by a person, offered by the checks, applied by the import.
-
-Input that cannot be used raises RecordingError.
-"""
+"""Corrections of an imported bag; invalid values raise RecordingError."""
 
 from __future__ import annotations
 
@@ -36,21 +33,18 @@ def read_time_increment(text: str) -> float | Literal["auto"]:
 
 @dataclass(frozen=True, slots=True)
 class Corrections:
-    """What the import changes in a recording.
+    """Corrections applied by the import.
 
     Attributes:
         angle_scale: turns of the axis per turn of the angle; negative reverses, 0.75 is a gear.
         angle_zero: angle at joint position 0, in the unit of the angle.
-        time_increment: seconds from beam to beam; "auto" is the step's share of a mirror turn.
-        stamp: moment that the stamp of a scan means; receipt uses no stamps at all.
+        time_increment: seconds between two beams; "auto" is the step's part of a mirror turn.
+        stamp: beam of the stamp of a scan; receipt uses no stamps.
         bearings: limits spreads the beams from angle_min to angle_max.
         scan_offset_s: added to the times of the scans.
         no_return_from_m: ranges from this one on are no returns.
         echo: ranges of a MultiEchoLaserScan: first, last, strongest or all.
         drop_outliers: drop angles far off both neighbours.
-
-    Raises:
-        RecordingError: a number is out of bounds.
     """
 
     angle_scale: float = 1.0

@@ -1,4 +1,4 @@
-"""Headers of scans: do bearings, times between beams and ranges mean what ROS says they mean?"""
+"""Checks of the headers of scans: bearings, times between beams and ranges."""
 
 from __future__ import annotations
 
@@ -17,44 +17,32 @@ from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
 from scanwright.firmware_io.samples import Scan
 
-AT_M = 5.0  # range at which a finding states its cost
-_LEAST_MM = 2.0  # at that range: less is not worth a warning, the best lidars have 10 mm of noise
+AT_M = 5.0  # range at which a finding states its position error
+_LEAST_MM = 2.0  # at that range, to warn; the best lidars have 10 mm of noise
 _WRONG_MM = 5.0  # at that range, of the last beam
-_TIME_ERROR = 0.015  # of time_increment: real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
-_TURN_ERROR = 0.03  # how near to an integer the turns between two scans are that a driver dropped
-_SAME_RANGE = 0.01  # share of the beams with the longest range: no scene puts so many at one distance
+_TIME_ERROR = 0.015  # of time_increment; real bags are within 0.01 (Hokuyo, RPLIDAR, SICK)
+_TURN_ERROR = 0.03  # largest deviation from an integer of the turns between two scans, if a driver drops some
+_SAME_RANGE = 0.01  # fraction of the beams with the longest range, above that of any scene
 _FEWEST = 20  # beams
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Headers:
-    """Headers of the usable scans, shape (n,) each.
-
-    Attributes:
-        stamp_ns: of the scan.
-        beams: number of ranges.
-        step_rad: angle_increment.
-        span_rad: angle_max - angle_min.
-        time_increment_s: of the header.
-        scan_time_s: of the header.
-        range_max_m: of the header.
-        longest: longest range -> number of beams that have it, over all scans.
-        unequal_intensities: number of scans with another number of intensities than ranges.
-    """
+    """Headers of the usable scans, shape (n,) each."""
 
     stamp_ns: Times
-    beams: Ints
-    step_rad: Floats
-    span_rad: Floats
+    beams: Ints  # number of ranges
+    step_rad: Floats  # angle_increment
+    span_rad: Floats  # angle_max - angle_min
     time_increment_s: Floats
     scan_time_s: Floats
     range_max_m: Floats
-    longest: Counter[float]
-    unequal_intensities: int
+    longest: Counter[float]  # longest range -> number of beams with it, over all scans
+    unequal_intensities: int  # number of scans with another number of intensities than ranges
 
     @classmethod
     def of(cls, rows: Iterable[tuple[float, ...]]) -> Headers:
-        """Make the record of the row of each scan: `header_of` or `header_of_scan`."""
+        """Combine rows of `header_of` or `header_of_scan`."""
         stamps, beams, steps, spans, increments, scan_times, limits, unequal, longest_m, count = map(
             np.array, zip(*rows, strict=True)
         )
@@ -64,7 +52,7 @@ class Headers:
         return cls(stamps, beams, steps, spans, increments, scan_times, limits, +longest, int(np.sum(unequal)))
 
     def corrected(self, time_increment_s: float | None, corrections: Corrections) -> Headers:
-        """Return the headers as they are after corrections."""
+        """Return the headers after corrections."""
         changed = self
         if time_increment_s is not None:
             changed = replace(changed, time_increment_s=np.full(self.beams.size, time_increment_s))
@@ -84,10 +72,7 @@ class Headers:
         return (self.beams > 1) & (1000 * AT_M * np.minimum(*off_rad) > _WRONG_MM)
 
     def judged(self) -> Headers:
-        """Return the headers by which times are judged.
-
-        If steps and limits disagree, the times between beams decide which of them is used.
-        """
+        """Return the headers for the checks of times; if steps and limits disagree, times between beams choose one."""
         if not self.bearings_disagree.any():
             return self
         by_limits = self.corrected(None, Corrections(bearings="limits"))
@@ -96,16 +81,13 @@ class Headers:
 
     @property
     def time_increment_ratio(self) -> float:
-        """Stated time from beam to beam over that of an even mirror turn; NaN if either is unknown."""
+        """Stated time between two beams relative to that of a uniform mirror turn; NaN if either is unknown."""
         even_s, stated_s = self.time_increment_from_turn_s, float(np.median(self.time_increment_s))
         return stated_s / even_s if even_s and stated_s else math.nan
 
     @property
     def mirror_turn_s(self) -> float:
-        """Time of a mirror turn: scan_time if scans are whole multiples of it apart, else the usual time between scans.
-
-        0 if there is only one scan.
-        """
+        """Duration of a mirror turn: scan_time, or the median time between scans if it is no multiple (0: unknown)."""
         if self.stamp_ns.size < 2:
             return 0.0
         usual_s = float(np.median(np.diff(np.sort(self.stamp_ns)))) / 1e9
@@ -115,12 +97,12 @@ class Headers:
 
     @property
     def time_increment_from_turn_s(self) -> float:
-        """Time from beam to beam of a mirror that turns evenly: the step's share of a mirror turn."""
+        """Time between two beams of a uniform mirror turn."""
         return float(np.median(np.abs(self.step_rad))) / (2 * math.pi) * self.mirror_turn_s
 
     @property
     def arc_ns(self) -> Times:
-        """Time from the first to the last beam of each scan, by the mirror turn if it is known, shape (n,)."""
+        """Time from the first to the last beam of each scan, shape (n,); by the mirror turn if that is known."""
         even_s = self.time_increment_from_turn_s
         increment_s = np.full(self.beams.size, even_s) if even_s else self.time_increment_s
         return np.rint(1e9 * increment_s * (self.beams - 1)).astype(np.int64)
@@ -149,12 +131,7 @@ def _row(stamp_ns: int, ranges: Any, intensities: Any, *numbers: float) -> tuple
 
 
 def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
-    """Check the headers of the scans.
-
-    Args:
-        headers: of the scans.
-        speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-    """
+    """Check the headers of the scans; `speed_rad_s`: usual speed of the axis, 0 if it rests during each scan."""
     yield from _bearings(headers)
     yield from _time_increment(headers.judged(), speed_rad_s)
     yield from _longest_range(headers)

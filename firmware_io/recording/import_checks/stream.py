@@ -1,4 +1,4 @@
-"""The checks of the import on scans and angles while they come: over a rolling window, each kind reported once."""
+"""Import checks on a stream of scans and angles, over a sliding window; each kind of finding is reported once."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ from scanwright.firmware_io.samples import JointLog, Scan
 
 WINDOW_S = 20.0
 EVERY_S = 5.0
-_UNKNOWN = -1  # time of receipt
-_LEAST = 20  # scans and angles: medians of fewer mean little
+_UNKNOWN = -1  # receive time
+_LEAST = 20  # scans and angles, for medians
 
 
 class StreamChecks:
-    """Checks scans and angles that are on one clock."""
+    """Checks of scans and angles on one clock; `at_rest`: the axis rests during each scan."""
 
     def __init__(self, *, at_rest: bool) -> None:
-        """`at_rest`: the axis stands still during each scan."""
         self._at_rest = at_rest
         self._headers: deque[tuple[float, ...]] = deque()
         self._received_ns: deque[int] = deque()
@@ -34,18 +33,13 @@ class StreamChecks:
         self._checked_ns: int | None = None
 
     def joint(self, time_ns: int, position_rad: float) -> None:
-        """Take an angle."""
+        """Add an angle."""
         self._angles.append((time_ns, position_rad))
         while time_ns - self._angles[0][0] > WINDOW_S * 1e9:
             self._angles.popleft()
 
     def scan(self, scan: Scan, received_ns: int | None = None) -> list[Finding]:
-        """Take a scan; every `EVERY_S` return the findings that are new.
-
-        Args:
-            scan: in the order of its receipt.
-            received_ns: when; None if this is unknown.
-        """
+        """Add a scan, in the order of receipt; every `EVERY_S` return the new findings."""
         self._headers.append(header_of_scan(scan))
         self._received_ns.append(_UNKNOWN if received_ns is None else received_ns)
         while scan.stamp_ns - self._headers[0][0] > WINDOW_S * 1e9:
@@ -59,7 +53,7 @@ class StreamChecks:
         return self.check()
 
     def check(self) -> list[Finding]:
-        """Return the findings of the window that are new."""
+        """Return the new findings of the window."""
         if min(len(self._headers), len(self._angles)) < _LEAST:
             return []
         new = [
@@ -75,7 +69,7 @@ class StreamChecks:
         time_ns, position_rad = (np.array(column) for column in zip(*self._angles, strict=True))
         unique_ns, first = np.unique(time_ns, return_index=True)
         received_ns = np.array(self._received_ns, np.int64)
-        prompt_ns = headers.stamp_ns + headers.judged().arc_ns  # tells the checks nothing
+        prompt_ns = headers.stamp_ns + headers.judged().arc_ns  # causes no finding
         return sample_findings(
             headers,
             Stamps(headers.stamp_ns, np.where(received_ns == _UNKNOWN, prompt_ns, received_ns)),
@@ -111,11 +105,11 @@ def sample_findings(
         angle_ns: times that the angles get, shape (n,).
         position_rad: the angles, shape (n,).
         speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        at_rest: the axis stands still during each scan.
-        same_clock: scans and angles are known to share a clock.
-        dropped: angles far off their neighbours are dropped.
-        stamped: the scans' times are their stamps.
-        timed: the times of the angles are exact enough to judge speeds by.
+        at_rest: whether the axis rests during each scan.
+        same_clock: whether scans and angles share a clock.
+        dropped: whether outliers of the angles are dropped.
+        stamped: whether the times of the scans are their stamps.
+        timed: whether the times of the angles are exact enough for speeds.
     """
     if not at_rest:
         order = np.argsort(angle_ns, kind="stable")

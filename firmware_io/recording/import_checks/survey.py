@@ -1,7 +1,4 @@
-"""First pass over a foreign bag: times, headers and angles of all usable messages.
-
-Input that cannot be used raises RecordingError.
-"""
+"""First pass over a foreign bag: times, headers and angles of all usable messages; errors raise RecordingError."""
 
 from __future__ import annotations
 
@@ -32,7 +29,7 @@ class BagSurvey:
     angle_stamps: Stamps  # times of the angles
     angle: Floats  # in its unit
     turned: bool  # the angles come from quaternions, in radians
-    angle_note: str  # what a person should know of the angles; empty if nothing
+    angle_note: str  # warning, or empty
     left_out: Counter[str]  # reason -> number of messages
 
 
@@ -111,5 +108,5 @@ def survey_bag(
 
 
 def endless(laser_scan: Any) -> bool:
-    """Return whether a scan states no longest range: some drivers leave it 0."""
+    """Whether a scan has no longest range, as drivers that leave it at 0."""
     return not laser_scan.range_max > laser_scan.range_min

@@ -1,1 +1,1 @@
-"""Damaged recordings: what of them is whole, in a new file."""
+"""Repair of damaged recordings."""

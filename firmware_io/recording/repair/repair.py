@@ -1,15 +1,12 @@
-"""`scanwright repair`: every message of a damaged recording whose bytes are whole, in a new file with a new index.
+"""`scanwright repair`: all intact messages of a damaged recording, in a new file with a new index.
 
-An MCAP file is a chain of records (https://mcap.dev/spec). What proves that bytes are whole is not the chain:
-
-- messages stand in chunks, and a chunk carries the checksum of what is in it. Its opcode, lengths, sizes, times and the
-  name of its compression may all be damaged: each is tried in every way it can be, and the checksum decides;
-- topics and types stand in chunks too, and once more in the summary at the end, which has a checksum of its own;
-- where the chain breaks, it begins anew where two records in a row can be read to their last byte.
-
-A file is called whole only when all of that holds, indexes say what they index, and the readers read it.
-
-Input that cannot be used raises RecordingError.
+An MCAP file is a chain of records (https://mcap.dev/spec).
+- Messages are in chunks with a checksum of their content. Opcode, lengths, sizes, times and compression name of a chunk
+  may be damaged: all possible values are tried until the checksum fits.
+- Topics and types are in chunks, and also in the summary at the end, which has its own checksum.
+- A broken chain continues where two consecutive records can be read completely.
+A file is intact only if all of that is valid, indexes are correct, and other readers read it.
+Unusable input raises RecordingError.
 """
 
 from __future__ import annotations
@@ -30,14 +27,14 @@ from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey
 
 
 def repair(path: Path, out: Path | None = None) -> RepairSummary:
-    """Write all that is whole in a recording to another file; nothing is written where nothing is damaged.
+    """Write the intact messages of a damaged recording to another file; write nothing if it is intact.
 
     Args:
-        path: stays as it is.
+        path: of the recording, which is not changed.
         out: another file; None for `repaired_place(path)`.
 
     Raises:
-        RecordingError: the file cannot be read, holds not one whole message, or `out` is the same file.
+        RecordingError: the file cannot be read, has no intact message, or `out` is the same file.
     """
     target = repaired_place(path)
     out = target if out is None else out
@@ -75,7 +72,7 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
 
 
 def repaired_place(path: Path) -> Path:
-    """Where the repaired recording goes: beside the damaged one."""
+    """Return the default path of the repaired recording, next to the damaged one."""
     if not path.is_file():
         what = "this is a folder, not a recording" if path.is_dir() else f"no such file{made_by(path)}"
         raise RecordingError(f"{path}: {what}")
@@ -83,7 +80,7 @@ def repaired_place(path: Path) -> Path:
 
 
 def _read_alike(path: Path, messages: Counter[str]) -> bool:
-    """Whether every reader finds in a file what was found here."""
+    """Whether all readers read these messages."""
     try:
         with path.open("rb") as stream:
             for reader in (SeekingReader(stream, validate_crcs=True), NonSeekingReader(stream, validate_crcs=True)):
@@ -95,12 +92,12 @@ def _read_alike(path: Path, messages: Counter[str]) -> bool:
             for items in (extras.iter_metadata(), extras.iter_attachments()):
                 list(items)
         return messages == Counter(topic for topic, _ in read_messages(path, messages))
-    except Exception:  # a reader that refuses a file does so in a dozen ways
+    except Exception:  # readers raise many types
         return False
 
 
 def _write(writer: TimedChunks, data: memoryview, result: Survey) -> None:
-    """Everything anew, schemas and channels under numbers of their own."""
+    """Write all intact records, with new numbers of schemas and channels."""
     header = result.header or mcap.Header("ros2", "scanwright")
     writer.start(header.profile, header.library)
     for extra in result.extras:

@@ -1,4 +1,4 @@
-"""Records of an MCAP file (https://mcap.dev/spec) wherever they can still be read, whatever is damaged around them."""
+"""Reading of intact records in a damaged MCAP file (https://mcap.dev/spec)."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from mcap.writer import MCAP0_MAGIC
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length
 _CHUNK_HEAD = struct.Struct("<QQQII")  # first and last time, size, checksum, length of the compression's name
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, begin of the summary, of its offsets, checksum
-_BLOCK = 1 << 20  # bytes that are searched at once
-_SIP = 1 << 12  # of packed bytes at once: they may become 32,768 times as many
-_MOST_UNPACKED = 1 << 30  # bytes: chunks of recorders have some MB
-_PACKED = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18", "": b""}  # compression -> how it begins
+_BLOCK = 1 << 20  # bytes searched together
+_SIP = 1 << 12  # packed bytes per step, which unpack to at most 32,768 times as many
+_MOST_UNPACKED = 1 << 30  # bytes; chunks of recorders have some MB
+_PACKED = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18", "": b""}  # compression -> first bytes
 _READ: dict[int, Callable[[Any], Any]] = {
     Opcode.HEADER: mcap.Header.read,
     Opcode.FOOTER: mcap.Footer.read,
@@ -45,16 +45,16 @@ _READ: dict[int, Callable[[Any], Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class IntactChunk:
-    """Packed bytes in the file that unpack to what their checksum says."""
+    """Packed bytes in the file whose checksum is valid."""
 
     begin: int
     end: int
     packing: str
-    doubtful: bool  # one bit is off: of the checksum, or of the last four bytes, nobody can tell
+    doubtful: bool  # whether one bit is wrong, of the checksum or of the last four bytes
 
 
 def record_at(data: memoryview, at: int) -> tuple[Any, int]:
-    """The record that can be read at a place to its last byte, else None; and where it ends, or says it does."""
+    """Return the record at a place, None if it cannot be read completely; and its end, by its length."""
     if at + RECORD_HEAD.size > len(data):
         return None, len(data)
     opcode, length = RECORD_HEAD.unpack_from(data, at)
@@ -64,14 +64,14 @@ def record_at(data: memoryview, at: int) -> tuple[Any, int]:
     stream = _Exact(BytesIO(data[begin:end].tobytes()))
     try:
         record = mcap.Message.read(stream, max(length, 22)) if opcode == Opcode.MESSAGE else _READ[opcode](stream)
-    except Exception:  # bytes that are no such record fail in a dozen ways
+    except Exception:  # invalid bytes raise many types
         return None, end
-    # the reader of attachments passes over their checksum only where there is one
+    # the reader of attachments skips their checksum only if there is one
     return (record if stream.count == length else None), end
 
 
 class _Exact(ReadDataStream):
-    """As many bytes as were asked for, or none: the reader of mcap takes what is left."""
+    """Stream that raises EOFError instead of returning fewer bytes than requested."""
 
     def read(self, length: int) -> bytes:
         data = super().read(length)
@@ -81,7 +81,7 @@ class _Exact(ReadDataStream):
 
 
 def index_at_the_end(data: memoryview) -> tuple[list[Any], int]:
-    """The records of the summary, if its checksum holds, and where it begins; else none, and the end of the file."""
+    """Return records and start of a valid summary; otherwise none, and the end of the file."""
     at = len(data) - len(MCAP0_MAGIC) - _FOOTER.size
     if at < 0:
         return [], len(data)
@@ -100,13 +100,13 @@ def index_at_the_end(data: memoryview) -> tuple[list[Any], int]:
 
 
 def between_magics(data: memoryview) -> bool:
-    """Whether a file begins and ends as one of its kind."""
+    """Whether a file begins and ends with the magic bytes."""
     size = len(MCAP0_MAGIC)
     return data[:size].tobytes() == MCAP0_MAGIC == data[-size:].tobytes()
 
 
 def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None) -> IntactChunk | None:
-    """The chunk at a place, whatever is damaged of its head, if its checksum holds."""
+    """Return the chunk at a place if its checksum is valid, even with a damaged head."""
     if at + RECORD_HEAD.size + _CHUNK_HEAD.size > len(data):
         return None
     checksum = _CHUNK_HEAD.unpack_from(data, at + RECORD_HEAD.size)[3]
@@ -125,7 +125,7 @@ def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None)
 
 
 def unpacked_at(data: memoryview, begin: int, end: int, packing: str) -> tuple[bytes, int]:
-    """What was packed, and where it ends in the file; nothing and 0 if it is damaged."""
+    """Return the unpacked bytes, and the end of the packed ones in the file; no bytes and 0 if damaged."""
     if data[begin : begin + len(_PACKED[packing])].tobytes() != _PACKED[packing]:
         return b"", 0
     if not packing:
@@ -136,13 +136,13 @@ def unpacked_at(data: memoryview, begin: int, end: int, packing: str) -> tuple[b
         while at < end and not reader.eof and size <= _MOST_UNPACKED:
             chunks.append(reader.decompress(data[at : min(at + _SIP, end)].tobytes()))
             size, at = size + len(chunks[-1]), min(at + _SIP, end)
-    except Exception:  # bytes that are not what was written, in whatever way
+    except Exception:  # damaged bytes raise many types
         return b"", 0
     return (b"".join(chunks), at - len(reader.unused_data or b"")) if reader.eof else (b"", 0)
 
 
 def inside_of(unpacked: bytes) -> Iterator[tuple[int, Any]]:
-    """Schemas, channels and messages of a chunk, and their places in it."""
+    """Yield schemas, channels and messages of a chunk, and their places in it."""
     data, at = memoryview(unpacked), 0
     while at < len(data):
         record, end = record_at(data, at)
@@ -152,7 +152,7 @@ def inside_of(unpacked: bytes) -> Iterator[tuple[int, Any]]:
 
 
 def _intact_inside(unpacked: bytes) -> bool:
-    """Whether a chunk without a checksum is records to its last byte."""
+    """Whether a chunk without a checksum consists of complete records."""
     data, at = memoryview(unpacked), 0
     while at < len(data):
         record, at = record_at(data, at)
@@ -162,7 +162,7 @@ def _intact_inside(unpacked: bytes) -> bool:
 
 
 def fits(record: Any, noted: mcap.ChunkIndex | None, messages: Counter[tuple[int, int, int]]) -> bool:
-    """Whether the head of a chunk says what is in it."""
+    """Whether the head of a chunk agrees with its content."""
     if not isinstance(record, mcap.Chunk):
         return False
     times = [time_ns for _, time_ns, _ in messages] or [0]
@@ -173,7 +173,7 @@ def fits(record: Any, noted: mcap.ChunkIndex | None, messages: Counter[tuple[int
 
 
 def next_record(data: memoryview, at: int, expected_end: int, noted: mcap.ChunkIndex | None) -> int:
-    """Where the chain goes on behind what cannot be read; the end of the file if nowhere."""
+    """Return the place of the next readable record; the end of the file without one."""
     if noted:
         return min(at + noted.chunk_length, len(data))
     if _begins(data, expected_end):
@@ -192,7 +192,7 @@ def next_record(data: memoryview, at: int, expected_end: int, noted: mcap.ChunkI
 
 
 def _begins(data: memoryview, at: int) -> bool:
-    """Whether two records in a row can be read here, or one and the end of the file."""
+    """Whether two consecutive records can be read here, or one and the end of the file."""
     record, end = record_at(data, at)
     if record is None:
         return at == len(data)
@@ -200,6 +200,6 @@ def _begins(data: memoryview, at: int) -> bool:
 
 
 def sealed(data: memoryview, at: int, end: int) -> bool:
-    """Whether the checksum of an attachment holds, if it has one."""
+    """Whether the checksum of an attachment is valid or absent."""
     checksum = int.from_bytes(data[end - 4 : end].tobytes(), "little")
     return checksum in (0, zlib.crc32(data[at + RECORD_HEAD.size : end - 4]))

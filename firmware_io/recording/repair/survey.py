@@ -1,4 +1,4 @@
-"""What can be read of a damaged recording, where it is, and what is lost."""
+"""Survey of the intact and lost parts of a damaged recording."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from scanwright.firmware_io.recording.repair.salvage import (
     unpacked_at,
 )
 
-_LEAST_GAP_NS = 50_000_000  # a shorter one is printed as nothing
+_LEAST_GAP_NS = 50_000_000  # shorter ones are rounded to 0.0 s
 _MOST_LISTED = 8  # gaps
 
 
@@ -36,13 +36,13 @@ class RepairSummary:
     """Content and damage of a recording.
 
     Attributes:
-        messages: topic -> intact messages.
-        lost_messages: damaged messages, if the file has their number.
-        damaged_chunks: chunks with a wrong checksum.
-        lost_bytes: bytes of records that cannot be read, damaged chunks included.
-        repaired: other damage that a repair corrects -> count.
-        times_ns: log times of the first and of the last message.
-        missing_ns: log times before and after lost messages, if both are known.
+        messages: intact ones by topic.
+        lost_messages: damaged ones, if the file has their number.
+        damaged_chunks: with a wrong checksum.
+        lost_bytes: of unreadable records, damaged chunks included.
+        repaired: other damage that a repair corrects.
+        times_ns: log times of the first and the last message.
+        missing_ns: known log times before and after lost messages.
     """
 
     messages: Counter[str] = field(default_factory=Counter)
@@ -54,17 +54,17 @@ class RepairSummary:
     missing_ns: list[tuple[int, int]] = field(default_factory=list)
 
     def misses(self, before_ns: int, after_ns: int) -> None:
-        """Bytes are lost between messages of these times; 0 if one is not known."""
+        """Add a gap between messages of these times; 0 if one is unknown."""
         if before_ns and after_ns - before_ns >= _LEAST_GAP_NS:
             self.missing_ns.append((before_ns, after_ns))
 
     @property
     def intact(self) -> bool:
-        """There is nothing to repair."""
+        """Whether there is no damage."""
         return not (self.lost_bytes or self.lost_messages or self.repaired)
 
     def lines(self, path: Path, out: Path) -> list[str]:
-        """What was found in the recording `path` and written to `out`, in words."""
+        """Format the content of `path` and the repair to `out`."""
         first_ns, last_ns = self.times_ns
         counts = " and ".join(f"{count:,} messages of {topic}" for topic, count in sorted(self.messages.items()))
         result = [f"{path}: {counts}, {(last_ns - first_ns) / 1e9:.1f} s"]
@@ -83,7 +83,7 @@ class RepairSummary:
         return [*result, f"wrote {out}"]
 
     def _missing(self) -> list[str]:
-        """Where it has gaps, counted from its first message, in a line."""
+        """Format the gaps, with times since the first message."""
         if not self.missing_ns:
             return []
         begin_ns = min(self.times_ns[0], self.missing_ns[0][0])
@@ -99,7 +99,7 @@ class RepairSummary:
 
 @dataclass(slots=True)
 class Survey:
-    """What can be read of a file, and where it is."""
+    """Intact records of a file, and their places."""
 
     summary: RepairSummary = field(default_factory=RepairSummary)
     header: mcap.Header | None = None
@@ -107,13 +107,13 @@ class Survey:
     channels: dict[int, mcap.Channel] = field(default_factory=dict)
     extras: list[mcap.Metadata | mcap.Attachment] = field(default_factory=list)
     chunks: list[IntactChunk] = field(default_factory=list)
-    loose: list[tuple[int, int]] = field(default_factory=list)  # where messages outside of chunks begin and end
-    announced: int = 0
-    summary_ns: tuple[int, int] = (0, 0)  # log times of the first and of the last message, by the index at the end
-    lost_at: list[int] = field(default_factory=list)  # where bytes are lost, increasing
+    loose: list[tuple[int, int]] = field(default_factory=list)  # begin and end of messages outside of chunks
+    announced: int = 0  # number of messages by the index at the end
+    summary_ns: tuple[int, int] = (0, 0)  # log times of the first and the last message by the index at the end
+    lost_at: list[int] = field(default_factory=list)  # places of lost bytes, increasing
 
     def learn(self, records: Iterable[Any]) -> None:
-        """Keep schemas and channels, the first of each number."""
+        """Add schemas and channels, the first of each number."""
         for record in records:
             if isinstance(record, mcap.Schema):
                 self.schemas.setdefault(record.id, record)
@@ -121,13 +121,13 @@ class Survey:
                 self.channels.setdefault(record.id, record)
 
     def topic(self, message: mcap.Message) -> str | None:
-        """Where a message belongs, if its topic and type are known."""
+        """Return the topic of a message, if its topic and type are known."""
         channel = self.channels.get(message.channel_id)
         return channel.topic if channel and (not channel.schema_id or channel.schema_id in self.schemas) else None
 
 
 def survey(data: memoryview) -> Survey:
-    """Find everything that can be read, and count what cannot."""
+    """Find all readable records, and count lost bytes."""
     surveyor = _Surveyor(data)
     at, end_of_data = len(MCAP0_MAGIC), surveyor.end_of_data
     while at < end_of_data:
@@ -136,7 +136,7 @@ def survey(data: memoryview) -> Survey:
 
 
 class _Surveyor:
-    """Reads one record after the other; what follows a damaged one is looked for."""
+    """Reader of consecutive records that searches for the next one after damage."""
 
     def __init__(self, data: memoryview) -> None:
         self._data = data
@@ -155,10 +155,10 @@ class _Surveyor:
         self._repaired["the first or last bytes"] += not between_magics(data)
         self._unsure: list[Any] = []
         self._closed = False
-        self._due: Counter[tuple[int, int, int]] | None = None  # what message indexes have to say of the chunk before
+        self._due: Counter[tuple[int, int, int]] | None = None  # expected message indexes of the last chunk
 
     def take(self, at: int) -> int:
-        """Take the record at a place; where the next one is."""
+        """Process the record at a place; return the place of the next one."""
         record, end = record_at(self._data, at)
         noted = self._noted.get(at)
         chunk = chunk_at(self._data, at, end, noted) if record is None or isinstance(record, mcap.Chunk) else None
@@ -176,7 +176,7 @@ class _Surveyor:
         elif isinstance(record, mcap.MessageIndex):
             self._message_index(record)
         elif isinstance(record, mcap.Message):
-            # any bytes are a message: one of a damaged length ends where nothing begins, and others begin within it
+            # a message has no checksum: after one of a damaged length no record begins, but others begin inside it
             known = record_at(self._data, end)[0] is not None
             begins = end if known else next_record(self._data, at, at, None)
             if begins < end:
@@ -196,10 +196,10 @@ class _Surveyor:
         return end
 
     def finish(self) -> Survey:
-        """Return the survey, when all records are taken."""
+        """Return the survey after all records."""
         result, lost, repaired = self._result, self._lost, self._repaired
         result.learn(self._unsure)
-        if result.chunks or lost.damaged_chunks:  # any bytes may look like a message, and nothing vouches for these
+        if result.chunks or lost.damaged_chunks:  # in a file with chunks, loose messages are unverified
             lost.lost_bytes += sum(end - at for at, end in result.loose)
             result.loose.clear()
         repaired["the end of the data"] += bool(self._index) and not self._closed
@@ -233,7 +233,7 @@ class _Surveyor:
 
 
 def intact_messages(data: memoryview, result: Survey) -> Iterator[tuple[int, mcap.Message]]:
-    """The whole messages as they stand in the file, behind the place of their chunk, of a known topic or not."""
+    """Yield the place of the chunk of each intact message, and the message, in the order of the file."""
     places: list[tuple[int, IntactChunk | None]] = [(chunk.begin, chunk) for chunk in result.chunks]
     places += [(at, None) for at, _ in result.loose]
     for at, chunk in sorted(places, key=itemgetter(0)):

@@ -1,1 +1,1 @@
-"""Final adjustment of a pair: the flat pieces that both stands saw, together with the pose, beam by beam."""
+"""Final adjustment of a pair: the pose and the common flat surfaces, from the single beams."""

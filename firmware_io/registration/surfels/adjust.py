@@ -1,9 +1,10 @@
 """Pose of a pair by least squares over all beams of all pieces; every piece's plane and the calibration are unknown.
 
-Each piece has a plane of its own, which both stands' beams determine together and which is eliminated (a Schur
-complement): what is left says how the two stands disagree about it. No number is used twice: normals are no averages
-of shared neighbours, and a beam belongs to one piece. So the inverse of the normal equations is the covariance.
-What the stated covariance of the scanner's angles allows is unknown too, the same four numbers in both stands.
+The plane of each piece is determined by the beams of both scan positions and eliminated (a Schur complement), which
+leaves their disagreement about it. No measurement is used twice: normals are no averages of shared neighbours, and a
+beam belongs to one piece. So the inverse of the normal equations is the covariance.
+
+The four unknowns of the calibration are the same in both scan positions, with the stated covariance as their prior.
 """
 
 from __future__ import annotations
@@ -21,41 +22,33 @@ from scanwright.design.concurrency.parallel import in_chunks
 from scanwright.firmware_io.registration.surfels.beams import UNKNOWNS, BeamRun, Beams, sum_beams
 from scanwright.firmware_io.registration.surfels.cells import Cells, Lookup, find_cells, look_up
 
-_ROUNDS = 8  # of finding cells and solving: an end to poses that do not settle
-_SETTLED = 5e-2  # squared sigmas of a step: beams at the edges of pieces come and go, and move it as much for ever
+_ROUNDS = 8  # of finding cells and solving
+_SETTLED = 5e-2  # squared sigmas of a step: beams that enter and leave pieces at their edges move it as much
 _SAME_REACH = 0.9  # times the last reach: the cells would be the same
-_REACH = 5  # sigmas: what a wall's noise never does
+_REACH = 5  # sigmas: above the noise of a wall
 _FOREIGN = 0.02  # share of points off the common plane
 _MIN_CELLS = 12  # two for each degree of freedom
-_SHARED_BEAMS = 20  # how many beams of the whole cloud's noise a piece's own is mixed with
-_OUTLIER = 36.0  # times the median of what pieces disagree by, in squared sigmas: moved, or not the same thing
-_DOUBTED = 9.0  # from here on a piece pulls in proportion to its distance only
-_REWEIGHTED = 8  # of the robust weights
+_SHARED_BEAMS = 20  # weight, in beams, of the whole cloud's noise in that of a piece
+_OUTLIER = 36.0  # times the median disagreement of pieces, in squared sigmas: a moved or another object
+_DOUBTED = 9.0  # above it the pull of a piece grows in proportion to its distance only
+_REWEIGHTED = 8  # iterations of the robust weights
 _MEDIAN_CHI2 = 2.37  # of three degrees of freedom
-_VAGUE = 0.1  # of the spacing: flat pieces that leave a position this open leave out what holds it
-_RIDGE = 1e-9  # of a plane's information: keeps what one line leaves open solvable
+_VAGUE = 0.1  # of the spacing: largest sigma of a position that flat pieces hold
+_RIDGE = 1e-9  # of a plane's information: makes a plane with a single line of beams solvable
 _RANK = 1e-6  # times the largest eigenvalue: smaller ones are rounding
-_SHARES = 8  # of the beams, summed side by side: on every machine as many, as the order of a sum rounds it
+_SHARES = 8  # of the beams, summed in parallel: the same on every machine, since the order of a sum affects rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Adjusted:
-    """A pose, and how well it is known.
+    """An adjusted pose."""
 
-    Attributes:
-        covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (6, 6).
-        scale: by how much the pieces disagree more than the noise of their beams explains, at least 1; it is in the
-            covariance.
-    """
-
-    T_a_b: Pose  # shape (4, 4)
-    covariance: Float64[ndarray, "6 6"]
-    pieces: int  # how many pieces of surface hold it
-    scale: float
+    T_a_b: Pose
+    covariance: Float64[ndarray, "6 6"]  # of a small motion (rotation vector [rad], translation [m]) on its right
 
 
 def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None:
-    """The pose from a start right to a fraction of `spacing_m`; None if the flat surfaces do not hold it."""
+    """Return the pose from a start with an error below `spacing_m`; None if the flat surfaces do not hold it."""
     cells = find_cells(
         np.concatenate([a.voxels_m, frames.apply(T_a_b, b.voxels_m)]),
         np.concatenate([a.counts, b.counts]),
@@ -68,28 +61,28 @@ def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None
     if a.covariance is not None:
         free = UNKNOWNS - 3
         prior[6:, 6:] = np.linalg.inv(a.covariance)
-    T, answer = T_a_b, None
+    T, adjusted = T_a_b, None
     for _ in range(_ROUNDS):
         if cells.number < _MIN_CELLS:
             return None
         lookup = look_up(cells)
-        one, on_a, off_a = _summed(a, cells, lookup, np.eye(4), False)
-        two, on_b, off_b = _summed(b, cells, lookup, T, True)
+        sums_a, on_a, off_a = _summed(a, cells, lookup, np.eye(4), False)
+        sums_b, on_b, off_b = _summed(b, cells, lookup, T, True)
         enough = (np.minimum(on_a, on_b) > 3) & (off_a <= _FOREIGN * on_a) & (off_b <= _FOREIGN * on_b)
-        cells, one, two, on_a, on_b = cells.select(enough), one[enough], two[enough], on_a[enough], on_b[enough]
+        cells = cells.select(enough)
         if cells.number < _MIN_CELLS:
             return None
-        solved = _solve(one, two, on_a, on_b, prior, free)
+        solved = _solve(sums_a[enough], sums_b[enough], on_a[enough], on_b[enough], prior, free)
         if max(np.abs(solved.x[3:6]).max(), np.sqrt(solved.covariance[3:, 3:].trace()) / _VAGUE) > spacing_m:
             return None
         T = T @ frames.rigid(frames.rotvec_to_matrix(solved.x[:3]), solved.x[3:6])
-        answer = Adjusted(T, solved.covariance, int(solved.agrees.sum()), solved.scale)
+        adjusted = Adjusted(T, solved.covariance)
         reach_m = min(cells.reach_m, _REACH * solved.noise_m)
         still = solved.x[:6] @ np.linalg.solve(solved.covariance, solved.x[:6]) < _SETTLED
         if still and reach_m > _SAME_REACH * cells.reach_m:
             break
         cells = cells.moved(solved.planes, reach_m).select(solved.agrees)
-    return answer
+    return adjusted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +92,6 @@ class _Solved:
     planes: Float64[ndarray, "m 3"]
     agrees: Bool[ndarray, " m"]
     noise_m: float
-    scale: float
 
 
 def _summed(
@@ -119,17 +111,18 @@ def _summed(
 
 
 def _solve(
-    one: Floats, two: Floats, on_a: Int64[ndarray, " m"], on_b: Int64[ndarray, " m"], prior: Floats, free: int
+    sums_a: Floats, sums_b: Floats, on_a: Int64[ndarray, " m"], on_b: Int64[ndarray, " m"], prior: Floats, free: int
 ) -> _Solved:
-    """Weigh, eliminate the planes, solve; pieces that cannot be the same thing in both stands are left out."""
-    weights = [_weights(sums, on) for sums, on in ((one, on_a), (two, on_b))]
-    one, two = (sums * weight[:, None, None] for sums, weight in zip((one, two), weights, strict=True))
-    left = _without_plane(one + two)
-    alone = [_without_plane(one), _without_plane(two)]
-    rank_a, rank_b, rank = (_rank(sums[:, :3, :3]) for sums in (one, two, one + two))
+    """Weigh, eliminate the planes, solve; pieces that disagree are left out."""
+    weights = [_weights(sums_a, on_a), _weights(sums_b, on_b)]
+    sums_a, sums_b = (sums * weight[:, None, None] for sums, weight in zip((sums_a, sums_b), weights, strict=True))
+    both = sums_a + sums_b
+    left = _without_plane(both)
+    alone = [_without_plane(sums_a), _without_plane(sums_b)]
+    rank_a, rank_b, rank = (_rank(sums[:, :3, :3]) for sums in (sums_a, sums_b, both))
     freedom = rank_a + rank_b - rank
     some = freedom > 0
-    trust = np.ones(len(one))
+    trust = np.ones(len(both))
     for _ in range(_REWEIGHTED):
         x, _ = _least_squares(left, trust, prior, free)
         apart = _apart(left, alone, x)
@@ -140,18 +133,17 @@ def _solve(
     x, H = _least_squares(left, agrees.astype(float), prior, free)
     apart = _apart(left, alone, x)
     scale = max(1.0, float(np.sqrt(apart[agrees].sum() / max(freedom[agrees].sum() - 6, 1))))
-    both = one + two
     A, rest = both[:, :3, :3], both[:, :3, -1] - both[:, :3, 3:-1] @ x
     planes = np.linalg.solve(_ridged(A), rest[..., None])[..., 0]
     noise_m = float(np.sqrt(1 / min(np.median(weight) for weight in weights)))
     covariance = scale**2 * np.linalg.inv(H[:free, :free])[:6, :6]
-    return _Solved(x, covariance, planes, agrees, noise_m, scale)
+    return _Solved(x, covariance, planes, agrees, noise_m)
 
 
 def _least_squares(
     left: Floats, trust: Float64[ndarray, " m"], prior: Floats, free: int
 ) -> tuple[Float64[ndarray, " 10"], Floats]:
-    """Solution and normal equations of pieces whose planes are eliminated."""
+    """Return the solution and the normal equations of pieces whose planes are eliminated."""
     sums = np.einsum("m,mij->ij", trust, left)
     H = sums[:-1, :-1] + prior
     x = np.zeros(UNKNOWNS - 3)
@@ -160,7 +152,7 @@ def _least_squares(
 
 
 def _weights(sums: Floats, on: Int64[ndarray, " m"]) -> Float64[ndarray, " m"]:
-    """One over the variance of a range [m^-2], piece by piece, from what its beams leave about a plane of their own."""
+    """Return one over the variance of a range [m^-2] for each piece, from the residuals to a plane of its own."""
     rest = np.maximum(_without_plane(sums)[:, -1, -1], 0.0)
     freedom = np.maximum(on - 3, 0)
     usual = float(np.median(rest[freedom > 0] / freedom[freedom > 0]))
@@ -168,7 +160,7 @@ def _weights(sums: Floats, on: Int64[ndarray, " m"]) -> Float64[ndarray, " m"]:
 
 
 def _without_plane(sums: Floats) -> Floats:
-    """Schur complement of the first three unknowns, shape (m, 11, 11)."""
+    """Return the Schur complement of the first three unknowns, shape (m, 11, 11)."""
     across = sums[:, :3, 3:]
     return sums[:, 3:, 3:] - np.swapaxes(across, 1, 2) @ np.linalg.solve(_ridged(sums[:, :3, :3]), across)
 
@@ -178,13 +170,13 @@ def _ridged(A: Floats) -> Floats:
 
 
 def _apart(left: Floats, alone: list[Floats], x: Floats) -> Float64[ndarray, " m"]:
-    """By how much two planes of their own fit better than a shared one, in squared sigmas."""
+    """Return the residual of a shared plane over that of two separate ones, in squared sigmas."""
     full = np.append(-x, 1.0)
-    shared, one, two = (np.einsum("i,mij,j->m", full, sums, full) for sums in (left, *alone))
-    return np.maximum(shared - one - two, 0.0)
+    shared, alone_a, alone_b = (np.einsum("i,mij,j->m", full, sums, full) for sums in (left, *alone))
+    return np.maximum(shared - alone_a - alone_b, 0.0)
 
 
 def _rank(A: Floats) -> Int64[ndarray, " m"]:
-    """How many of a plane's three numbers are determined: one line of beams determines two."""
+    """Return how many of a plane's three parameters are determined: a single line of beams determines two."""
     values = np.linalg.eigvalsh(A)
     return (values > _RANK * values[:, -1:]).sum(axis=1)

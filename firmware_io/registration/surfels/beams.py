@@ -3,7 +3,7 @@
 A beam measures a range, and its noise lies along the beam. If a plane is raised by `c0 + c1 u + c2 v` [m] and a point
 is moved by `dp`, the expected range changes by `(c0 + c1 u + c2 v - n.dp) / n.d`. Divided by `n.d`, all beams have the
 noise of a range, and no beam shares its noise with another. The point where a beam crosses the plane does not depend
-on that noise, so whatever is selected by it (the beams of a piece, their levers) is unbiased.
+on that noise, so a selection by it (the beams of a piece, their levers) is unbiased.
 """
 
 from __future__ import annotations
@@ -30,38 +30,31 @@ _OFF, _BESIDE, _ON = 0, 1, 2  # a beam ends in the cube but off the plane; not o
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Beams:
-    """The measurements of one stand.
+    """The measurements of one scan position; `joint_rad` and `covariance` only if the calibration is uncertain."""
 
-    Attributes:
-        joint_rad: angle of the axis at each beam, shape (n,); empty if the calibration is taken as exact.
-        frame: columns x and y of the rotation frame in that of the stand, at joint 0, shape (3, 2).
-        covariance: of the laser's tilt about them [rad] and its offset along them [m], shape (4, 4), of the scanner
-            that made all clouds; None if the calibration is taken as exact.
-    """
-
-    points_m: Float32[ndarray, "n 3"]  # in the frame of the stand, shape (n, 3)
-    voxels_m: Float64[ndarray, "k 3"]  # means of small voxels, shape (k, 3)
-    counts: Int64[ndarray, " k"]  # points of each voxel, shape (k,)
-    eye_m: Float64[ndarray, " 3"]  # origin of the beams, shape (3,)
-    joint_rad: Float32[ndarray, " joints"]
-    frame: Float64[ndarray, "3 2"]
-    covariance: Float64[ndarray, "4 4"] | None
+    points_m: Float32[ndarray, "n 3"]  # in the frame of the cloud
+    voxels_m: Float64[ndarray, "k 3"]  # means of small voxels
+    counts: Int64[ndarray, " k"]  # points of each voxel
+    eye_m: Float64[ndarray, " 3"]  # origin of the beams
+    joint_rad: Float32[ndarray, " joints"]  # angle of the axis at each beam, or empty
+    frame: Float64[ndarray, "3 2"]  # columns x and y of the rotation frame in that of the cloud, at joint 0
+    covariance: Float64[ndarray, "4 4"] | None  # of the laser's tilt about x, y [rad] and offset along them [m]
 
 
 class BeamRun(NamedTuple):
-    """A run of the beams of one stand, as the compiled sum takes it; the first four fields are those of `Beams`."""
+    """Part of the beams of one scan position for the compiled sum; the first four fields are those of `Beams`."""
 
     points_m: Float32s
     eye_m: Floats
     joint_rad: Float32s
     frame: Floats
-    T: Floats  # pose of the stand in the frame of the pieces, shape (4, 4)
+    T: Floats  # pose of the cloud in the frame of the pieces, shape (4, 4)
     moves: bool  # whether that pose is unknown
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def sum_beams(run: BeamRun, cells: Cells, lookup: Lookup) -> tuple[Floats, Ints, Ints]:
-    """Normal equations of each piece, the number of beams that end on it, and the number in its cube off its plane.
+    """Return the normal equations of each piece, its number of beams, and the number in its cube off its plane.
 
     Returns:
         Shapes (m, 14, 14), the last row and column being the residuals of the ranges; (m,); (m,).
@@ -107,7 +100,7 @@ def _move(T: Floats, point: _Triple, out: Floats) -> None:
 
 @_part
 def _key(p: Floats, edge_m: float) -> np.int64:
-    """As `cube_keys`, for one point."""
+    """Return `cube_keys` of one point."""
     half = np.int64(1) << 20
     a, b, c = np.int64(np.floor(p[0] / edge_m)), np.int64(np.floor(p[1] / edge_m)), np.int64(np.floor(p[2] / edge_m))
     return ((a + half) << 42) | ((b + half) << 21) | (c + half)
@@ -115,7 +108,7 @@ def _key(p: Floats, edge_m: float) -> np.int64:
 
 @_part
 def _direction(p: Floats, eye: Floats, d: Floats) -> bool:
-    """Whether there is one."""
+    """Set `d` to the unit vector of the beam; False if its length is 0."""
     length = np.sqrt((p[0] - eye[0]) ** 2 + (p[1] - eye[1]) ** 2 + (p[2] - eye[2]) ** 2)
     if length == 0.0:
         return False
@@ -126,9 +119,9 @@ def _direction(p: Floats, eye: Floats, d: Floats) -> bool:
 
 @_part
 def _cross(cells: Cells, c: int, p: Floats, d: Floats, q: Floats) -> tuple[int, float, float]:
-    """Where the beam to `p` ends with respect to piece `c`, its slant and the height of `p` over the plane [m].
+    """Return where the beam to `p` ends at piece `c`, its slant and the height of `p` over the plane [m].
 
-    `q` becomes the point at which the beam crosses the plane.
+    `q` is set to the point at which the beam crosses the plane.
     """
     slant, height, across, inside = 0.0, 0.0, 0, True
     for k in range(3):
@@ -153,7 +146,7 @@ def _cross(cells: Cells, c: int, p: Floats, d: Floats, q: Floats) -> tuple[int, 
 
 @_part
 def _differentiate(run: BeamRun, cells: Cells, i: int, c: int, q: Floats, row: Floats) -> None:
-    """Derivatives of the height of beam `i` over piece `c` with respect to the unknowns."""
+    """Set `row` to the derivatives of the height of beam `i` over piece `c` with respect to the unknowns."""
     axes, off = cells.axes, (q[0] - run.T[0, 3], q[1] - run.T[1, 3], q[2] - run.T[2, 3])
     n, q0 = _turn_back(run.T, (axes[c, 2, 0], axes[c, 2, 1], axes[c, 2, 2])), _turn_back(run.T, off)
     row[0], row[1], row[2] = -1.0, 0.0, 0.0
@@ -179,7 +172,7 @@ def _differentiate(run: BeamRun, cells: Cells, i: int, c: int, q: Floats, row: F
 
 @_part
 def _turn_back(T: Floats, a: _Triple) -> _Triple:
-    """Into the frame of the stand."""
+    """Rotate into the frame of the cloud."""
     x, y, z = a[0], a[1], a[2]
     return (
         T[0, 0] * x + T[1, 0] * y + T[2, 0] * z,
@@ -195,7 +188,7 @@ def _cross_product(a: _Triple, b: _Triple) -> _Triple:
 
 @_part
 def _add(sums: Floats, c: int, row: Floats, weight: float) -> None:
-    """The lower triangle of the outer product."""
+    """Add the lower triangle of the weighted outer product of `row`."""
     for k in range(len(row)):
         if row[k] != 0.0:
             weighted = row[k] * weight

@@ -1,1 +1,1 @@
-"""The wire to servos: the serial line, transactions on it, registers, and one servo by its registers."""
+"""Servo bus: serial line, transactions, registers, and access to one servo."""

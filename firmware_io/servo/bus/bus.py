@@ -1,7 +1,7 @@
 """Transactions with the servos on one serial port, in any packet format.
 
-An echoing adapter is detected on opening; its echo is removed. An answer must have the requested length. Failures raise
-`DeviceError`; those that a retry can cure are retried.
+The echo of an adapter is detected and removed. A reply must have the requested length. Failures raise `DeviceError`,
+after retries if these can help.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from scanwright.firmware_io.servo.bus.packet_format import PacketFormat, Status
 from scanwright.firmware_io.servo.bus.registers import Register
 from scanwright.firmware_io.servo.bus.serial_line import SerialLine
 
-_TRIES = 3  # at one damaged answer in ten, one reading in a thousand fails
-_EXCUSED = 10  # tries in which this computer was kept from running: they say nothing of the servo
-_LATE = 4  # times the wait for an answer, until it is given up for good
+_TRIES = 3  # at one damaged reply in ten, one reading in a thousand fails
+_EXCUSED = 10  # tries that do not count because this process was suspended during them
+_LATE = 4  # times the wait for a reply, after which none arrives
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,43 +26,43 @@ class ServoAnswer:
     """One status packet.
 
     Attributes:
-        sampled_ns: `time.monotonic_ns()` when the servo took its values: the middle of the transaction, without the
-            bytes' own time on the wire and without the return delay.
+        sampled_ns: `time.monotonic_ns()` when the servo sampled its values: the middle of the transaction, without the
+            time of the bytes on the wire and without the return delay.
     """
 
     data: bytes  # parameters
-    conditions: int  # fault bits of the servo, or in protocol 2.0 one that says there are some; 0 when it is well
+    conditions: int  # fault bits, in protocol 2.0 a single one; 0 without a fault
     sampled_ns: int
-    bound_ns: int  # the sampling lies within this of `sampled_ns`
+    bound_ns: int  # largest error of `sampled_ns`
 
 
 class ServoBus:
-    """The servos behind one port, which is locked."""
+    """The servos on one port, which is locked."""
 
     def __init__(self, port: str, packets: PacketFormat, baud: int = 57600) -> None:
-        self.port = port  # name of the port
-        self.packets = packets  # how they are packed; may be changed
-        self.return_delay_ns = 0.0  # what the servo waits between request and answer
-        self.lost_replies = 0  # count of answers that were damaged or did not come, and were asked for again
+        self.port = port
+        self.packets = packets  # writable
+        self.return_delay_ns = 0.0  # of the servo between request and reply
+        self.lost_replies = 0  # number of damaged or missing replies
         self._line = SerialLine(port, baud)
 
     def listen(self, seconds: float) -> bytes:
-        """What comes in that time though nobody asked; a servo never speaks first."""
+        """Return the bytes received in that time without a request; a servo sends none."""
         with self._port_errors():
             return self._line.listen(seconds)
 
     def find_echo(self) -> None:
-        """Find out whether the adapter returns what it sends; before the first request."""
+        """Detect an echo of the adapter, before the first request."""
         with self._port_errors():
             self._line.find_echo()
 
     @property
     def baud(self) -> int:
-        """Bits per second."""
+        """Baud rate."""
         return int(self._line.port.baudrate)
 
     def set_baud(self, baud: int) -> bool:
-        """Send at another speed from now on; False if the adapter cannot."""
+        """Set the baud rate; False if the adapter does not support it."""
         with self._port_errors():
             try:
                 self._line.port.baudrate = baud
@@ -72,20 +72,20 @@ class ServoBus:
 
     @property
     def is_open(self) -> bool:
-        """Whether it was not closed yet."""
+        """Whether the port is open."""
         return bool(self._line.port.is_open)
 
     def fileno(self) -> int:
-        """The open port, for the guard to inherit."""
+        """Return the descriptor of the open port, which the watchdog process inherits."""
         return int(self._line.port.fileno())
 
     def close(self) -> None:
-        """Close the port; may be called again."""
+        """Close the port; can be called again."""
         self._line.port.close()
 
     def lower_latency(self) -> None:
-        """Ask the USB adapter to hand over bytes at once, until the port is closed."""
-        with suppress(OSError, ValueError, AttributeError, NotImplementedError):  # not every driver can, or needs to
+        """Set the USB adapter to forward bytes at once, until the port is closed."""
+        with suppress(OSError, ValueError, AttributeError, NotImplementedError):  # unsupported by some drivers
             self._line.port.set_low_latency_mode(True)
 
     def read(self, servo_id: int, register: Register) -> ServoAnswer:
@@ -98,16 +98,16 @@ class ServoBus:
         return self._ask(servo_id, self.write_packet(servo_id, register, data))
 
     def write_packet(self, servo_id: int, register: Register, data: bytes) -> bytes:
-        """The bytes on the wire of a write."""
+        """Encode a write."""
         return self.packets.writing(servo_id, register.address, data)
 
     def write_unanswered(self, servo_id: int, register: Register, data: bytes) -> None:
-        """Write to a servo that may be set not to answer writes."""
+        """Write to a servo that is possibly set not to reply to writes."""
         with self._port_errors():
             self._line.port.write(self.write_packet(servo_id, register, data))
 
     def ping(self, servo_id: int, wait_s: float) -> list[int]:
-        """Which servos answer a ping of one, or of all, in time; damaged answers are left out."""
+        """Return the ids of the servos that reply in time to a ping of one or all; drops damaged replies."""
         answering: set[int] = set()
         with self._port_errors():
             self._send(self.packets.ping(servo_id), wait_s)
@@ -136,15 +136,15 @@ class ServoBus:
                         self.lost_replies += 1
                     if tries == _TRIES:
                         raise type(error)(f"{self.port}: servo {servo_id}: {error}") from error
-                    self._let_pass()
+                    self._drop_late_replies()
 
     def _send(self, request: bytes, wait_s: float) -> None:
         self._line.clearPort()
         self._line.write(request)
         self._line.expect(len(request) * self._line.byte_s + wait_s)
 
-    def _let_pass(self) -> None:
-        """Wait for answers that are late, and drop them: they carry no number, so one would be taken for the next."""
+    def _drop_late_replies(self) -> None:
+        """Wait for late replies and drop them: without a number, one would be mistaken for the next reply."""
         self._line.expect(_LATE * self._line.wait_s)
         with suppress(DeviceTimeoutError):
             while True:
@@ -152,7 +152,6 @@ class ServoBus:
                     self.packets.receive(self._line)
 
     def _receive(self, servo_id: int) -> Status:
-        """The next status of that servo; raises as `PacketFormat.receive`."""
         while True:
             status = self.packets.receive(self._line)
             if status.id == servo_id:
@@ -162,7 +161,7 @@ class ServoBus:
         meaning, complete = self.packets.meaning(status.error), len(status.data) == expected
         if meaning.damaged:
             raise ProtocolError("the request arrived damaged: check cable and ground")
-        if meaning.refusal and not (complete and reads):  # a read that brings its values was no mistake
+        if meaning.refusal and not (complete and reads):  # a read that returns its values is valid
             raise DeviceError(f"{self.port}: servo {status.id}: refused: {meaning.refusal}")
         if not complete:
             raise ProtocolError(f"{len(status.data)} bytes instead of {expected}")

@@ -1,4 +1,4 @@
-"""What a family of servos says on its bus: how its packets are made, taken apart and understood."""
+"""Encoding and decoding of the packets of a servo family."""
 
 from __future__ import annotations
 
@@ -13,43 +13,38 @@ NO_ANSWER = "no answer: check its power and cable; another program may have set 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One answer of a servo, as it came."""
+    """One reply of a servo."""
 
     id: int
-    error: int  # its error byte
+    error: int  # error byte
     data: bytes  # parameters, without stuffing
-    length: int  # in bytes, on the wire
+    length: int  # bytes on the wire
 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What an error byte means."""
+    """Decoded error byte."""
 
-    conditions: int = 0  # bits of it that tell of the servo, not of the request; 0 when it is well
+    conditions: int = 0  # fault bits of the servo itself; 0 without a fault
     damaged: bool = False  # the request arrived damaged
-    refusal: str | None = None  # why the servo does not do what it was told; None if it does
+    refusal: str | None = None  # why the servo rejected the request; None if it did not
 
 
 class PacketFormat(ABC):
-    """How the servos of a family pack what is said on their bus; packets hold an instruction and its parameters.
+    """Packet format of a servo family; a packet contains an instruction and its parameters."""
 
-    Attributes:
-        everyone: number that all answer to; without one, the number that they have from the factory.
-        address_bytes: of an address, and of a size.
-    """
-
-    protocol: str  # as the maker calls it: "2.0"
-    overhead: int  # bytes of a reading, request and answer, around its values
-    everyone = 254
-    address_bytes = 1
+    protocol: str  # name given by the maker, such as "2.0"
+    overhead: int  # bytes of request and reply of a reading, without its values
+    everyone = 254  # broadcast id, or the factory id if there is none
+    address_bytes = 1  # of an address, and of a size
 
     @abstractmethod
     def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
-        """The bytes of a request."""
+        """Encode a request."""
 
     @abstractmethod
     def acknowledged(self, servo_id: int) -> bytes:
-        """What the answer to a write that was obeyed begins with, whatever the servo reports of itself."""
+        """Return the first bytes of the reply to an executed write; they do not depend on reported faults."""
 
     @abstractmethod
     def receive(self, line: SerialLine) -> Status:
@@ -57,22 +52,21 @@ class PacketFormat(ABC):
 
     @abstractmethod
     def meaning(self, error: int) -> Meaning:
-        """What the error byte of a status means."""
+        """Decode the error byte of a status."""
 
     def ping(self, servo_id: int) -> bytes:
-        """The request to say no more than that it is there."""
+        """Encode a ping."""
         return self.packet(servo_id, _PING, b"")
 
     def reading(self, servo_id: int, address: int, size: int) -> bytes:
-        """The request for the values at an address."""
-        return self.packet(
-            servo_id, _READ, b"".join(one.to_bytes(self.address_bytes, "little") for one in (address, size))
-        )
+        """Encode the request to read `size` bytes at an address."""
+        block = address.to_bytes(self.address_bytes, "little") + size.to_bytes(self.address_bytes, "little")
+        return self.packet(servo_id, _READ, block)
 
     def writing(self, servo_id: int, address: int, values: bytes) -> bytes:
-        """The request to take these values to an address."""
+        """Encode the request to write bytes at an address."""
         return self.packet(servo_id, _WRITE, address.to_bytes(self.address_bytes, "little") + values)
 
     def reboot(self, servo_id: int) -> bytes:
-        """The request to restart, which not every family knows."""
+        """Encode the request to restart; not all families support it."""
         return self.packet(servo_id, _REBOOT, b"")

@@ -13,7 +13,7 @@ from typing import Literal
 from scanwright.design.errors import DeviceError
 from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
 
-RPM = 2 * math.pi / 60  # rad/s of a turn in a minute
+RPM = 2 * math.pi / 60  # rad/s
 
 Sign = Literal["none", "twos"] | int
 
@@ -25,10 +25,9 @@ class Register:
     Attributes:
         address: of its lowest byte; little-endian.
         size: in bytes.
-        unit: what one count is worth; negative where counts grow clockwise.
-        sign: how negative counts are written; a number is that of the bit which is set for them, the size standing in
-            the bits below it.
-        name: of a setting that outlasts a scan, as the e-manual has it.
+        unit: SI value of one count; negative if counts grow clockwise.
+        sign: encoding of negative counts; a number is the index of a sign bit, with the magnitude in the bits below it.
+        name: of a setting, as in the e-manual.
     """
 
     address: int
@@ -60,7 +59,7 @@ class Register:
         return count.to_bytes(self.size, "little", signed=self.sign == "twos")
 
     def decode(self, data: bytes) -> float:
-        """The value in SI units of `size` bytes; the inverse of `encode`."""
+        """Return the value in SI units of `size` bytes; the inverse of `encode`."""
         count = int.from_bytes(data, "little", signed=self.sign == "twos")
         if isinstance(self.sign, int):
             size = count & (1 << self.sign) - 1
@@ -73,28 +72,27 @@ Setting = tuple[Register, int]
 
 @dataclass(frozen=True, slots=True)
 class ControlTable:
-    """What the driver needs to know of one model with one protocol.
+    """Registers and properties of one model with one protocol.
 
     Attributes:
-        model: name, as in the catalogue.
-        packets: how they are packed.
-        number: of the model, that stands in `model_number`.
-        ram: first address that is not kept without power; below it torque must be off to write.
+        model: catalogue name.
+        number: value of `model_number`.
+        ram: first volatile address; torque must be off to write below it.
         centre: count of the encoder's centre, angle 0.
         last: highest count of one turn, or of the range that the sensor covers.
         measures_turn: False if the position sensor has a dead sector.
-        speed_loop: False if "speed" in wheel mode is a share of the supply voltage, and no speed is measured.
+        speed_loop: False if "speed" in wheel mode is a part of the supply voltage, and no speed is measured.
         wheel: settings of continuous rotation.
-        joint: settings of going to an angle.
-        neutral: settings that would turn or shift the angles' zero, with the value that does not.
-        bauds: bits per second, by the count of `baud`.
-        answers_all: count of `status_return` with which everything is answered.
-        faults: what the bits of the fault byte mean: of `hardware_error` where there is one, else of each answer.
-        joint_speed: speed on the way to an angle; count 0 means unlimited.
-        max_torque: what `torque_limit` is when the servo starts; after a shutdown it is less.
-        lock: 1 in it keeps settings as they are, or writes to them from outlasting the power.
-        watchdog: stops a servo to which nobody talks for so long.
-        modes: names of the counts of the first register of `wheel`, as its maker calls them.
+        joint: settings of moving to an angle.
+        neutral: settings that turn or shift the zero of angles, with the value that does not.
+        bauds: baud rates, by the count of `baud`.
+        answers_all: count of `status_return` with which all requests get a reply.
+        faults: names of the bits of `hardware_error` if there is one, otherwise of the error byte of each reply.
+        joint_speed: speed towards an angle; count 0 means unlimited.
+        max_torque: `torque_limit` after a start; a shutdown lowers that.
+        lock: 1 in it keeps settings unchanged, or makes writes to them volatile.
+        watchdog: time without requests after which the servo stops.
+        modes: names of the counts of the first register of `wheel`.
     """
 
     model: str
@@ -137,17 +135,17 @@ class ControlTable:
         return register.address < self.ram
 
     def mode(self, *, spins: bool) -> tuple[Setting, ...]:
-        """Settings of continuous rotation, or of going to an angle."""
+        """Return the settings of continuous rotation, or of moving to an angle."""
         return self.wheel if spins else self.joint
 
     @property
     def protocol(self) -> str:
-        """As its maker calls it."""
+        """Name of the protocol given by the maker."""
         return self.packets.protocol
 
     @property
     def can_be_mute(self) -> bool:
-        """Whether it can be set to answer nothing but pings: the levels are 0 pings, 1 questions, 2 everything."""
+        """Whether it can be set to reply only to pings: the levels are 0 pings, 1 reads, 2 all requests."""
         return self.answers_all > 1
 
     @property
@@ -161,28 +159,28 @@ class ControlTable:
             if known == baud:
                 return count
         raise DeviceError(
-            f"{baud} baud: {self.model} knows {', '.join(str(one) for one in sorted(self.bauds.values()))}"
+            f"{baud} baud: {self.model} supports {', '.join(str(rate) for rate in sorted(self.bauds.values()))}"
         )
 
     @property
     def reach_rad(self) -> tuple[float, float]:
-        """The angles that it can go to, and tell."""
+        """Range of angles."""
         ends = [(count - self.centre) * self.position.unit for count in (0, self.last)]
         return min(ends), max(ends)
 
     @property
     def present(self) -> Register:
-        """The block of addresses that holds all present values: one transaction reads it."""
+        """Block of addresses with all present values, for one transaction."""
         values = (self.position, self.load, self.velocity, self.voltage, self.temperature)
         first = min(register.address for register in values)
         return Register(first, max(register.address + register.size for register in values) - first)
 
     def names(self, code: int) -> str:
-        """The faults that a fault byte tells of."""
+        """Return the names of the faults in a fault byte."""
         named = " and ".join(name for bit, name in self.faults.items() if code >> bit & 1)
         return named or f"fault code {code}"
 
     def pick(self, register: Register, data: bytes) -> float:
-        """Return one value out of the bytes of `present`, in SI units."""
+        """Return one value of the bytes of `present`, in SI units."""
         start = register.address - self.present.address
         return register.decode(data[start : start + register.size])

@@ -1,4 +1,4 @@
-"""One servo on a bus, by its registers; failures raise DeviceError."""
+"""Access to the registers of one servo; failures raise DeviceError."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolEr
 from scanwright.firmware_io.servo.bus.bus import ServoAnswer, ServoBus
 from scanwright.firmware_io.servo.bus.registers import ControlTable, Register
 
-PING_S = 0.05  # a servo answers within a millisecond; USB adapters gather bytes for up to 16 ms, both ways
+PING_S = 0.05  # a servo replies within a millisecond; USB adapters delay bytes up to 16 ms, in both directions
 
 
 @dataclass(frozen=True, slots=True)
 class ServoUnit:
-    """One servo that answers."""
+    """One servo that replies."""
 
-    bus: ServoBus  # that it is on
-    table: ControlTable  # of its model
-    id: int  # its number on the bus
-    was_mute: bool = False  # it answered nothing but pings before
+    bus: ServoBus
+    table: ControlTable
+    id: int
+    was_mute: bool = False  # it replied only to pings before
 
     def __str__(self) -> str:
         return f"{self.bus.port}: servo {self.id}"
 
     def read(self, register: Register) -> ServoAnswer:
-        """The bytes of a register or a block; raises as `ServoBus.read`."""
+        """Read a register or a block; raises as `ServoBus.read`."""
         return self.bus.read(self.id, register)
 
     def present(self) -> ServoAnswer:
-        """The present values, for `ControlTable.pick`, and the time of the position; raises as `ServoBus.read`."""
+        """Read the present values, for `ControlTable.pick`; raises as `ServoBus.read`."""
         return self.read(self.table.present)
 
     def has_torque(self) -> bool:
-        """Whether its torque is on: it holds or turns."""
+        """Whether its torque is on."""
         return bool(self.count(self.table.torque))
 
     def value(self, register: Register) -> float:
-        """What a register holds, in SI units."""
+        """Read a register in SI units."""
         return register.decode(self.read(register).data)
 
     def count(self, register: Register) -> int:
-        """What a register holds, in counts."""
+        """Read a register in counts."""
         return round(self.value(register) / register.unit)
 
     def write(self, register: Register, value: float) -> ServoAnswer:
@@ -50,19 +50,19 @@ class ServoUnit:
         return self.bus.write(self.id, register, register.encode(value))
 
     def torque_off(self) -> tuple[bytes, bytes]:
-        """The packet that takes the torque, and what the answer to it begins with."""
+        """Return the packet that turns the torque off, and the first bytes of its reply."""
         torque = self.table.torque
         return self.bus.write_packet(self.id, torque, torque.encode(0)), self.bus.packets.acknowledged(self.id)
 
     def reported_fault(self, answer: ServoAnswer) -> str | None:
-        """What the servo reports of itself with an answer, in words; None if it is well."""
+        """Return the names of the faults reported in a reply; None without a fault."""
         if not answer.conditions:
             return None
         fault = self.table.hardware_error
         return self.table.names(answer.conditions if fault is None else self.count(fault))
 
     def set_permanent(self, register: Register, count: int) -> int:
-        """Set an entry that is permanent, torque being off; its count before. Written if it differs: it wears."""
+        """Set a permanent register if it differs, with torque off; return its count before."""
         was = self.count(register)
         if was != count:
             self._unlock(True)
@@ -74,27 +74,27 @@ class ServoUnit:
                 raise DeviceError(f"{self}: {register} stays {was}: its memory is locked; switch its power off and on")
         return was
 
-    def _unlock(self, open_it: bool) -> None:
-        lock, wanted = self.table.lock, 0 if open_it else 1
+    def _unlock(self, unlocked: bool) -> None:
+        lock, count = self.table.lock, 0 if unlocked else 1
         if lock is None:
             return
         try:
-            self.write(lock, wanted)
-        except DeviceTimeoutError:  # it may be set not to answer what it is told
-            if self.count(lock) != wanted:
+            self.write(lock, count)
+        except DeviceTimeoutError:  # possibly set not to reply to writes
+            if self.count(lock) != count:
                 raise
 
     def set_baud(self, baud: int) -> None:
-        """Set its speed, torque being off, and find it at its new one."""
+        """Set its baud rate, with torque off, and find it at the new one."""
         register, count, before = self.table.baud, self.table.baud_count(baud), self.bus.baud
         if not self.bus.set_baud(baud):
-            raise DeviceError(f"{self.bus.port}: this adapter cannot do {baud} baud; nothing was changed")
+            raise DeviceError(f"{self.bus.port}: this adapter does not support {baud} baud; nothing was changed")
         self.bus.set_baud(before)
         self._unlock(True)
         self.bus.write_unanswered(self.id, register, register.encode(count))
-        time.sleep(PING_S)  # until the request is out at the old speed, and its answer, if any, is over
-        for speed in (baud, before):
-            self.bus.set_baud(speed)
+        time.sleep(PING_S)  # until request and possible reply at the old rate are complete
+        for rate in (baud, before):
+            self.bus.set_baud(rate)
             with suppress(DeviceTimeoutError, ProtocolError):
                 if self.id in self.bus.ping(self.id, PING_S) and self.count(register) == count:
                     self._unlock(False)
@@ -104,11 +104,11 @@ class ServoUnit:
         )
 
     def set_id(self, new_id: int) -> ServoUnit:
-        """Give it another number, torque being off; the servo with it, read back."""
+        """Set its id, with torque off; return the servo with the new id, read back."""
         register = self.table.id
         self._unlock(True)
         self.bus.write_unanswered(self.id, register, register.encode(new_id))
-        time.sleep(PING_S)  # whether it answers with the old number or the new is its own affair
+        time.sleep(PING_S)  # it can reply with the old or the new id
         renamed = ServoUnit(self.bus, self.table, new_id)
         if renamed.count(register) != new_id:
             raise DeviceError(f"{self}: no answer as {new_id}: switch it off and on, then try again")
@@ -116,19 +116,19 @@ class ServoUnit:
         return renamed
 
     def answer_everything(self) -> None:
-        """Set it to answer everything; this is permanent if `ControlTable.is_permanent` says so."""
+        """Set it to reply to all requests; permanent if `ControlTable.is_permanent`."""
         level = self.table.status_return
-        with_answer = level.encode(self.table.answers_all)
         try:
-            answers = self.read(level).data == with_answer
+            if self.read(level).data == level.encode(self.table.answers_all):
+                return
         except DeviceTimeoutError:
-            answers = False
-        if not answers:
-            self.set_answers(level, self.table.answers_all)
+            pass
+        self.set_answers(self.table.answers_all)
 
-    def set_answers(self, level: Register, count: int) -> None:
-        """Set what it answers, torque being off; not read back, as it may not answer that."""
+    def set_answers(self, count: int) -> None:
+        """Set to which requests it replies, with torque off; not read back, as it may not reply to that."""
+        level = self.table.status_return
         self._unlock(True)
         self.bus.write_unanswered(self.id, level, level.encode(count))
-        time.sleep(PING_S)  # whether it answers this very write is unknown: let an answer come and be dropped
+        time.sleep(PING_S)  # it may or may not reply to this write
         self._unlock(False)

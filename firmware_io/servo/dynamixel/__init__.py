@@ -1,1 +1,1 @@
-"""Dynamixel, protocols 1.0 and 2.0: registers, bus, driver."""
+"""Packets and control tables of Dynamixel, protocols 1.0 and 2.0."""

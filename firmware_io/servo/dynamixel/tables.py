@@ -2,8 +2,8 @@
 
 Sources are ROBOTIS' e-manual pages ax/ax-12a, mx/mx-28, mx/mx-64, mx/mx-106, their second editions for protocol 2.0,
 x/xl330-m288, x/xl430-w250, x/xh430-w350, x/xm430-w350 and x/xm540-w270; numbers of models and currents agree with the
-parameters of ROBOTIS' hardware interface for ROS 2. Load is the current as a share of the stall current at 12 V (XL330:
-5 V); the XL430 and MX-28 measure none and tell their duty.
+parameters of ROBOTIS' hardware interface for ROS 2. Load is the current relative to the stall current at 12 V (XL330:
+5 V); the XL430 and MX-28 measure none and report their duty.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from scanwright.firmware_io.servo.bus.registers import RPM, ControlTable, Regist
 from scanwright.firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 
 _NUMBER = Register(0, 2)
-_CLOCKWISE = 10  # the bit of protocol 1.0
-_DELAY_NS = 2000.0  # return delay counts 2 us
-_LOAD = 0.001  # of models that measure no current: the share of the duty
+_CLOCKWISE = 10  # sign bit of protocol 1.0
+_DELAY_NS = 2000.0  # one count of the return delay
+_LOAD = 0.001  # duty, of models that measure no current
 _BAUDS_1 = {
     1: 1_000_000,
     3: 500_000,
@@ -40,11 +40,11 @@ _FAULTS_2 = {0: "voltage", 2: "overheating", 3: "motor encoder", 4: "electrical 
 
 def _protocol_1(model: str, number: int, *, step_deg: float, last: int, speed_rpm: float) -> ControlTable:
     ax = model == "AX-12A"
-    drive_mode = ((Register(10, 1, name="drive_mode"), 0),) if model == "MX-106" else ()  # it can follow another one
+    drive_mode = ((Register(10, 1, name="drive_mode"), 0),) if model == "MX-106" else ()  # it can follow another servo
     clockwise = Register(6, 2, name="cw_angle_limit")
     counterclockwise = Register(8, 2, name="ccw_angle_limit")
     step_rad = math.radians(step_deg)
-    # In wheel mode the AX-12A takes a share of the voltage: that share of its 59 rpm without load, at 12 V.
+    # In wheel mode the AX-12A gets a part of the voltage: the same part of its 59 rpm without load, at 12 V.
     wheel_unit = 59 * RPM / 1023 if ax else speed_rpm * RPM
     return ControlTable(
         model=model,
@@ -124,7 +124,7 @@ def _protocol_2(model: str, number: int, *, load: float, most_baud: int = 4_500_
 
 
 def _current(count_mA: float, stall_A: float) -> float:
-    """What one count of current is of the stall torque."""
+    """Return the fraction of the stall torque of one count of current."""
     return count_mA / 1000 / stall_A
 
 

@@ -1,1 +1,1 @@
-"""Feetech STS and SMS: packets of our own, control tables."""
+"""Packets and control tables of Feetech STS and SMS."""

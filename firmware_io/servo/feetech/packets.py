@@ -1,8 +1,8 @@
 """Packets of Feetech's STS and SMS servos: FF FF, id, length, instruction or status, parameters, sum.
 
 The maker's SDK (`ftservo-python-sdk` 2.0.1) copies the Dynamixel one with its faults, so it is not used. Frame and sum
-are those of Dynamixel's protocol 1.0, so each family answers the other's pings; status byte, registers and signs
-differ. A damaged request gets no answer. Invalid bytes raise ProtocolError.
+are those of Dynamixel's protocol 1.0, so each family replies to the other's pings; status byte, registers and signs
+differ. A damaged request gets no reply. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def checksum(body: bytes) -> int:
 
 
 def from_header(data: bytes) -> bytes:
-    """What is left of bytes from the first on with which a status may begin."""
+    """Drop the bytes before the first one with which a status can begin."""
     for start in range(len(data)):
         head = data[start : start + 4]
         fits = head[2:3] <= _LAST_ID and (len(head) < 4 or 2 <= head[3] <= _LONGEST)
@@ -33,25 +33,25 @@ def from_header(data: bytes) -> bytes:
 
 
 def packet_length(data: bytes) -> int:
-    """How long the status is that begins here; as long as the shortest while that is not known."""
+    """Return the length of the status that begins here; the shortest one if that is not yet received."""
     return data[3] + 4 if len(data) > 3 else _SHORTEST
 
 
 def status(data: bytes) -> Status:
-    """Take a whole status apart."""
+    """Decode a complete status."""
     if data[-1] != checksum(data[2:-1]):
         raise ProtocolError(f"damaged answer {data.hex(' ')}: check cable, ground and other senders")
     return Status(data[2], data[4], data[5:-1], len(data))
 
 
 class Sts(PacketFormat):
-    """The `PacketFormat` of them."""
+    """Packet format of STS and SMS."""
 
     protocol = "STS"
     overhead = 14
 
     def packet(self, servo_id: int, instruction: int, parameters: bytes) -> bytes:
-        """The bytes of a request."""
+        """Encode a request."""
         body = bytes([servo_id, len(parameters) + 2, instruction]) + parameters
         return _HEADER + body + bytes([checksum(body)])
 
@@ -60,19 +60,19 @@ class Sts(PacketFormat):
         return _HEADER + bytes([servo_id, 2])
 
     def receive(self, line: SerialLine) -> Status:
-        """The next status; raises as `PacketFormat.receive`."""
-        received, came = b"", False
-        while len(received) < (wanted := packet_length(received)):
-            more = line.readPort(wanted - len(received))
+        """As `PacketFormat.receive`."""
+        received, is_damaged = b"", False
+        while len(received) < (length := packet_length(received)):
+            more = line.readPort(length - len(received))
             if not more:
-                if came:
+                if is_damaged:
                     raise ProtocolError(f"damaged answer {received.hex(' ')}: check cable, ground and other senders")
                 raise DeviceTimeoutError(NO_ANSWER)
-            received, came = from_header(received + more), True
+            received, is_damaged = from_header(received + more), True
         return status(received)
 
     def meaning(self, error: int) -> Meaning:
-        """What the status byte means: it tells of the servo only, and refuses nothing."""
+        """Decode the status byte, which has only faults of the servo."""
         return Meaning(conditions=error)
 
 

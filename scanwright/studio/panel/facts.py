@@ -71,19 +71,14 @@ class Facts:
         """What the task asks for: in words, whether it is met without parts, and the value."""
         limits, blind = self.limits, f"{percent(self.blind_weight)} blind"
         rows = [("no blind spot", self.blind_weight <= (limits.max_blind_weight or NO_BLIND_WEIGHT), blind)]
-        for words, limit, value, met in (
-            (
-                "at least {:g} beams per ball",
-                limits.min_density,
-                f"{self.least}",
-                self.least >= (limits.min_density or 0),
-            ),
-            ("scan lines at most {:g} deg apart", limits.max_line_gap_deg, f"{self.gap_deg:.3f} deg", None),
-            ("blind cone at most {:g} deg", limits.max_blind_cone_deg, f"{self.blind_cone_deg:.2f} deg", None),
-        ):
-            if limit is not None:
-                own = self.gap_deg if "lines" in words else self.blind_cone_deg
-                rows.append((words.format(limit), own <= limit if met is None else met, value))
+        if (fewest := limits.min_density) is not None:
+            rows.append((f"at least {fewest:g} beams per ball", self.least >= fewest, f"{self.least}"))
+        if (most := limits.max_line_gap_deg) is not None:
+            rows.append((f"scan lines at most {most:g} deg apart", self.gap_deg <= most, f"{self.gap_deg:.3f} deg"))
+        if (most := limits.max_blind_cone_deg) is not None:
+            rows.append(
+                (f"blind cone at most {most:g} deg", self.blind_cone_deg <= most, f"{self.blind_cone_deg:.2f} deg")
+            )
         return rows
 
     @property

@@ -12,7 +12,6 @@ from scanwright.cad.files.part_files import build_parts
 from scanwright.cad.files.urdf import urdf_text
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.placement import drive_of
-from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Bearing
@@ -108,9 +107,9 @@ def test_masses_add_up_and_inertias_are_those_of_bodies(made):
     bearing = load_catalogue().get("61806-2RS", Bearing).mass_g / 1000 if "bearing_cage" in own else 0.0
     turning = own["servo_shaft"] + own["alignment_linkage"] + own.get("counterweight", 0.0) + 0.1 + bearing / 2
     turning += own.get("journal_sleeve", 0.0)
-    turning += sum(lead.mass_g for lead in laid_out(made.scanner).leads) / 1000
+    turning += sum(lead.mass_g for lead in result.assembly.layout.leads) / 1000
     fixed = own["slip_ring_adapter"] + own["base_mount"] + own.get("bearing_cage", 0.0) + 0.1 + bearing / 2
-    fixed += sum(cable.mass_g for cable in laid_out(made.scanner).cables) / 1000
+    fixed += sum(cable.mass_g for cable in result.assembly.layout.cables) / 1000
     assert mass["rot"] == pytest.approx(turning, abs=5e-4)  # of the plain parts: their labels weigh that little
     assert mass["servo"] == pytest.approx(fixed + 0.126, abs=5e-4)
     assert mass["laser"] == pytest.approx(0.370)

@@ -189,6 +189,7 @@ DAILY = (  # every way to hold something, and every part that takes a screw, onc
     "tilted, nuts",
     "tilted, inserts",
     "upright on the deck",
+    "upright, a sub-plate",
     "small, without a ring",
     "printed throughout, inserts",
     "tilted, with a bearing",

@@ -25,8 +25,8 @@ def plain(time_ns):
     return np.linspace(0.5, 5.0, time_ns.size), np.arange(time_ns.size, dtype=float)
 
 
-def machine(model, look=plain, clock_ms=0, **options):
-    return LidarMachine(IDENTITIES[model], look, Quartz(0, clock_ms, 0.0), **options)
+def machine(model, ranging=plain, clock_ms=0, **options):
+    return LidarMachine(IDENTITIES[model], ranging, Quartz(0, clock_ms, 0.0), **options)
 
 
 def asked(sensor, request, now_ns=0):
@@ -263,6 +263,6 @@ def test_a_slow_look_leaves_scans_out_and_blocks_nothing():
     sensor = machine("UTM-30LX", motor_error=0.0)
     asked(sensor, b"MD0000108001000", 1)
     assert scanned(sensor).stamp_ms == 25
-    sensor.leave_out(1000 * MS)
+    sensor.skip_to(1000 * MS)
     assert sensor.next_ns() <= 1025 * MS
     assert scanned(sensor).stamp_ms >= 950

@@ -219,7 +219,7 @@ def test_absent_ports_and_ports_in_use_are_told(tmp_path):
 
 
 def test_a_port_where_no_lidar_answers(monkeypatch):
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.02)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 0.02)
     master, slave = os.openpty()
     try:
         with pytest.raises(DeviceTimeoutError, match="no SCIP sensor answers"):
@@ -250,7 +250,7 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     """A URG-04LX needs 216 kbit/s for ten scans; 115,200 is all that some adapters give."""
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     monkeypatch.setattr(SlowPort, "fastest", fastest)
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.4)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 0.4)
     with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         assert lidar._dialogue.line.stream.listens == lidar._dialogue.line.stream.baud == 115_200
         lidar.start()
@@ -272,7 +272,7 @@ class BadLine(byte_stream.SerialStream):
 
 def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.2)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 0.2)
     with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start()
         assert lidar._dialogue.line.stream.baud == 115_200
@@ -312,12 +312,12 @@ def test_a_reply_that_waits_for_a_late_host_counts(monkeypatch):
     told = protocol.reply(b"PP", "00", protocol.text_lines([("MODL", "x" * 500)]))
     monkeypatch.setattr(sensor_line, "open_stream", lambda _: AsleepStream(told))
     line = sensor_line.SensorLine("wire", protocol.LONGEST_REPLY)
-    (found,), _ = line.hear(protocol.Splitter().feed, time.monotonic() - 10.0)
+    (found,), _ = line.receive(protocol.Splitter().feed, time.monotonic() - 10.0)
     assert found.echo == b"PP"
     for waiting in (b"", b"x" * 100_000):
         line.stream = AsleepStream(waiting)
         with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
-            line.hear(protocol.Splitter().feed, time.monotonic() - 10.0)
+            line.receive(protocol.Splitter().feed, time.monotonic() - 10.0)
 
 
 class Chatter:
@@ -339,7 +339,7 @@ class Chatter:
 def test_endless_garbage_ends_in_a_timeout(monkeypatch):
     port = Chatter()
     monkeypatch.setattr(sensor_line, "open_stream", lambda _: port)
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.02)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 0.02)
     with pytest.raises(DeviceTimeoutError):
         ScipLidar("somewhere")
     assert port.closed

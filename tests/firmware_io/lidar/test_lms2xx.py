@@ -53,7 +53,7 @@ def test_an_emulator_answers_what_other_programs_ask():
     machine = VirtualLine("LMS 200", Wall()).machine
     for request, begins in OTHER_REQUESTS:
         asked = write_telegram(bytes.fromhex(request), address=0)
-        answer, _ = machine.hear(asked, machine.began_ns + 1)
+        answer, _ = machine.receive(asked, machine.began_ns + 1)
         assert answer[:3] == b"\x06\x02\x80"
         assert answer[5:].startswith(bytes.fromhex(begins)), request
     status = answer[5:]
@@ -233,12 +233,12 @@ def test_what_it_cannot_is_said(opened):
         lidar.read()
     lidar.start(skip=1)
     assert {lidar.read().scan.range_m.size for _ in range(4)} == {180}
-    with pytest.raises(DeviceError, match=r"calls itself 'LMS200;30106;V02\.30': not a LMS 291"):
+    with pytest.raises(DeviceError, match=r"reports type 'LMS200;30106;V02\.30': not a LMS 291"):
         open_lidar("virtual", "LMS 291")
 
 
 class VirtualPort(byte_stream.SerialStream):
-    """A virtual line on which both ends must have one speed: else the sensor hears nothing, and we hear noise."""
+    """A virtual line whose ends receive only noise, or nothing, at different baud rates."""
 
     def __init__(self, line):
         self.line, self.speed, self.answers_at = line, byte_stream.FIRST_BAUD, 0
@@ -285,16 +285,16 @@ def test_after_an_interruption_it_is_found_at_the_speed_that_it_has_by_then(monk
             line.unplug()
         if fault == "unplugged while it changes its speed":
             line.machine.power_cycle(line.now_ns - 10**9)
-            hear = line.machine.hear
+            receive = line.machine.receive
 
             def speed_answered_into_the_void(received, now_ns):
-                told, rest = hear(received, now_ns)
+                reply, rest = receive(received, now_ns)
                 if line.machine.baud == 500_000:
-                    line.machine.hear = hear
+                    line.machine.receive = receive
                     return b"", rest
-                return told, rest
+                return reply, rest
 
-            line.machine.hear = speed_answered_into_the_void
+            line.machine.receive = speed_answered_into_the_void
         began_ns = line.now_ns
         with pytest.raises(DeviceError):
             for _ in range(4):
@@ -308,7 +308,7 @@ def test_after_an_interruption_it_is_found_at_the_speed_that_it_has_by_then(monk
 
 
 class SlowPort(byte_stream.SerialStream):
-    """A real line, whose sensor hears what is sent at its own speed only."""
+    """A real line, whose sensor receives only bytes of its own baud rate."""
 
     machine = None
 
@@ -325,7 +325,7 @@ def test_the_speed_of_a_serial_line_is_found_and_raised_as_far_as_the_adapter_ca
     with lms_emulator(load_catalogue().products["LMS 200"], Wall()) as emulator:
         monkeypatch.setattr(SlowPort, "machine", emulator.machine)
         emulator.machine.baud = 19_200
-        monkeypatch.setattr(driver, "_ANSWER_S", 0.3)
+        monkeypatch.setattr(driver, "_REPLY_S", 0.3)
         with open_lidar(emulator.port, "LMS 200") as lidar:
             lidar.start()
             assert emulator.machine.baud == 38_400

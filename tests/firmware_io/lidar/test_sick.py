@@ -196,7 +196,7 @@ def test_a_busy_method_is_asked_again_and_other_codes_are_told_by_their_words():
 def test_a_sensor_of_unknown_name_wants_its_model():
     with emulator() as sensor:
         sensor.machine.lidar = sensor.machine.lidar.model_copy(update={"name": "LMS1xx"})
-        with pytest.raises(DeviceError, match=r"calls itself 'LMS1xx'.*name its model; known: LMS111"):
+        with pytest.raises(DeviceError, match=r"reports type 'LMS1xx'.*name its model; known: LMS111"):
             SickLidar(sensor.address)
         with SickLidar(sensor.address, "LMS111") as lidar:
             assert lidar.model == "LMS111"
@@ -335,5 +335,5 @@ def test_an_emulator_answers_what_other_programs_ask(model, dialogue):
     """The range of a TiM571: from -45 to 225 deg, in steps of a third of a degree cut to 0.3333."""
     machine = SickMachine(load_catalogue().get(model, Lidar), look, 0)
     for request, answer in dialogue:
-        got, rest = machine.hear(b"\x02" + request.encode() + b"\x03", 1_000_000_000)
+        got, rest = machine.receive(b"\x02" + request.encode() + b"\x03", 1_000_000_000)
         assert (got, rest) == (b"\x02" + answer.encode() + b"\x03", b""), request

@@ -43,7 +43,7 @@ DESCRIPTORS = [
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Emulators share a computer with the tests: wait ten times as long."""
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 2.0)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 2.0)
     monkeypatch.setattr(driver, "_START_S", 20.0)
     monkeypatch.setattr(driver, "_PAUSE_S", 2.0)  # what is lost after one is for `test_stalls`
     monkeypatch.setattr(world, "SPIN_UP_S", 1e-6)  # what happens meanwhile is for `test_spin_up`
@@ -83,9 +83,9 @@ def test_descriptors_are_those_that_are_published(published, told):
 def test_a_emulator_answers_published_requests_with_published_descriptors():
     emulator = slamtec_emulator(lidar("RPLIDAR A1"), ranging)
     for request, published, size in (("A5 50", DESCRIPTORS[0], 20), ("A5 52", DESCRIPTORS[1], 3)):
-        told, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
+        told, rest = emulator.machine.receive(bytes.fromhex(request), emulator.machine.began_ns)
         assert told[:7] == bytes.fromhex(published[0]) and (len(told), rest) == (7 + size, b"")
-    wrong, _ = emulator.machine.hear(bytes.fromhex("A5 82 05 00 00 00 00 00 23"), emulator.machine.began_ns)
+    wrong, _ = emulator.machine.receive(bytes.fromhex("A5 82 05 00 00 00 00 00 23"), emulator.machine.began_ns)
     assert wrong == b""
 
 
@@ -120,7 +120,7 @@ SDK_DIALOGUES = {
 def test_an_emulator_answers_what_the_makers_program_asks(model):
     emulator = slamtec_emulator(lidar(model), ranging)
     for request, answer in SDK_DIALOGUES[model]:
-        got, rest = emulator.machine.hear(bytes.fromhex(request), emulator.machine.began_ns)
+        got, rest = emulator.machine.receive(bytes.fromhex(request), emulator.machine.began_ns)
         assert got[: len(bytes.fromhex(answer))] == bytes.fromhex(answer), request
         assert bool(got) == bool(answer) and rest == b""
 
@@ -131,7 +131,7 @@ def test_a_serial_line_sends_no_faster_than_it_can():
         for number, mode in enumerate(identity.modes):
             command = protocol.SCAN if mode.kind == protocol.NODES else protocol.EXPRESS_SCAN
             request = protocol.request(command, bytes([number, 0, 0, 0, 0]))
-            emulator.machine.hear(request, emulator.machine.began_ns)
+            emulator.machine.receive(request, emulator.machine.began_ns)
             sent = [one for _ in range(60) for one in emulator.machine.next_packets()]
             bytes_s = sum(len(data) for _, data in sent[1:]) * 1e9 / (sent[-1][0] - sent[0][0])
             assert bytes_s < 1.0001 * identity.baud / 10, (model, mode.name)
@@ -172,7 +172,7 @@ def test_a_cabin_is_read_by_its_bits():
 def stream_of(model, mode, turns=0.3):
     emulator = slamtec_emulator(lidar(model), ranging)
     start = protocol.request(protocol.EXPRESS_SCAN, bytes([mode, 0, 0, 0, 0]))
-    emulator.machine.hear(start, emulator.machine.began_ns)
+    emulator.machine.receive(start, emulator.machine.began_ns)
     data = b""
     while len(data) < 84 * 12 * turns:
         data += b"".join(packet for _, packet in emulator.machine.next_packets())
@@ -278,7 +278,7 @@ def test_bad_capsules_are_counted_and_never_handed_out(model):
 
 def test_it_may_scan_already_and_comes_back_after_an_unplug_and_a_brown_out():
     with slamtec_emulator(lidar("RPLIDAR C1"), ranging) as emulator:
-        emulator.machine.hear(protocol.request(protocol.SCAN), time.monotonic_ns())
+        emulator.machine.receive(protocol.request(protocol.SCAN), time.monotonic_ns())
         with open_lidar(emulator.port, "RPLIDAR C1") as ours:
             ours.start()
             ours.read()

@@ -73,26 +73,25 @@ def test_a_wall_that_lies_in_a_face_of_the_voxels_does_not_pull():
 
 
 def test_the_angle_set_tells_what_the_pair_alone_cannot_know():
-    """A wrong calibration moves the pose by many stated sigmas, unless its covariance is told."""
+    """A wrong calibration moves the pose by many stated sigmas, unless its covariance is given."""
     rng = np.random.default_rng(3)
     boxes = room()
     poses = [frames.rigid(frames.Rz(k * 0.4), [0.4 * k, 0.2 * k, 1.0]) for k in range(2)]
     wrong = np.array([*np.radians([0.15, -0.15]), 0.0, 0.0])
     clouds = [faulty_scan(rng, boxes, T, 240, 361, 0.003, wrong) for T in poses]
     start = np.linalg.inv(poses[0]) @ poses[1]
-    untold = adjust(*(make_view("", points, 0.1).beams for points, _ in clouds), start, 0.1)
+    exact = adjust(*(make_view("", points, 0.1).beams for points, _ in clouds), start, 0.1)
     angles = scanner(np.array([*np.radians([0.15, 0.15]), 1e-4, 1e-4]))
-    told = adjust(*(make_view("", points, 0.1, angles, joint).beams for points, joint in clouds), start, 0.1)
-    errors = [motion(start, found.T_a_b) for found in (untold, told)]
-    squared = [
-        error @ np.linalg.solve(found.covariance, error) for error, found in zip(errors, (untold, told), strict=True)
-    ]
+    uncertain = adjust(*(make_view("", points, 0.1, angles, joint).beams for points, joint in clouds), start, 0.1)
+    results = (exact, uncertain)
+    errors = [motion(start, result.T_a_b) for result in results]
+    squared = [error @ np.linalg.solve(result.covariance, error) for error, result in zip(errors, results, strict=True)]
     assert squared[0] > 60
     assert squared[1] < 25
     assert np.linalg.norm(errors[1]) < np.linalg.norm(errors[0]) / 2
 
 
-def test_a_box_that_was_moved_between_the_stands_is_left_out():
+def test_a_box_that_was_moved_between_the_scans_is_left_out():
     poses = [frames.rigid(np.eye(3), [0, 0, 1.0]), frames.rigid(frames.Rz(0.2), [0.3, 0.2, 1.1])]
     box = np.array([[[2.0, -1.0, 0.0], [3.0, 1.0, 2.0]]])
     clouds = []
@@ -111,8 +110,8 @@ def test_pieces_lie_on_the_walls():
     views = [make_view(str(k), scan(shell(5.1, 4.1, 3), pose, 240, 361, k, 0.005), 0.1) for k in range(2)]
     points = np.concatenate([view.beams.voxels_m for view in views])
     counts = np.concatenate([view.beams.counts for view in views])
-    ours = np.arange(len(points)) < len(views[0].beams.counts)
-    cells = find_cells(points, counts, ours, np.zeros((2, 3)), 0.1)
+    of_first = np.arange(len(points)) < len(views[0].beams.counts)
+    cells = find_cells(points, counts, of_first, np.zeros((2, 3)), 0.1)
     x, y, z = np.abs(cells.centre_m - [0, 0, 0.5]).T
     off = np.min([np.abs(x - 5.1), np.abs(y - 4.1), np.abs(z - 1.5)], axis=0)
     large = cells.edge_m > 0.3
@@ -128,7 +127,7 @@ def test_what_cannot_be_told_of_the_calibration_is_one_line(command, tmp_path):
     calibrated, designed = tmp_path / "calibrated.json", tmp_path / "designed.json"
     calibrated.write_text(scanner().to_json())
     designed.write_text(scanner().model_copy(update={"covariance": None}).to_json())
-    for angles, says in ((designed, "states no covariance"), (calibrated, "a: no column joint_rad")):
+    for angles, says in ((designed, "has no covariance"), (calibrated, "a: no column joint_rad")):
         code, _, complaints = command("register", *clouds, "-o", tmp_path / "map.ply", "--angles", angles)
         assert code == 2
         assert len(complaints) == 1

@@ -127,7 +127,7 @@ def test_roundings_do_not_line_up_where_a_question_comes_with_every_step(monkeyp
     servo = RoundingServo(clock)
     axis = axis_thread.AxisThread(Spin(period_s=2 * math.pi / servo.rate_rad_s), 0.0, servo.step_rad)
     axis_thread._follow(servo, axis, clock)
-    heard = axis.hear()
+    heard = axis.receive()
     assert len(heard) > 90
     time_ns = np.array([state.time_ns for state in heard])
     log = JointLog(time_ns, np.array([state.position_rad for state in heard]))
@@ -143,7 +143,7 @@ def test_an_angle_is_left_out_if_this_process_was_stopped_while_it_was_asked_for
         axis.received.put(ServoState(k * 10_000_000, 500_000, 0.01 * k, 1.0, 0.0, 12.0, 30.0))
     half_ns = round(stopped_s / 2 * 1e9)
     axis.received.put(ServoState(10**9 + half_ns, half_ns, 1.0, 1.0, 0.0, 12.0, 30.0))  # it was read as the stop began
-    assert len(axis.hear()) == 100
+    assert len(axis.receive()) == 100
     assert dict(axis.left_out) == {"servo angles with uncertain timestamp": 1}
 
 
@@ -168,7 +168,7 @@ def test_an_order_that_was_not_answered_is_given_again(monkeypatch, deaf):
     servo = ForgetfulServo(clock, deaf)
     axis = axis_thread.AxisThread(Sweep(limits_deg=(-10, 10), period_s=1.0, accel_deg_s2=5000.0), 0.0, servo.step_rad)
     axis_thread._follow(servo, axis, clock)
-    assert len(axis.hear()) > 90  # no error among them
+    assert len(axis.receive()) > 90  # no error among them
     goals = [goal for index, goal in enumerate(servo.orders) if not deaf or index % 2]
     assert len(goals) >= 2 and goals == [math.radians(sign * 10) for sign in (-1, 1, -1, 1, -1)][: len(goals)]
 

@@ -199,7 +199,7 @@ def test_the_disk_is_full(drill, monkeypatch):
     monkeypatch.setattr(recorder, "CHUNK_S", 0.01)  # the recorder's thread runs in real time, the rest does not
     one.happens(3.0, lambda: full.append(True))
     assert one.run() == 3
-    assert "No space left on device; what came before is on the disk: free space, then `scanwright repair" in one.told
+    assert "No space left on device; earlier data are on the disk: free space, then `scanwright repair" in one.told
     assert OFF in one.told and not one.torque()
     full.clear()
     summary = repair(one.file)

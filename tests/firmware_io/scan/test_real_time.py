@@ -145,7 +145,7 @@ def test_a_servo_that_did_not_answer_is_not_said_to_stand(out, emulators):
 
 
 def test_the_doctor_says_what_is_wrong_and_the_remedy(emulators, command, monkeypatch):
-    monkeypatch.setattr(dialogue, "_ANSWER_S", 0.1)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 0.1)
     monkeypatch.setattr("scanwright.firmware_io.device_ports.list_ports.comports", lambda: [])
     assert command("doctor")[0] == 1
     code, said, _ = command("doctor", "--lidar", emulators.ports.servo, "--servo", "no-such-port")

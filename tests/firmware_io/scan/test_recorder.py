@@ -113,7 +113,7 @@ def test_a_full_disk_keeps_what_was_there_and_says_what_to_do(tmp_path):
     resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, hard))  # like a full disk, it cuts a write in the middle
     written, deadline = 0, time.monotonic() + 200
     try:
-        with pytest.raises(DeviceError, match=r"cannot write: .*; what came before is on the disk") as caught:  # noqa: SIM117
+        with pytest.raises(DeviceError, match=r"cannot write: .*; earlier data are on the disk") as caught:  # noqa: SIM117
             with Recorder(path, {}, {}) as recorder:
                 while time.monotonic() < deadline:
                     recorder.joint(time.monotonic_ns(), 0.0)

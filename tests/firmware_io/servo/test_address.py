@@ -53,7 +53,7 @@ def test_a_kept_setting_outlasts_the_power_of_a_servo_with_a_lock(command, virtu
         ([("MX-28", 3)], ("--id", "3", "--from-id", "1"), "a servo 3 answers at 57600 baud already; nothing was"),
         ([], ("--id", "7", "--dry-run"), "--id and --baud, --undo, --scanner and --dry-run: choose one of these"),
         ([], ("--id", "253"), "--id = 253: servos have numbers from 0 to 252"),
-        ([], ("--baud", "123456"), "123456 baud: MX-64R knows 9600, 19200"),
+        ([], ("--baud", "123456"), "123456 baud: MX-64R supports 9600, 19200"),
         ([], ("--id", "2", "--from-id", "9"), "servo 9 does not answer"),
     ],
 )

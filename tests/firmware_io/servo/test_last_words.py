@@ -110,11 +110,11 @@ def test_a_servo_is_said_to_hold_when_it_has_answered_so(hears):
         scans.next()
     assert servo.held >= 1
     assert ("the servo has answered that it holds" in said[0]) == hears
-    assert ("the servo has not answered that it stands: look, and cut its power" in said[0]) != hears
+    assert ("the servo did not confirm that it stopped: check it, and cut its power" in said[0]) != hears
 
 
 def test_a_servo_that_does_not_answer_at_all_is_not_waited_for_for_ever(monkeypatch):
-    monkeypatch.setattr(axis_thread, "_STOP_ANSWER_S", 0.0)
+    monkeypatch.setattr(axis_thread, "_STOP_REPLY_S", 0.0)
     assert not axis_thread.AxisThread(Spin(period_s=2.0), 0.0, 0.001).stop()
 
 
@@ -136,7 +136,7 @@ def test_ctrl_c_waits_for_the_thread_that_could_turn_the_servo_again():
     ("interrupt", "says"),
     [
         (lambda *_: (_ for _ in ()).throw(KeyboardInterrupt), "the servo was not started"),
-        (None, "state of the servo unknown: look, and cut its power if it turns"),
+        (None, "state of the servo unknown: check it, and cut its power if it turns"),
     ],
 )
 def test_ctrl_c_before_the_servo_is_opened_claims_nothing_of_it(tmp_path, command, monkeypatch, interrupt, says):
@@ -158,6 +158,6 @@ def test_ctrl_c_before_the_servo_is_opened_claims_nothing_of_it(tmp_path, comman
 
 def test_the_guard_that_was_dismissed_is_told_nothing_more():
     watch = object.__new__(guard.Guard)
-    watch._words = io.BytesIO()
-    watch._words.close()
+    watch._messages = io.BytesIO()
+    watch._messages.close()
     assert not watch.turning()

@@ -401,7 +401,7 @@ def test_the_guard_stops_a_servo_whose_program_leaves_without_a_word(pair):
     slave, heard, reply = pair
     watch = guard.Guard(slave, b"off", b"ack")
     assert watch.turning()
-    watch._words.close()  # what the kernel does for a killed program
+    watch._messages.close()  # what the kernel does for a killed program
     until(lambda: len(heard) >= 2)  # not answered: it insists
     reply[0] = b"xackx"
     watch.dismiss(at_rest=False)

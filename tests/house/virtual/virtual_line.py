@@ -43,7 +43,7 @@ class VirtualLine(OnClock):
 
     def write(self, data):
         self._here()
-        told, self._received = self.machine.hear(self._received + data, self.now_ns)
+        told, self._received = self.machine.receive(self._received + data, self.now_ns)
         if self.machine.scanning is not self._scanning:
             self._scanning = self.machine.scanning
             self._coming.clear()
@@ -53,7 +53,7 @@ class VirtualLine(OnClock):
     def read(self, timeout_s):
         self._here()
         end_ns = self.now_ns + max(round(timeout_s * 1e9), 0)
-        self.machine.leave_out(self.now_ns - _BUFFER_NS)
+        self.machine.skip_to(self.now_ns - _BUFFER_NS)
         while not (self._coming and self._coming[0][0] <= end_ns) and self.machine.next_ns() <= end_ns:
             self.now_ns = max(self.now_ns, self.machine.next_ns() - _AHEAD_NS)  # nobody knows where the axis is then
             self._here()

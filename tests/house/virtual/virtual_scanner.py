@@ -11,7 +11,7 @@ from virtual_time import VirtualTime
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.motion import Spin
-from scanwright.firmware_io.emulators.world import looking, range_model, room
+from scanwright.firmware_io.emulators.world import range_model, room, scene_ranging
 from scanwright.firmware_io.lidar import sensor_line
 from scanwright.firmware_io.lidar.scip import driver as scip
 from scanwright.firmware_io.scan import acquire, axis_thread, doctor
@@ -34,7 +34,7 @@ class VirtualScanner:
         self.servo = VirtualServo(angles.servo, clock=self.clock, seed=seed, angle_rad=angle_rad)
         self.servo.set_up(spins=isinstance(angles.motion, Spin))
         lidar = load_catalogue().get(angles.sensor, Lidar)
-        ranging = looking(room(None), angles, self.servo.servo.axis.angle_rad, range_model(lidar), seed)
+        ranging = scene_ranging(room(None), angles, self.servo.servo.axis.angle_rad, range_model(lidar), seed)
         self.lidar = VirtualLine(angles.sensor, ranging, self.clock)
         if angles.sensor.startswith("LMS 2"):
             self.lidar.machine.baud = 500_000  # this line has no speed that a driver could change

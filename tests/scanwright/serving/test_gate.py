@@ -3,6 +3,7 @@
 import http.client
 import random
 import time
+from socket import IPPROTO_TCP
 
 import msgspec
 import pytest
@@ -12,7 +13,7 @@ from websockets.sync.client import connect
 
 from scanwright.design.errors import TaskError
 from scanwright.serving.gate import Gate
-from scanwright.serving.handshake import MOST_VISITORS
+from scanwright.serving.handshake import MOST_VISITORS, bound
 from scanwright.serving.page_server import guarded_server
 
 CAMERA = {
@@ -213,6 +214,11 @@ def test_only_so_many_visitors_get_in(page):
         talk(gate)
     for socket in sockets:
         socket.close()
+
+
+def test_small_messages_are_sent_at_once():
+    with bound(0) as listening:
+        assert listening.proto == IPPROTO_TCP  # by which asyncio decides
 
 
 def test_a_port_that_is_taken_is_said_in_one_line(page):
