@@ -57,7 +57,7 @@ def search_trials(loaded: LoadedTask, progress: Progress) -> Iterator[Trial]:
     variants = _variants(loaded.task.angles, steps)
     search(problems[0], loaded.task.angles.model_copy(update={"step_deg": STEPS_DEG[0]}))  # compiles
     J, seconds = np.empty((len(variants), TASKS)), np.empty((len(variants), TASKS))
-    done: dict[tuple[float, Effort, int], tuple[float, float]] = {}  # every choice has the usual search among its own
+    done: dict[tuple[float, Effort, int], tuple[float, float]] = {}  # all choices contain the default search
     for i, variant in enumerate(variants):
         progress(f"{variant.choice}: {variant.setting}", i / len(variants))
         for k, problem in enumerate(problems):

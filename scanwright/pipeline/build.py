@@ -72,10 +72,10 @@ BEGINS = {
     "writing bom.csv": 0.75,
     "writing report.html": 0.83,
 }
-"""Share of a build's time after the search that has gone when a step begins, by its first words.
+"""Share of the build's time after the search that has passed at the start of each step, by the step's first words.
 
-Measured on two cores with `ground_ahead`, `indoor_urg` and `rolling`. How long search and kernel take differs: the time
-left is estimated once a tenth is done, when the parts are chosen.
+Measured on two cores with `ground_ahead`, `indoor_urg` and `rolling`. The times of the search and of the kernel's start
+vary, so the remaining time is estimated only from a share of a tenth on, when the parts are chosen.
 """
 
 
@@ -305,7 +305,7 @@ def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> 
 
 
 def measured(progress: Progress, step: str, fraction: float | None = None, /) -> None:
-    """Report a step of a build with the share of the build that is done; none if `BEGINS` does not have the step."""
+    """Report a step of a build with the share of the build that is done, or None for a step that is not in `BEGINS`."""
     begins = next((share for words, share in BEGINS.items() if step.startswith(words)), None)
     if begins:
         ends = next((share for share in BEGINS.values() if share > begins), 1.0)

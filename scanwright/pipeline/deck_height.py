@@ -1,4 +1,4 @@
-"""The height of the optical centre above the robot's deck: as built, and as the task has it."""
+"""The height of the optical centre above the robot's deck: as built and as given in the task."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scanwright.design.findings import Finding
 from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.robot_around import robot_around
 
-CLOSE_MM = 10.0  # a larger difference moves the robot in the masks visibly
+CLOSE_MM = 10.0  # a larger difference changes the masks noticeably
 
 
 def deck_height(loaded: LoadedTask, angles: AngleSet) -> Finding:

@@ -434,14 +434,14 @@ def test_warnings_of_one_remedy_are_one_unless_asked_for_in_full(tmp_path):
     found = [Finding("turn_from_metal", "note", "shaft", "shaft: of metal", hint="have it turned")]
     checks = tuple(Finding("unverified", "note", "UTM", f"UTM: {v} is not verified") for v in ("a = 1", "b = 2"))
     told = SimpleNamespace(table=list, lines=list, hole_lines=lambda **_: [], preferred_lines=list)
-    made = Made(told, told, told, tuple(found), told, "", "")
-    first, _, _, *gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
+    made = Made(told, told, told, tuple(found), told, "")
+    first, _, *gathered = Build(tmp_path, ("one",), ("slow",), checks, made).lines()
     assert first == f"wrote 1 files to {tmp_path}"
     assert gathered[0] == "warning: slow"
     assert gathered[1] == "note: shaft: of metal: have it turned"
     assert gathered[2].startswith("warning: unverified values shape parts (UTM: 2")
     assert len(gathered) == 3
-    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[3:] == [
+    assert Build(tmp_path, ("one",), (), checks, made).lines(in_full=True)[2:] == [
         "note: shaft: of metal: have it turned",
         "note: UTM: a = 1 is not verified",
         "note: UTM: b = 2 is not verified",
