@@ -56,13 +56,13 @@ def _unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
     for field in product.unverified():
         if f"{product.kind}.{field}" in shaping:
             value, source = _shown(getattr(product, field)), provenance[field].source
-            message = f"{product.name}: {field} = {value} is not verified ({source})"
+            message = f"{product.name}: {field}{value} is not verified ({source})"
             hint = f"{how_to_measure(field)}: it shapes {shaping[f'{product.kind}.{field}']}"
             yield Finding("unverified", "warning", product.name, message, hint=hint)
 
 
 def _shown(value: object) -> str:
     if isinstance(value, tuple) and value and isinstance(value[0], Hole):
-        return what_holds(value)
+        return f" = {what_holds(value)}"
     text = str(list(value)) if isinstance(value, tuple) else str(value)
-    return text if len(text) < SHOWN_CHARS else f"{text[: SHOWN_CHARS - 3]}..."
+    return f" = {text}" if len(text) < SHOWN_CHARS else ""

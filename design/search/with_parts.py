@@ -86,7 +86,8 @@ class Chosen:
         """Return the chosen mount, and the rejected ones with reasons."""
         lines = [
             f"built {angles_words(self.family.angles_deg)}: J = {self.bare.J:.4f} without parts; "
-            f"considered {self.bounded} mounts, built {self.built}, rejected {len(self.refused)}",
+            f"considered {self.bounded} mount{'s' * (self.bounded != 1)}, built {self.built}, "
+            f"rejected {len(self.refused)}",
             *(f"{each.what} rejected: {each.why}" for each in self.left_out()),
         ]
         if self.worse:

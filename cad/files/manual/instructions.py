@@ -16,7 +16,7 @@ from scanwright.cad.layout.joints import DECK_MM, Joint
 from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
 from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
-from scanwright.design.catalogue.measuring import measure_first
+from scanwright.design.catalogue.measuring import WITH_CALIPER, measure_first
 from scanwright.design.electrics.wiring import network_of, uart_adapter
 from scanwright.design.scanner import Scanner
 
@@ -191,4 +191,5 @@ def _to_measure(assembly: Assembly) -> Iterator[str]:
     for product in products_of(assembly.layout.scanner, assembly.layout.drive):
         fields = {field for name in assembly.made for field in assembly.parts[name].values_of(product)}
         if sentence := measure_first(product, *fields, "holes", *HORN_FIELDS):
-            yield from (sentence, "")
+            drawn = f" `scanwright catalogue '{product.name}' --sketch FILE.svg` shows where."
+            yield from (f"{sentence}{drawn * (WITH_CALIPER in sentence)}", "")
