@@ -27,9 +27,8 @@ _EVER_NS = 2**62  # half of an int64: differences of two times still fit
 class PosePieces(NamedTuple):
     """Poses factored for the kernel.
 
-    Between two of them, at the fraction u in [0, 1]:
-        p_map = R_then Rz(u turn) (R_first p + t_first) + t_then + u shift
-    with p rotated by the joint; if `moves` is false, p_map = R_first p + t_first.
+    Between two of them, at the fraction u in [0, 1], with p rotated by the joint, p_map = R_then Rz(u turn)
+    (R_first p + t_first) + t_then + u shift; if `moves` is false, p_map = R_first p + t_first.
     """
 
     time_ns: Times  # (k + 1,)

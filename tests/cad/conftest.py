@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from scanwright.cad.files.part_files import build_parts
+from scanwright.design.progress import no_progress
 
 sys.path.insert(0, str(Path(__file__).parent))  # scanners.py
 
@@ -20,7 +21,7 @@ def built_once(once, parts_of):
 
     def build(scanner):
         def made(folder):
-            return folder, build_parts(scanner, folder, lambda _: None, anywhere)
+            return folder, build_parts(scanner, folder, no_progress, anywhere)
 
         return once(f"files of parts {scanner}", made)
 

@@ -1,10 +1,12 @@
 """`scanwright repair`: all intact messages of a damaged recording, in a new file with a new index.
 
 An MCAP file is a chain of records (https://mcap.dev/spec).
+
 - Messages are in chunks with a checksum of their content. Opcode, lengths, sizes, times and compression name of a chunk
   may be damaged: all possible values are tried until the checksum fits.
 - Topics and types are in chunks, and also in the summary at the end, which has its own checksum.
 - A broken chain continues where two consecutive records can be read completely.
+
 A file is intact only if all of that is valid, indexes are correct, and other readers read it.
 Unusable input raises RecordingError.
 """

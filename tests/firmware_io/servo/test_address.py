@@ -51,7 +51,11 @@ def test_a_kept_setting_outlasts_the_power_of_a_servo_with_a_lock(command, virtu
     [
         ([("MX-28", 3)], ("--id", "7"), "several servos answer (1 at 57600 baud, 3 at 57600 baud): leave one"),
         ([("MX-28", 3)], ("--id", "3", "--from-id", "1"), "a servo 3 answers at 57600 baud already; nothing was"),
-        ([], ("--id", "7", "--dry-run"), "--id and --baud, --undo, --scanner and --dry-run: choose one of these"),
+        (
+            [],
+            ("--id", "7", "--dry-run"),
+            "--id and --baud, --undo, --centre, --scanner and --dry-run: choose one",
+        ),
         ([], ("--id", "253"), "--id = 253: servos have numbers from 0 to 252"),
         ([], ("--baud", "123456"), "123456 baud: MX-64R supports 9600, 19200"),
         ([], ("--id", "2", "--from-id", "9"), "servo 9 does not answer"),
