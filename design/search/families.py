@@ -240,10 +240,7 @@ def refine_candidates(
     if MOST_RUNS[rounds] > 1:  # with a tolerance of the mounting the first run has the lowest J within it
         k = 0 if space.ranges.tolerance_deg else int(np.argmin([family.score.J for family in ready]))
         ready[k] = finished(descend(space, apart[k], NARROW), NARROW.nodes)
-    families: list[Family] = []
-    for family in sorted(ready, key=lambda family: family.score.J):
-        if _is_apart(family.angles_deg, family.score.J, families):
-            families.append(family)
+    families = list(joined(tuple(ready)))
     for candidate in candidates:
         if candidate.score is None and _is_apart(candidate.angles_deg, candidate.J_coarse, families):
             result = space.score(candidate.angles_deg)
@@ -251,6 +248,15 @@ def refine_candidates(
     if space.ranges.tolerance_deg:
         return _by_the_worst(space, families)
     return tuple(sorted(families, key=lambda family: family.score.J))
+
+
+def joined(*results: tuple[Family, ...]) -> tuple[Family, ...]:
+    """Return the families of several results, at most one in each valley, the lowest J first."""
+    families: list[Family] = []
+    for family in sorted(chain.from_iterable(results), key=lambda family: family.score.J):
+        if _is_apart(family.angles_deg, family.score.J, families):
+            families.append(family)
+    return tuple(families)
 
 
 def same_valley(angles_deg: Setting, J: float, other_deg: Setting, other_J: float) -> bool:

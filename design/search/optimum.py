@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
@@ -22,7 +21,7 @@ from scanwright.design.progress import Progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.gain import Gain, gain_lines, gains
 from scanwright.design.search.mounts.reference import TunedMount, angles_used, reference_mounts
-from scanwright.design.search.search import SearchResult, search
+from scanwright.design.search.search import SearchResult, search, with_starts
 from scanwright.design.search.shortest_period import fastest
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import LoadedTask
@@ -39,17 +38,14 @@ class Optimum:
         loaded: the same with the result of a search for the shortest period.
         problem: the same as numbers.
         search: result of the search.
+        mounts: the reference mounts, tuned to the task.
     """
 
     requested: LoadedTask
     loaded: LoadedTask
     problem: Problem
     search: SearchResult
-
-    @cached_property
-    def mounts(self) -> tuple[TunedMount, ...]:
-        """The reference mounts, tuned to the task."""
-        return reference_mounts(self.problem, self.loaded.task)
+    mounts: tuple[TunedMount, ...]
 
     @property
     def title(self) -> str:
@@ -210,9 +206,14 @@ def find_optimum(loaded: LoadedTask, progress: Progress) -> Optimum:
     else:
         problem = problem_of(loaded)
         result = search(problem, loaded.task.angles, progress, loaded.task.limits)
+    task = result_task.task
+    progress("tuning the reference mounts")
+    mounts = reference_mounts(problem, task)
+    starts = [mount.angles_deg for mount in mounts if mount.in_ranges]
+    result = with_starts(problem, task.angles, task.limits, result, starts, progress)
     best = result.best[0]
     require_counted(result_task, best.angles_rad, best.score)
-    return Optimum(loaded, result_task, problem, result)
+    return Optimum(loaded, result_task, problem, result, mounts)
 
 
 def directions_left_out(problem: Problem) -> list[LeftOut]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,14 @@ from scanwright.design.objective.problem import Problem
 from scanwright.design.progress import Progress, no_progress
 from scanwright.design.search.coarse import USUAL, Effort, Landscape, coarse_landscape
 from scanwright.design.search.constraints import blinding_words
-from scanwright.design.search.families import Candidate, Family, best_candidate, find_candidates, refine_candidates
+from scanwright.design.search.families import (
+    Candidate,
+    Family,
+    best_candidate,
+    find_candidates,
+    joined,
+    refine_candidates,
+)
 from scanwright.design.search.mounts.simplest import simplest_first
 from scanwright.design.search.plane_axis_product import lowest
 from scanwright.design.search.space import SearchSpace
@@ -107,6 +115,39 @@ def search(
         lowest=families[0] if simple else None,
         planes=_plane_table(land),
         axes=np.column_stack([axes.settings_deg, land.plain.by_axis[axes.flip.astype(int), axes.classes]]),
+    )
+
+
+def with_starts(
+    problem: Problem,
+    ranges: AngleRanges,
+    limits: Limits,
+    result: SearchResult,
+    starts: Iterable[tuple[float, ...]],
+    progress: Progress = no_progress,
+) -> SearchResult:
+    """Return the result of a search after refinement of those starts [deg] that are better than its lowest J.
+
+    A region can be free of blind spots only at mounts between those of the grid. With a tolerance of the mounting the
+    result stays, since its best mount does not have the lowest J.
+    """
+    space = SearchSpace(problem, ranges, limits, avoid_holes=ranges.holes == "avoid" and result.least_blind is None)
+    lowest = min(result.best, key=lambda family: family.score.J).score
+    better = []
+    for start in [] if ranges.tolerance_deg else starts:
+        own = space.score(np.array(start))
+        if own is not None and own.J + own.J_error < lowest.J - lowest.J_error:
+            better.append(Candidate(np.array(start), own.J, own, 1, 1, False))
+    if not better:
+        return result
+    families = joined(refine_candidates(space, better, USUAL.rounds, progress), result.best)
+    simple = ranges.prefer == "simple"
+    plain = result.plain if result.plain is not None and result.plain.score.J < families[0].score.J else None
+    return replace(
+        result,
+        best=simplest_first(space, families) if simple else families,
+        lowest=families[0] if simple else None,
+        plain=plain,
     )
 
 

@@ -1,5 +1,6 @@
 """The folded search against an unfolded loop over every setting; `benchmarks/design/claims.py` draws settings too."""
 
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -13,9 +14,9 @@ from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import quick_J, score
 from scanwright.design.search import coarse, families
-from scanwright.design.search.search import search
+from scanwright.design.search.search import search, with_starts
 from scanwright.design.task.angle_ranges import NAMES
-from scanwright.design.task.task import LoadedTask, Task, load_task
+from scanwright.design.task.task import Limits, LoadedTask, Task, load_task
 
 AHEAD = {
     "weight": [{"shape": "band", "theta_deg": [95, 150], "phi_deg": [-60, 60]}],
@@ -154,6 +155,20 @@ def test_refinement_never_makes_it_worse(monkeypatch):
 
 
 @pytest.mark.usefixtures("unrefined")
+def test_a_start_that_is_better_replaces_the_result_and_a_worse_one_does_not():
+    problem, ranges = CASES["a fan without symmetry, axis fixed"]
+    full = search(problem, ranges)
+    best = full.best[0]
+    lacking = replace(full, best=full.best[1:])
+    assert with_starts(problem, ranges, Limits(), lacking, [full.best[2].angles_deg]) is lacking
+    mended = with_starts(problem, ranges, Limits(), lacking, [full.best[2].angles_deg, best.angles_deg])
+    assert mended.best[0].score.J == pytest.approx(best.score.J, abs=1e-5)
+    assert {family.angles_deg for family in mended.best[1:]} <= {family.angles_deg for family in lacking.best}
+    assert [family.score.J for family in mended.best] == sorted(family.score.J for family in mended.best)
+    dense = Limits(min_density=best.score.least + 1)  # which the start does not have
+    assert with_starts(problem, ranges, dense, lacking, [best.angles_deg]) is lacking
+
+
 def test_all_is_covered_with_fewer_evaluations():
     problem, ranges = case(AHEAD, {"step_deg": 15})
     found = search(problem, ranges)
