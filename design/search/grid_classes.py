@@ -77,7 +77,7 @@ def fold_planes(ranges: AngleRanges, mirrors: Float[ndarray, "mirrors 2 2"]) -> 
 
 
 def unfolded(ranges: AngleRanges) -> tuple[Folded, Folded]:
-    """Return axes and scan planes of the grid, each in a class of its own, for a sweep, which has no symmetries."""
+    """Return axes and scan planes of the grid, one in each class, for a sweep, which has no symmetries."""
     axes = _grid(ranges, "alpha_rot", "beta_rot")
     planes = _grid(ranges, "alpha_laser", "beta_laser")
     return _apart(axes, R_world_rot(*np.radians(axes.T))[:, :, 2]), _apart(planes, plane_key(np.radians(planes)))

@@ -66,7 +66,7 @@ def lowest(
     plain, feasible = _Running.over(closed_plane, closed_axis), _Running.over(closed_plane, closed_axis)
 
     def after(planes: slice) -> tuple[_Running, _Running]:
-        """Return the minima after some of the planes; each thread has planes, and minima about axes, of its own."""
+        """Return the minima after some of the planes; each thread has separate planes and minima about axes."""
         of_all, of_feasible = plain.with_own_axes(), feasible.with_own_axes()
         for part in _slices(0, has_axis.shape[1], PART):
             for piece in _slices(planes.start, planes.stop, PIECE):

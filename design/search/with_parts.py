@@ -91,7 +91,7 @@ class Chosen:
             *(f"{each.what} rejected: {each.why}" for each in self.left_out()),
         ]
         if self.worse:
-            lines.append(f"{self.worse} more mounts with a lower J without parts lose more beams to their parts")
+            lines.append(f"mounts with a lower J without parts that lose more beams to their parts: {self.worse}")
         if self.open:
             lines.append(f"{self.open} more mounts can be better with their parts, but were not built")
         return lines

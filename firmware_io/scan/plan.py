@@ -142,7 +142,7 @@ def _with_period(motion: Motion, period_s: float) -> Motion:
     try:
         return type(motion).model_validate(motion.model_dump() | {"period_s": period_s})
     except ValidationError as error:
-        why = error.errors()[0]["msg"].removeprefix("Value error, ")
+        why = error.errors()[0]["msg"].removeprefix("Value error, ").removeprefix(f"period_s = {period_s:g}: ")
         raise ScanwrightError(f"period_s = {period_s:g}: {why}") from None
 
 

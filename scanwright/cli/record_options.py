@@ -19,7 +19,7 @@ def record_options(record: type[Any], *own: str, **metavars: str) -> Callable[[C
 
     Args:
         record: a dataclass whose docstring describes each field in one line.
-        own: fields for which the command has options of its own.
+        own: fields for which the command declares the options itself.
         metavars: placeholder of the value in the help; by default the unit at the end of the field's name.
     """
     described = dict(re.findall(r"^ +(\w+): (.*?)\.?$", record.__doc__ or "", re.MULTILINE))

@@ -152,7 +152,7 @@ def _least_squares(
 
 
 def _weights(sums: Floats, on: Int64[ndarray, " m"]) -> Float64[ndarray, " m"]:
-    """Return one over the variance of a range [m^-2] for each piece, from the residuals to a plane of its own."""
+    """Return one over the variance of a range [m^-2] for each piece, from the residuals to its fitted plane."""
     rest = np.maximum(_without_plane(sums)[:, -1, -1], 0.0)
     freedom = np.maximum(on - 3, 0)
     usual = float(np.median(rest[freedom > 0] / freedom[freedom > 0]))

@@ -131,5 +131,9 @@ def test_the_share_that_masks_hide_of_each_region_is_that_of_a_count(seed):
     assert left.message.startswith("the robot hides ") and left.message.endswith(" to the left")
     assert right.value == pytest.approx(expected, abs=0.004) and right.message.endswith(" to the right")
     assert [each.severity for each in (left, right)] == ["warning" if expected > MOST_HIDDEN else "note"] * 2
+    near = ground | {"from_m": 0.1, "to_m": 0.4, "width_m": width_m}
+    behind = Task.model_validate(task | {"weight": [near], "mask": [top | {"to_m": 0.3}]})
+    (most,) = hidden_regions(LoadedTask(behind, Path(), load_catalogue(), ()))
+    assert most.severity == "warning" and most.value > MOST_HIDDEN and "move the scanner" in most.hint
     bare = LoadedTask(loaded.task.model_copy(update={"mask": ()}), Path(), loaded.products, ())
     assert hidden_regions(bare) == ()

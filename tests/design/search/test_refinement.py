@@ -53,6 +53,15 @@ def test_it_takes_no_more_values_than_it_may(most):
     assert rosen(found) == lowest == min([*values, *(rosen(point) for point in taken)])
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_simplex_whose_mounts_are_all_rejected_ends():
+    corners = np.array([[3.0, 3.0], [3.001, 3.0], [3.0, 3.001]])
+    _, lowest = lowest_by_simplex(
+        lambda _: np.inf, corners, np.full(3, np.inf), np.array([[-9.0, 9.0]] * 2), ended(200, 0.01, 1e-3)
+    )
+    assert lowest == np.inf
+
+
 def test_what_is_refused_is_kept_off():
     """The lowest value lies at the edge of what is allowed; beyond it the values would be lower still."""
 

@@ -112,15 +112,19 @@ def test_the_equivalent_that_hides_least_is_built():
     assert chosen.bounded == 2 and chosen.built == 1
 
 
-def test_a_family_that_hides_less_wins_and_the_rest_is_not_made():
+@pytest.mark.parametrize(("half_deg", "worse"), [(60, 0), (85, 1)])
+def test_a_family_that_hides_less_wins_and_the_rest_is_not_made(half_deg, worse):
     p = problem()
     fixed = AngleRanges(alpha_rot_deg=0, beta_rot_deg=(0, 90), alpha_laser_deg=0, beta_laser_deg=(0, 90))
     families = (family(p, 0.0, 90.0, 0.0, 85.0), family(p, 0.0, 20.0, 0.0, 20.0), family(p, 0.0, 85.0, 0.0, 3.0))
-    workshop = ConeRegion(p, np.radians(60))
+    workshop = ConeRegion(p, np.radians(half_deg))
     chosen = choose_with_parts(p, families, fixed, Limits(), workshop, no_progress)
     best = min(families, key=lambda f: score_with(p, f.angles_rad, workshop.bound(f.angles_rad)).J)
     assert chosen.family.angles_deg == best.angles_deg
     assert chosen.built <= len(families) and chosen.open == 0
+    assert chosen.worse == sum(each.score.J < chosen.bare.J for each in families) == worse
+    said = f"mounts with a lower J without parts that lose more beams to their parts: {worse}"
+    assert (said in chosen.lines()) == bool(worse)
 
 
 def test_the_simplest_mount_is_built_though_another_one_has_a_lower_J_and_hides_less():

@@ -108,6 +108,24 @@ def test_the_beams_of_another_sensor_are_told(tmp_path, sensor, first_deg, last_
     assert all(sensor in line and f"from {first_deg} to {last_deg:.4g} deg" in line for line in said)
 
 
+@pytest.mark.parametrize("whole", [True, False])
+def test_an_incomplete_first_scan_does_not_condemn_the_angle_set(tmp_path, whole):
+    scans = [
+        a_scan(
+            beams=360,
+            stamp_ns=START + 2 * 10**8 * k,
+            angle_min_rad=-np.pi,
+            angle_increment_rad=np.radians(0.6 if not (whole and k) else 1.0),
+            time_increment_s=1e-4,
+        )
+        for k in range(3)
+    ]
+    recording = write(tmp_path / "r.mcap", scans, a_log(0.0, 1.0))
+    angles = angle_set().model_copy(update={"sensor": "LD19"})
+    notes = assemble_recording(recording, angles, tmp_path / "o.ply").notes
+    assert any("the scanner that made it" in line for line in notes) != whole
+
+
 @settings(max_examples=50, deadline=None)
 @given(angles=any_angles, seed=st.integers(0, 99), start=angle_deg, stop=angle_deg, lag_s=st.floats(-0.5, 0.5))
 def test_the_slow_obvious_loop_agrees(angles, seed, start, stop, lag_s):

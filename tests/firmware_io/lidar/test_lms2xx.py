@@ -308,7 +308,7 @@ def test_after_an_interruption_it_is_found_at_the_speed_that_it_has_by_then(monk
 
 
 class SlowPort(byte_stream.SerialStream):
-    """A real line, whose sensor receives only bytes of its own baud rate."""
+    """A real line, whose sensor receives only bytes at its present baud rate."""
 
     machine = None
 

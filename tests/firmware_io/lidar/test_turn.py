@@ -1,7 +1,7 @@
 """Turns cut from a stream: each point in one turn, however the stream comes and however its angles tremble."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
@@ -34,6 +34,30 @@ def test_every_point_is_in_one_turn_and_only_what_is_not_whole_is_left_out(piece
         assert turn.angle_deg[0] < 17.3 + 4 and turn.angle_deg[-1] > 360 - 17.3 - 4
         assert np.abs(np.diff(turn.angle_deg) - 17.3).max() < 2 * tremble_deg + 1e-6
     assert len(turns) >= (angle_deg[-1] - angle_deg[0]) // 360 - 2
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 999), missing=st.integers(0, 100))
+def test_missing_turns_are_counted_although_the_speed_wanders_by_a_per_cent(seed, missing):
+    """A pause of 100 turns is off by one turn if it is divided by the length of a single turn."""
+    rng = np.random.default_rng(seed)
+    begins = rng.uniform(-1.0, 1.0) + np.arange(202)  # of turns: the speed goes up and down within ten turns
+    begins = begins + 0.01 * 10 / (2 * np.pi) * np.sin(2 * np.pi * begins / 10)
+    number = np.arange(200 * 50)  # fifty points a turn, evenly in angle
+    time_ns = (np.interp(number / 50, np.arange(202), begins) - begins[0]) * 1e8
+    angle_deg = number % 50 * 7.2 + 3.6
+    queue, line = TurnQueue(), ArrivalLine(smallest_delay_ns=0, rate_max=1e-4, grain_ns=0.0)
+    before, after = number[: 80 * 50], number[(81 + missing) * 50 :]
+    for part in [*np.array_split(before, 160), None, *np.array_split(after, 160)]:
+        if part is None:
+            queue.cut()
+            continue
+        none = np.zeros(part.size, np.float32)
+        queue.add(Points(angle_deg[part], none, none, time_ns[part]), int(time_ns[part[-1]]))
+        line.add(float(time_ns[part[-1]]), int(time_ns[part[-1]]))
+    while queue.next(line) is not None:
+        pass
+    assert queue.dropped == missing + 3  # one is left out, and the turns at both ends of the pause are incomplete
 
 
 def test_turns_that_never_came_are_counted():

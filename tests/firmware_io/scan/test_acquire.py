@@ -425,3 +425,25 @@ def test_clusters_and_every_second_scan_reach_the_recording(out, scanner):
     assert {scan.range_m.size for scan in scans} == {217}
     steps_s = np.diff([scan.stamp_ns for scan in scans]) / 1e9
     assert np.median(steps_s) == pytest.approx(0.05, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("motion", "period_s", "says"),
+    [
+        (SWEEP, 9.5, ""),
+        (SPIN, 9.5, ""),
+        (SWEEP, 0.1, "error: --period-s = 0.1: 90 deg out and back at accel_deg_s2 = 720 take 1.41 s at least"),
+        (SPIN, -3, "error: --period-s = -3: Input should be greater than or equal to 0.001"),
+        (
+            {"mode": "stop_and_go", "stops": 4, "dwell_s": 0.5},
+            9.5,
+            "error: --period-s = 9.5: a stop_and_go motion has none",
+        ),
+    ],
+)
+def test_a_scan_can_have_another_period_than_the_task(tmp_path, command, motion, period_s, says):
+    (tmp_path / "angles.json").write_text(angle_set(motion=motion).to_json())
+    words = ("--lidar", "L", "--servo", "S", "--dry-run", "--period-s", period_s)
+    code, said, complaints = command("scan", tmp_path, *words)
+    assert code == (2 if says else 0)
+    assert complaints[0].startswith(says) if says else f" of {period_s} s: {period_s} s of recording" in said
