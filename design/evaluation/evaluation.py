@@ -154,7 +154,7 @@ class Evaluation:
             *([] if self.lever is None else [f"lever          {self.lever.words()}"]),
             *(
                 [f"blind spot     {hole.words().removeprefix('blind ')}" for hole in self.holes]
-                or [f"blind spots    none: every direction of the region has beams within {ball_deg:g} deg"]
+                or [f"blind spots    none: every direction of the region is within {ball_deg:g} deg of a beam's path"]
             ),
             f"J              {J.J:.5f} +- {error_words(J.J, J.J_error)}   mean over the start phase",
             f"J_lower        {J.J_lower:.5f}           lower bound, from the mean count",
@@ -162,7 +162,7 @@ class Evaluation:
             f"never seen     {percent(seen.blind_fraction)} of the unmasked sphere, {percent(J.blind_weight)} of the "
             "weight",
             f"masked         {seen.masked_fraction:.2%} of the sphere",
-            f"min_density    {J.least} beams within {ball_deg:g} deg, lowest in the region at any start phase",
+            f"min_density    {J.least} beams within {ball_deg:g} deg of the worst direction of the region, at the worst start phase",
         ]
         lines += [f"blind cone     {_cap(cone)}" for cone in gap.blind_cones]
         if self.cap is not None:
@@ -217,9 +217,10 @@ def evaluate(
     cap = None if sweep is None else empty_cap(simulated_beams(problem, angles_rad))
     interlaced_s = interlaced_period_s(motion.duration_s, loaded.lidar.scan_rate_hz) if motion.mode == "spin" else None
     result = checked_score(loaded, problem, angles_rad, None)
-    built = None
+    built, own = None, result
     if shadow is not None:
-        built = as_built(problem, loaded.task, angles_rad, shadow, checked_score(loaded, problem, angles_rad, shadow))
+        own = checked_score(loaded, problem, angles_rad, shadow)
+        built = as_built(problem, loaded.task, angles_rad, shadow, own)
     progress("ball search, 8 start phases")
     return Evaluation(
         problem=problem,
@@ -235,7 +236,7 @@ def evaluate(
         rises=sensitivity(problem, angles_rad, np.radians(1.0)),
         hit=None if pole is None else pole_chances(problem, angles_rad, pole),
         surfaces=None if loaded.surface is None else on_surfaces(problem, angles_rad, loaded.surface),
-        cloud=expected_cloud(loaded, problem, angles_rad, shadow, checks),
+        cloud=expected_cloud(loaded, problem, angles_rad, own, shadow, checks),
         as_built=built,
     )
 

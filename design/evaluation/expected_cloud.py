@@ -14,9 +14,11 @@ from scanwright.design.catalogue.servo import most_backlash_deg
 from scanwright.design.evaluation.coverage import hidden_regions
 from scanwright.design.evaluation.gaps import wide_gap
 from scanwright.design.evaluation.metres import AT_M, PlaneFigures, free_beams, on_planes, rounded
+from scanwright.design.evaluation.missed_object import missed_object
 from scanwright.design.findings import Finding, sentence
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.score import Score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import weighted_samples
 from scanwright.design.task.task import LoadedTask
@@ -77,6 +79,7 @@ class ExpectedCloud:
         error: of a point at 3 m.
         far: of a point at 5 m; None if the lidar does not reach it.
         gap: warning of a gap much wider than the spacing of the lines, if there is one.
+        missed: warning that an object of the size that the task states can be missed.
         planes: points on ground, ceiling and walls of the task.
         hidden: regions that the masks hide in part.
     """
@@ -84,6 +87,7 @@ class ExpectedCloud:
     error: ExpectedError
     far: ExpectedError | None
     gap: Finding | None
+    missed: Finding | None
     planes: tuple[PlaneFigures, ...]
     hidden: tuple[Finding, ...]
 
@@ -93,7 +97,7 @@ class ExpectedCloud:
         return [
             f"{self.error.words()}{far}",
             *(f"one full scan, {plane.words()}" for plane in self.planes),
-            *([] if self.gap is None else [f"warning: {sentence(self.gap)}"]),
+            *(f"warning: {sentence(each)}" for each in (self.missed, self.gap) if each is not None),
             *(f"{each.severity}: {sentence(each)}" for each in self.hidden),
         ]
 
@@ -103,6 +107,7 @@ class ExpectedCloud:
             "expected_error": asdict(self.error),
             "expected_error_far": None if self.far is None else asdict(self.far),
             "wide_gap": None if self.gap is None else asdict(self.gap),
+            "missed_object": None if self.missed is None else asdict(self.missed),
             "planes": [asdict(plane) for plane in self.planes],
             "hidden_regions": [asdict(each) for each in self.hidden],
         }
@@ -112,10 +117,11 @@ def expected_cloud(
     loaded: LoadedTask,
     problem: Problem,
     angles_rad: Setting,
+    own: Score,
     shadow: SelfOcclusion | None = None,
     checks: Sequence[Finding] = (),
 ) -> ExpectedCloud:
-    """Return the expected cloud of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad].
+    """Return the expected cloud of (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad], which has the score `own`.
 
     `shadow` are the beams that its parts block and `checks` the checks of these parts, if it was built.
     """
@@ -124,6 +130,7 @@ def expected_cloud(
         expected_error(loaded, problem, angles_rad, checks),
         far if far.at_m == FAR_M else None,
         wide_gap(problem, angles_rad, free_beams(problem, angles_rad, shadow)),
+        missed_object(loaded, angles_rad, own, shadow),
         on_planes(loaded, problem, angles_rad, shadow),
         hidden_regions(loaded),
     )

@@ -29,7 +29,8 @@ def optimise(task: TaskFile, as_json: AsJson = False) -> None:
     optimum = api.optimise(task, progress=ConsoleProgress())
     from scanwright.design.evaluation.expected_cloud import expected_cloud
 
-    cloud = expected_cloud(optimum.loaded, optimum.problem, optimum.search.best[0].angles_rad)
+    best = optimum.search.best[0]
+    cloud = expected_cloud(optimum.loaded, optimum.problem, best.angles_rad, best.score)
     if as_json:
         from scanwright.cli.results.angles import Optimised
 

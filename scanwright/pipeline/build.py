@@ -365,6 +365,6 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         records.write_report(work, begin)
         to_make = read_parts(work / "bom.csv").to_make
     checks = read_checks(target / "checks.json")
-    cloud = expected_cloud(loaded, problem, best.angles_rad, chosen.shadow, checks)
+    cloud = expected_cloud(loaded, problem, best.angles_rad, best.score, chosen.shadow, checks)
     seen = as_built(problem, loaded.task, best.angles_rad, chosen.shadow, best.score, optimum.mounts)
     return Made(optimum, chosen, seen, (height, *parts.findings, *findings), cloud, to_make)

@@ -53,10 +53,11 @@ def answer(
     """
     built = task_as_built(loaded, angles)
     problem, setting = problem_of(built), mounting_rad(angles)
+    own = checked_score(built, problem, setting, shadow)
     return BuildAnswer(
-        as_built=as_built(problem, built.task, setting, shadow, checked_score(built, problem, setting, shadow)),
+        as_built=as_built(problem, built.task, setting, shadow, own),
         ball_deg=float(np.degrees(problem.ball_rad)),
-        cloud=expected_cloud(built, problem, setting, shadow, checks),
+        cloud=expected_cloud(built, problem, setting, own, shadow, checks),
         masked_fraction=coverage(problem, setting).masked_fraction,
         lines=problem.lines.count * problem.lines.repeats,
         beams=len(problem.bearings_rad),

@@ -130,7 +130,10 @@ def _sees(answer: BuildAnswer) -> Card:
     elif cloud.hidden:
         headline += ", except behind the robot"
     warned = [each.message for each in cloud.hidden if each.message not in lost[:1]]
-    if cloud.gap is not None:
+    if cloud.missed is not None:
+        headline += ", but small objects can be missed" if not lost else ""
+        warned, lines = [cloud.missed.message.partition(":")[0], *warned], ""
+    elif cloud.gap is not None:
         headline += ", but with a gap" if not lost else ""
         warned, lines = [cloud.gap.message.partition(";")[0], *warned], ""
     text = [f"{_capital(words)}." for words in (*warned, *(plane.words() for plane in cloud.planes))]

@@ -151,6 +151,7 @@ class Optimised:
         expected_error: error of a point to expect at 3 m.
         expected_error_far: the same at 5 m; null if the lidar does not reach it.
         wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
+        missed_object: warning that an object as wide as a ball of the task can get no beam; null if none can.
         planes: points on ground, walls and ceilings of the task.
         hidden_regions: regions that the robot hides in part.
         warnings: limits of the task that can surprise.
@@ -173,6 +174,7 @@ class Optimised:
     expected_error: ExpectedError
     expected_error_far: ExpectedError | None
     wide_gap: Finding | None
+    missed_object: Finding | None
     planes: list[PlaneFigures]
     hidden_regions: list[Finding]
     warnings: list[str]
@@ -223,6 +225,7 @@ class Evaluated:
         expected_error: error of a point to expect at 3 m.
         expected_error_far: the same at 5 m; null if the lidar does not reach it.
         wide_gap: warning of a gap much wider than the spacing of lines; null if there is none.
+        missed_object: warning that an object as wide as a ball of the task can get no beam; null if none can.
         planes: points on ground, walls and ceilings of the task.
         hidden_regions: regions that the robot hides in part.
         lever: offset of the optical centre that the figures are for; null if it is on the axis.
@@ -257,6 +260,7 @@ class Evaluated:
     expected_error: ExpectedError
     expected_error_far: ExpectedError | None
     wide_gap: Finding | None
+    missed_object: Finding | None
     planes: list[PlaneFigures]
     hidden_regions: list[Finding]
     lever: Lever | None = None
