@@ -1,4 +1,4 @@
-"""Metric cap screws (ISO 4762 heads), in mm: what a hole, a head and a driver need, and what a thread in a part."""
+"""Metric cap screws (ISO 4762 heads), in mm: holes, heads, drivers, nuts, and threads in printed parts."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts 
 
 
 def thread_hole(screw: Screw, printer: Printer) -> float:
-    """Diameter of the hole in a part that a screw holds on to: the core of a thread, or the seat of an insert."""
+    """Return the diameter of the hole for a thread, or of the seat of an insert."""
     return screw.insert if printer.thread == "insert" and screw.insert is not None else screw.core
 
 
 @dataclass(frozen=True, slots=True)
 class Trap:
-    """Room for a hexagon nut in a part, and the hole through it.
+    """Pocket for a hexagon nut in a part, and the hole through it.
 
     Attributes:
-        hole: diameter, with half of a screw's clearance: it leads the screw into the nut, and no other hole is alike.
+        hole: diameter, with half of a screw's clearance.
         across: across the flats of the pocket.
         depth: of a pocket, thickness of a slot.
     """
@@ -72,7 +72,7 @@ class Trap:
 
 
 def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | None:
-    """Nut trap of a screw; None where the profile asks for none.
+    """Return the nut pocket of a screw; None if the profile uses none.
 
     Args:
         screw: the size.
@@ -88,11 +88,11 @@ def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | 
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """What a screw holds on to in a printed part: a thread, an insert, or a nut in a trap.
+    """Thread of a screw in a printed part: cut, an insert, or a nut in a pocket.
 
     Attributes:
         hole: diameter.
-        trap: room for the nut, if it is one.
+        trap: pocket of the nut, if there is one.
         insert: whether it is an insert.
     """
 
@@ -102,12 +102,12 @@ class Thread:
 
 
 def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True, carries: bool = False) -> Thread:
-    """What a printer's profile gives a screw to hold on to.
+    """Return the thread that a printer's profile gives a screw.
 
     Args:
         screw: the size.
         printer: the profile.
-        room_for_nut: whether a nut finds room; where it does not and the lidar hangs on it, an insert does.
+        room_for_nut: whether a nut fits; if not and the lidar hangs on the screw, an insert is used.
         carries: whether the lidar hangs on it.
     """
     trap = trap_of(screw, printer, carries=carries)
@@ -120,5 +120,5 @@ def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True,
 
 
 def passing_hole(screw: Screw, printer: Printer) -> float:
-    """Diameter of the hole in a part that a screw passes through."""
+    """Return the diameter of the hole in a part that a screw passes through."""
     return screw.nominal + printer.screw_clearance_mm

@@ -1,7 +1,6 @@
-"""Bought products: which bodies draw them, what moves these, and their colours.
+"""Bodies of bought products: shape, frame, colour. Millimetres, rotation frame at gamma = 0.
 
-Millimetres, rotation frame at gamma = 0. Every body is placed by an explicit location; the lidar by the angle set's
-own `T_rot_laser`, the one that the point cloud goes through.
+The lidar is placed by `T_rot_laser` of the angle set, the same transform as for the point cloud.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ class BodySpec:
 
 
 def bought_of(layout: Layout) -> list[BodySpec]:
-    """The bodies of everything that one scanner is bought with, of the leads on the rotor, and of the other cables."""
+    """Return the bodies of all bought products and cables of one scanner."""
     drawn = [body for station in layout.drive.stations for body in _of_station(layout.drive, station)]
     drawn.sort(key=lambda body: body.product != names.SERVO)
     return [*drawn, *_of_lidar(layout), *_of_leads(layout.leads), *_of_cables(layout.cables)]
@@ -105,7 +104,7 @@ def _of_station(drive: DriveLayout, station: Station) -> Iterator[BodySpec]:
 
 
 def _of_servo(drive: DriveLayout, servo: Servo) -> Iterator[BodySpec]:
-    """Case and horn, which turns with the rotor if it is on its axis."""
+    """Yield the case and horn; the horn turns with the rotor if it is on its axis."""
     R, t = drive.servo_pose
     case, horn = partial(draw.servo_case, servo, t[2]), partial(draw.servo_horn, servo, t[2])
     if not np.any(t[:2]):
@@ -136,7 +135,7 @@ def _bearing(bearing: Bearing, top: float, place: str) -> Iterator[BodySpec]:
 
 
 def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
-    """Body, window, cap and cables."""
+    """Yield body, window, cap and cables."""
     lidar = layout.scanner.lidar
     makes = {
         names.LIDAR_BODY: partial(draw.lidar_body, lidar),
@@ -159,7 +158,7 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
 
 
 def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
-    """Those that have a path."""
+    """Return those that have a path."""
     for i, lead in enumerate(leads, start=1):
         if lead.path is not None:
             yield BodySpec(
@@ -173,7 +172,7 @@ def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
 
 
 def _of_cables(cables: Sequence[FixedCable]) -> Iterator[BodySpec]:
-    """Those that have a path."""
+    """Return those that have a path."""
     for cable in cables:
         if cable.path is not None:
             yield BodySpec(
@@ -187,12 +186,12 @@ def _of_cables(cables: Sequence[FixedCable]) -> Iterator[BodySpec]:
 
 
 def _moved(R: Array, t: Array, make: Callable[[], cq.Solid]) -> cq.Solid:
-    """A body of a servo that is not on the axis."""
+    """Return a body of a servo that is not on the axis."""
     return make().moved(solids.location(R, t * [1.0, 1.0, 0.0]))
 
 
 def _on_axis(layout: Layout, make: Callable[[], cq.Solid]) -> cq.Solid:
-    """A body of the lidar, its optical centre where the angle set has it."""
+    """Return a body of the lidar at its pose of the angle set."""
     T = layout.scanner.angles.T_rot_laser()
     base = cq.Location(cq.Vector(0, 0, -layout.scanner.lidar.optical_height_mm))
     return make().moved(solids.location(layout.stack.R(), T[:3, 3] * 1000) * base)

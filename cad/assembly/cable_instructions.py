@@ -1,4 +1,4 @@
-"""Instructions for laying the cables: where each leaves its device, how long it is, where its joint is."""
+"""Instructions for laying the cables: exit from the device, length, joints and ties."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def leads_text(layout: Layout) -> str:
 
 
 def tied_at(layout: Layout) -> list[str]:
-    """Return where cables are tied, a place for each tie; leads without a path, which a person lays, count too."""
+    """Return the place of each cable tie; cables without a path, which a person lays, count too."""
     leads, seat, places = layout.leads, layout.linkage.hub_tie, [PLATE] * len(layout.linkage.plate_ties)
     places = [COIL] * 2 + places if leads else places
     if seat is not None and all(tied_mm(lead, seat) is not None for lead in leads if lead.path is not None):
@@ -50,7 +50,6 @@ def tied_at(layout: Layout) -> list[str]:
 
 
 def _ties(layout: Layout) -> list[str]:
-    """How they are tied."""
     seat, places, lines = layout.linkage.hub_tie, tied_at(layout), list[str]()
     if seat is not None and HUB in places:
         tie = (

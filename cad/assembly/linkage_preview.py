@@ -1,7 +1,7 @@
-"""The alignment linkage for the eye: put together from the very shapes of the part, but as meshes.
+"""The alignment linkage for display: the shapes of the part, joined as meshes.
 
-Booleans of meshes take milliseconds where those of the kernel take a second. What comes is the part to within the
-chords of its meshes, unchecked: `cad.parts.linkage.alignment_linkage` makes what is printed, and may refuse it.
+Booleans of meshes take milliseconds, those of the kernel a second. The result is within the chords of its meshes and
+not checked; `cad.parts.linkage.alignment_linkage` makes the printed part.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ CHORD_ANGLE = 0.3  # rad
 
 
 def draft_linkage(p: AlignmentLinkage) -> TriMesh:
-    """The linkage, rotation frame.
+    """Return the linkage, rotation frame.
 
     Raises:
         BuildError: the kernel fails at one of its shapes.
@@ -33,7 +33,7 @@ def draft_linkage(p: AlignmentLinkage) -> TriMesh:
 
 
 def coarse_mesh(shape: cq.Shape) -> TriMesh:
-    """A shape for the eye, rotation frame."""
+    """Return a mesh of a shape for display."""
     return mesh_of(shape, CHORD_ERROR, CHORD_ANGLE)
 
 

@@ -24,7 +24,7 @@ Wanted = Callable[[PartSpec | BodySpec], bool]
 
 
 def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
-    """Make every part that this scanner needs, and the bought ones around them; of these, those that are wanted.
+    """Make the parts of a scanner and the bought bodies, limited to those that are `wanted`.
 
     Raises:
         BuildError: a part cannot be made, or fits no bed of the printer; the message names part, feature, parameter and
@@ -34,7 +34,7 @@ def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
 
 
 def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
-    """The same, of a layout."""
+    """Return the parts of a layout; `wanted` as for `make_parts`."""
     parts = {spec.name: spec for spec in parts_of(layout) if not isinstance(spec, LeftOut)}
     bodies = {spec.name: spec for spec in bought_of(layout)}
     last = parts.pop(COUNTERWEIGHT, None)
@@ -48,7 +48,7 @@ def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
 
 
 def _balanced(assembly: Assembly) -> Assembly:
-    """The assembly with its counterweight, cut to the solids; without linkage and sub-plate, to their estimate."""
+    """Return the assembly with its counterweight, cut to the solids, or to their estimate if some are missing."""
     layout = assembly.layout
     bar = layout.counterweight
     assert not isinstance(bar, LeftOut)
@@ -82,7 +82,7 @@ def require_room_on_bed(assembly: Assembly) -> None:
 
 
 def _across(assembly: Assembly, name: str) -> float:
-    """Diameter of a ball around a part: a bed as wide holds it in any pose."""
+    """Return the diameter of a ball around a part: a bed as wide holds it in any pose."""
     vertices = assembly.mesh(name).vertices
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     return 2 * float(np.linalg.norm(vertices - middle, axis=1).max())

@@ -1,4 +1,4 @@
-"""What every body of a scanner weighs, and where: for the URDF, the checks and the counterweight."""
+"""Mass properties of the bodies of a scanner, for the URDF, the checks and the counterweight."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ Motor, mirror and most of the boards lie around its axis; plugs and windows, a t
 
 
 def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
-    """Mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
+    """Return the mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
 
-    Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns. Leads are lines.
+    Bought parts are homogeneous boxes, of which a share may turn; cables are lines.
     """
     lidar, masses = scanner.lidar, assembly.layout.drive.masses
     fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
@@ -43,25 +43,25 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
 
 
 def rotor_of(scanner: Scanner, bodies: Mapping[str, Inertial]) -> Inertial:
-    """All that turns, rotation frame, from the bodies of `link_bodies`."""
+    """Return all that turns, rotation frame, from the bodies of `link_bodies`."""
     return inertia.together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
 
 
 def rotor_weight(scanner: Scanner, stack: Hub, bodies: Mapping[str, Inertial]) -> Weight:
-    """Weight of all that turns, from the bodies of `link_bodies`."""
+    """Return the weight of all that turns, from the bodies of `link_bodies`."""
     rotor = rotor_of(scanner, bodies)
     x, y, z = rotor.centre_m
     return weight_of(scanner, rotor.mass_kg, float(z) - stack.horn / 1000, math.hypot(x, y))
 
 
 def off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
-    """How far the rotor's centre of mass may be off across the axis, since that of the lidar is undocumented."""
+    """Return the error of the rotor's centre of mass across the axis: that of the lidar is undocumented."""
     lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
     return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
 
 
 def rotor_moment(scanner: Scanner, assembly: Assembly) -> Array:
-    """Mass times distance from the axis of all that turns, shape (2,) [g mm]."""
+    """Return the mass times distance from the axis of all that turns, shape (2,) [g mm]."""
     rotor = rotor_of(scanner, link_bodies(scanner, assembly))
     return np.asarray(1e6 * rotor.mass_kg * rotor.centre_m[:2])
 

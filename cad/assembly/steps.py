@@ -1,4 +1,4 @@
-"""The steps of putting a scanner together, in the order that always works: those of its parts and of what is bought."""
+"""Assembly steps of a scanner in order: those of its parts and of bought products."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CABLES_CHECK = "turned by hand, nothing that turns comes near a cable; a pull on
 
 
 def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
-    """Part or product that a step puts in, and the step."""
+    """Return each step with the part or product that it adds."""
     layout = assembly.layout
     specs = [assembly.parts[name] for name in assembly.made]
     steps = {spec.name: spec.step for spec in specs if spec.step is not None}

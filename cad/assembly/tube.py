@@ -19,7 +19,7 @@ LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not
 
 
 def lead_solid(lead: RotorLead) -> cq.Solid:
-    """The bundle of wires between ring and lidar, with the shrink tube over its joint.
+    """Return the wires between ring and lidar with the shrink tube over their joint.
 
     Raises:
         BuildError: the kernel does not make one valid solid of it, with a closed mesh.
@@ -35,7 +35,7 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
 
 
 def cable_solid(cable: FixedCable) -> cq.Solid:
-    """A cable that does not turn.
+    """Return a cable that does not turn.
 
     Raises:
         BuildError: the kernel does not make one valid solid of it, with a closed mesh.

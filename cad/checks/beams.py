@@ -21,7 +21,7 @@ from scanwright.design.self_occlusion import SelfOcclusion
 def beam_checks(
     scanner: Scanner, shadow: SelfOcclusion, triangles_m: Mapping[str, Array], carriers: Collection[str]
 ) -> list[Finding]:
-    """Return how many beams are hidden, and how many by the linkage alone.
+    """Return the width of the hidden beams, and of those that the linkage alone hides.
 
     Args:
         scanner: angles and lidar.

@@ -97,7 +97,7 @@ def _near(rings: Array, box: Array) -> Array:
 
 
 def _image(mesh: TriMesh) -> Array:
-    """Outlines of shapes in the half plane that cover the surface at every axis angle, each once."""
+    """Return outlines of shapes in the half plane that cover the surface at every axis angle, each once."""
     corners = mesh.vertices[mesh.faces]
     radius = np.hypot(corners[:, :, 0], corners[:, :, 1])
     across = np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1)
@@ -113,7 +113,7 @@ def _image(mesh: TriMesh) -> Array:
 
 
 def _outlines(corners: Array, levels: int) -> Array:
-    """Outlines (r, z) of triangles: at each level from lowest to highest the nearest and furthest point, (m, 2n, 2)."""
+    """Return outlines (r, z) of triangles, at each level the nearest and the furthest point, shape (m, 2 levels, 2)."""
     order = np.argsort(corners[:, :, 2], axis=1, kind="stable")
     low, middle, high = (np.take_along_axis(corners, order[:, i, None, None], axis=1)[:, 0] for i in range(3))
     share = np.linspace(0.0, 1.0, levels)
@@ -133,7 +133,7 @@ def _outlines(corners: Array, levels: int) -> Array:
 
 
 def _on_short_edges(low: Array, middle: Array, high: Array, z: Array) -> Array:
-    """Points at heights z on the path low - middle - high."""
+    """Return points at heights z on the path low - middle - high."""
     below = z <= middle[:, None, 2]
     start = np.where(below[..., None], low[:, None], middle[:, None])
     end = np.where(below[..., None], middle[:, None], high[:, None])
@@ -143,7 +143,7 @@ def _on_short_edges(low: Array, middle: Array, high: Array, z: Array) -> Array:
 
 
 def _flat(corners: Array, levels: int) -> tuple[Array, ...]:
-    """A horizontal triangle is a line in the half plane."""
+    """Return near, far and z of horizontal triangles, which are lines in the half plane."""
     ends = np.roll(corners, -1, axis=1)
     along = ends[..., :2] - corners[..., :2]
     square = np.einsum("mek,mek->me", along, along)

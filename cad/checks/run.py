@@ -1,6 +1,6 @@
 """All checks of one scanner, for its build folder and for the command `check`.
 
-They use the parts without their labels: the wall between two engraved strokes is not a thin wall.
+They use the parts without labels: the wall between two engraved strokes is no thin wall.
 """
 
 from __future__ import annotations
@@ -31,13 +31,7 @@ from scanwright.design.self_occlusion import SelfOcclusion, self_occlusion_bytes
 
 
 def check_files(scanner: Scanner, assembly: Assembly, progress: Progress) -> dict[str, bytes]:
-    """Return `checks.json` and `own_body.npz` of a build.
-
-    Args:
-        scanner: angles and products.
-        assembly: its parts.
-        progress: callback for progress.
-    """
+    """Return `checks.json` and `own_body.npz` of a build."""
     checks, shadow = run_checks(scanner, assembly, progress)
     own_body = self_occlusion_bytes(shadow, scanner.lidar.bearings_rad())
     return {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body}

@@ -13,7 +13,7 @@ from scanwright.design.scanner import Scanner
 
 
 def wiring_checks(scanner: Scanner) -> list[Finding]:
-    """Return every broken rule of the wiring, or one finding that it keeps them; then the values it lacks."""
+    """Return every broken rule of the wiring, or one finding if none is; then the missing values."""
     network = network_of(scanner)
     summary = (
         f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "

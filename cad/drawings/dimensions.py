@@ -1,7 +1,7 @@
-"""Dimensions of one view: ordinates from the view's origin, diameters and other call-outs with leaders, angles.
+"""Dimensions of one view: ordinates from the view's origin, leaders with text, angles.
 
-Ordinates are the running dimensions of ISO 129: every value is measured from 0, nothing adds up, and what lies close
-together is spread without crossing. Places are millimetres of paper.
+Ordinates are the running dimensions of ISO 129; close ones are spread without crossing. Places are millimetres of
+paper.
 """
 
 from __future__ import annotations

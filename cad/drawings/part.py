@@ -1,4 +1,4 @@
-"""What a drawing shows of a part: its solid, holes, cylinders about the axis, and plane faces. Rotation frame, mm."""
+"""Content of a drawing: solid, holes, cylinders about the axis, and plane faces. Rotation frame, mm."""
 
 from __future__ import annotations
 

@@ -109,13 +109,7 @@ def _drilled(holes: list[Round]) -> list[Round]:
 
 
 def with_threads(patterns: list[Pattern], joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
-    """Add thread, insert or nut to the patterns that hold screws of joints.
-
-    Args:
-        patterns: of a part.
-        joints: whose threads it holds, rotation frame.
-        moved: what the part was moved by.
-    """
+    """Add thread, insert or nut to the patterns of a part, moved by `moved`, that hold screws of its joints."""
     threaded: list[Pattern] = []
     for pattern in patterns:
         joint = next((joint for joint in joints if all(_of(hole, joint, moved) for hole in pattern.holes)), None)

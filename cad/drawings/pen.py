@@ -1,4 +1,4 @@
-"""Draws on the modelspace of a DXF document in millimetres of paper: strokes, arcs, texts and dimensions on layers."""
+"""Draw on the modelspace of a DXF document in millimetres of paper: strokes, arcs, texts and dimensions on layers."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Lines of a solid seen from one side, hidden ones marked: straight lines, arcs, and chains of points for the rest.
+"""Lines of a solid seen from one side, hidden ones marked: straight lines, arcs, and chains of points. Millimetres.
 
-The kernel's hidden-line removal takes seconds where edges lie exactly behind one another and hundredths where they do
-not (measured: 8.6 s and 0.1 s), so the view is turned by SKEW_RAD; lines that then coincide within TOLERANCE_MM are
-drawn once, and no hidden line is drawn under a visible one. Millimetres.
+The kernel's hidden-line removal takes 8.6 s if edges are exactly behind one another and 0.1 s if not, so the view is
+turned by SKEW_RAD. Lines within TOLERANCE_MM are drawn once, and no hidden line under a visible one.
 """
 
 from __future__ import annotations
@@ -125,7 +124,7 @@ def _is_straight(points: Array) -> bool:
 
 
 def _circle(points: Array) -> tuple[Array, float, Span] | None:
-    """Return centre, radius and angles of the circle through points; None if there is none."""
+    """Return the centre, radius and angles of the circle through points; None if there is none."""
     system = np.column_stack([2 * points, np.ones(len(points))])
     middle = points.mean(axis=0)
     solved, *_ = np.linalg.lstsq(system - [*(2 * middle), 0.0], ((points - middle) ** 2).sum(axis=1), rcond=None)

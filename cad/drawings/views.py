@@ -1,8 +1,8 @@
-"""Which views a part needs.
+"""Views that a part needs.
 
-Three views along the rotation frame's axes and an isometric; of a part with a fit a section along its axis; a view onto
-every pattern of three holes or more that is inclined to all of them; and, where no view shows the angle of such a
-pattern to the axis in true size, one that does.
+Three views along the rotation frame's axes and an isometric; a section along the axis if a diameter has a fit; a view
+onto every inclined pattern of three holes or more; and one that shows the angle of such a pattern in true size, if no
+other does.
 """
 
 from __future__ import annotations

@@ -89,16 +89,7 @@ def items_of(
     config_hash: str,
     plates: Sequence[Sequence[str]] = (),
 ) -> list[BomItem]:
-    """Return all rows; the total last.
-
-    Args:
-        scanner: angles and products.
-        assembly: the solids.
-        joints: of the layout.
-        masses_g: of the made parts.
-        config_hash: of what shapes the parts.
-        plates: parts that are printed together.
-    """
+    """Return all rows, the total last; `masses_g` are of the made parts, `plates` the parts printed together."""
     items = []
     for name in assembly.made:
         part, number = assembly.parts[name], drawing_number(config_hash, name, assembly)
@@ -218,7 +209,7 @@ def _ties(assembly: Assembly) -> Iterator[BomItem]:
 
 
 def _servo_wiring(servo: Servo) -> Iterator[BomItem]:
-    """Yield the adapter and the cable of a servo, as the catalogue has them."""
+    """Yield the adapter and the cable of a servo from the catalogue."""
     if servo.adapter is None:
         yield _unknown_wiring(servo)
     for field, price, estimate in (("adapter", servo.adapter_usd, "adapter"), ("cable", None, "servo cable")):
@@ -256,7 +247,7 @@ def _filament(scanner: Scanner, items: list[BomItem], plates: Sequence[Sequence[
 
 
 def _electrics(scanner: Scanner) -> Iterator[BomItem]:
-    """Yield what the wiring needs besides the devices."""
+    """Yield the parts of the wiring other than devices."""
     network = network_of(scanner)
     fuses = Counter(branch.fuse_a for branch in network.branches)
     main = next(box for box in network.boxes if box.name == "switch").lines[0]
@@ -305,7 +296,7 @@ def _torques(assembly: Assembly, joints: Sequence[Joint]) -> str:
 
 
 def _ranged(item: BomItem) -> BomItem:
-    """Return the row with its range: of its price, wider if that is unsure, or of an estimate."""
+    """Return the row with its price range: of its price, wider if that is unverified or old, or of an estimate."""
     if item.low_usd is not None:
         return item
     if item.total_usd is not None:

@@ -141,8 +141,8 @@ def _primitive(buffer: _Buffer, surface: Surface, material: int) -> dict[str, An
 def shaded(mesh: TriMesh) -> Surface:
     """Return vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
 
-    A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of
-    the faces about it that have no edge towards this one, each as wide as its corner.
+    A vertex is repeated for each of its normals. The normal at a corner is the mean of those of the faces around it
+    without an edge towards this one, weighted by their angles.
     """
     corners = mesh.vertices[mesh.faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

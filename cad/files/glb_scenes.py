@@ -1,9 +1,9 @@
-"""The scanner in 3D: `assembly.glb` in the tree of its frames, and `exploded.glb` pulled apart in build order.
+"""The scanner in 3D: `assembly.glb` in the tree of its frames, and `exploded.glb` in build order.
 
-    y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body hangs under the frame it moves with.
+    y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body is in the frame that it moves with.
 
-Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate leave
-the linkage along the lidar's z, as they are put in, a counterweight along its radius.
+Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate move
+along the lidar's z, a counterweight along its radius.
 """
 
 from __future__ import annotations
@@ -30,14 +30,7 @@ def product_of(body: str, assembly: Assembly) -> str:
 
 
 def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh], config_hash: str) -> dict[str, bytes]:
-    """Return both files.
-
-    Args:
-        scanner: angles and products.
-        assembly: the solids.
-        meshes: of the made parts, rotation frame; the bought ones are meshed here.
-        config_hash: of what shapes the parts.
-    """
+    """Return both files; `meshes` are of the made parts, rotation frame."""
     T = scanner.angles.T_rot_laser()
     nodes = [
         Node("world", "", np.eye(4)),

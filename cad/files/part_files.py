@@ -36,7 +36,7 @@ class PartReport:
 
 @dataclass(frozen=True, slots=True)
 class PartsResult:
-    """What `build_parts` made.
+    """Results of `build_parts`.
 
     Attributes:
         assembly: the solids.

@@ -30,12 +30,7 @@ INK, LIGHT, TEXT_PX = (20, 20, 20), (255, 255, 255), 15
 
 
 def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]) -> list[Plate]:
-    """Distribute parts over as few beds as rows of boxes need; a part larger than a bed gets a separate one.
-
-    Args:
-        printed: parts in their print pose.
-        bed_mm: width, depth and height.
-    """
+    """Distribute parts in their print pose over few beds, in rows; a part larger than a bed gets a separate one."""
     sizes = {name: np.ptp(mesh.vertices, axis=0) for name, mesh in printed.items()}
     order = sorted(printed, key=lambda name: (-round(float(sizes[name][1]), 3), -round(float(sizes[name][0]), 3), name))
     rows: list[tuple[float, list[str]]] = []  # width left, and its parts
@@ -60,7 +55,7 @@ def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]
 def plate_files(
     plates: Sequence[Plate], bed_mm: tuple[float, float, float], about: str, settings: Mapping[str, str]
 ) -> dict[str, bytes]:
-    """Return print file and picture of each plate; `about` describes the parts, `settings` are a slicer's."""
+    """Return the print file and picture of each plate; `about` describes the parts, `settings` are a slicer's."""
     files = {}
     for number, plate in enumerate(plates, start=1):
         name = f"plate_{number}"

@@ -1,7 +1,7 @@
-"""Estimated prices of rows of the parts list for which the catalogue has none.
+"""Estimated prices for rows of the parts list without a price in the catalogue.
 
-The ranges are usual prices in small numbers, without tax and carriage; no shop was asked. A price of the catalogue that
-is unverified or older than RECENT is multiplied by UNSURE.
+The ranges are usual prices in small numbers without tax and carriage, not quotes. A price of the catalogue that is
+unverified or older than RECENT is multiplied by UNSURE.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""`wiring.svg`: the wiring of a scanner, drawn: boxes in columns from the supply to the lidar, wires between pins.
+"""`wiring.svg`: boxes in columns from the supply to the lidar, and wires between their pins. Lengths in pixels.
 
-A wire leaves a box to the right and enters another from the left: between two columns are first the lanes in which
-wires change their height, one for each, then space for the text on each wire before its end. A wire that passes columns
-does so below all boxes, so no texts overlap, whatever the scanner. A wire between two pins of one box is a bridge on
-its right. Cautions are above all boxes. Lengths in pixels.
+A wire leaves a box at its right and enters another at its left. Each wire between two columns has its own lane to
+change height, then space for its text. Wires that pass a column run below all boxes, so no texts overlap; a wire
+between two pins of a box is at its right.
 """
 
 from __future__ import annotations

@@ -24,12 +24,7 @@ Section = tuple[list[str], list[str]]  # items of a list, then paragraphs
 
 
 def wiring_files(scanner: Scanner, digest: str) -> dict[str, bytes]:
-    """Return both files by name.
-
-    Args:
-        scanner: angles and products.
-        digest: of what shapes the parts.
-    """
+    """Return both files by name; `digest` identifies the configuration."""
     network = network_of(scanner)
     title = f"{scanner.angles.task}: wiring ({digest})"
     return {

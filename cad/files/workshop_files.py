@@ -42,14 +42,7 @@ def export_scanner(
     folder: Path,
     progress: Progress,
 ) -> Exports:
-    """Write all of them into a build folder.
-
-    Args:
-        scanner: angles and products.
-        made: its parts, of `part_files.build_parts`.
-        folder: the build folder.
-        progress: callback for progress.
-    """
+    """Write all of them into a build folder; `made` is the result of `part_files.build_parts`."""
     assembly, masses = made.assembly, made.masses_g()
     digest, joints = assembly.layout.digest, assembly.layout.joints
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"

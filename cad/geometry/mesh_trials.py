@@ -21,7 +21,7 @@ ANGLES = 0.5, 0.2, CHORD_ANGLE, 0.05  # rad
 
 
 def mesh_trials(solids: Mapping[str, cq.Solid], progress: Callable[[str], None]) -> Iterator[Trial]:
-    """All parts together at each pair of tolerances; the error is the farthest that a triangle is from its surface."""
+    """Yield a trial of all parts for each pair of tolerances; the error is the largest distance to the surface."""
     for angle in ANGLES:
         for chord in CHORDS:
             progress(f"meshes within {chord:g} mm and {angle:g} rad")
@@ -48,7 +48,7 @@ def _all_meshed(solids: list[cq.Solid], chord: float, angle: float) -> list[cq.S
 
 
 def _off(solid: cq.Solid) -> tuple[float, int]:
-    """Largest distance [mm] from the middle of a triangle or of its sides to the surface it stands for; triangles."""
+    """Return the largest distance [mm] of a triangle's middle or sides to its surface, and the number of triangles."""
     worst, count = 0.0, 0
     for face in solid.Faces():
         place = TopLoc_Location()

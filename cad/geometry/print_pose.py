@@ -1,9 +1,8 @@
-"""How a part lies on the printer's bed: one rule, shared by the print files and the checks. Millimetres.
+"""Pose of a part on the printer's bed, for print files and checks. Millimetres.
 
-Of all poses in which the part lies on one of its larger flats, those that fit the bed; of these the least support,
-counted as the volume of the columns from overhanging faces down to the bed; of equal ones (to a cubic centimetre) the
-larger contact, then the lower pose. A face overhangs where it leans more than 45 deg out of the vertical. About the
-vertical the part is turned so that its smallest rectangle lies along the bed, or aslant where it only fits so.
+Of all poses on a larger flat, those that fit the bed; of these the least support, the volume of the columns below
+overhanging faces (more than 45 deg out of the vertical); of equal ones (to a cubic centimetre) the larger contact, then
+the lower pose. The smallest rectangle around the part is along the bed, or tilted if it only fits so.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class PrintPose:
 
 
 def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
-    """The pose in which a part is printed, by the rule at the top of this module."""
+    """Return the pose in which a part is printed, by the rule at the top of this module."""
     faces = _Faces.of(mesh)
     poses = [_pose(mesh, faces, down, bed_mm) for down in _flats(mesh, faces)]
 
@@ -58,7 +57,7 @@ def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
 
 
 def on_bed(mesh: TriMesh, pose: PrintPose) -> TriMesh:
-    """The mesh in the frame of the bed, rounded as every mesh is; nothing is below the bed."""
+    """Return the mesh in the frame of the bed, rounded as every mesh."""
     vertices = np.round(mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3], 5)
     vertices[:, 2] = np.where(np.abs(vertices[:, 2]) < FLAT, 0.0, vertices[:, 2])
     return TriMesh(vertices + 0.0, mesh.faces)
@@ -82,7 +81,7 @@ class _Faces:
 
 
 def _flats(mesh: TriMesh, faces: _Faces) -> Array:
-    """Outward normals of the flats that lie on the convex hull, shape (n, 3), the largest first.
+    """Return the outward normals of the flats that lie on the convex hull, shape (n, 3), the largest first.
 
     A part without one, such as a ball, gets the largest facets of its hull.
     """
@@ -104,7 +103,7 @@ def _flats(mesh: TriMesh, faces: _Faces) -> Array:
 
 
 def _directions(faces: _Faces) -> list[Array]:
-    """Mean normals of the triangles that share a direction, where these are more than 1 % of the largest."""
+    """Return mean normals of triangles with a common direction that have more than 1 % of the largest area."""
     key = np.round(faces.normals, 4) + 0.0
     _, index = np.unique(key, axis=0, return_inverse=True)
     index = index.reshape(-1)
@@ -137,7 +136,7 @@ def _pose(mesh: TriMesh, faces: _Faces, down: Array, bed: tuple[float, float, fl
 
 
 def _upright(up: Array) -> Array:
-    """A rotation whose third row is `up`: it maps that direction to z."""
+    """Return a rotation that maps the direction `up` to z."""
     helper = np.eye(3)[int(np.argmin(np.abs(np.round(up, 6))))]
     x = np.cross(helper, up)
     x /= np.linalg.norm(x)
@@ -145,7 +144,7 @@ def _upright(up: Array) -> Array:
 
 
 def _turned_to_fit(vertices: Array, R: Array, bed: tuple[float, float, float]) -> Array:
-    """R as it is where the part fits the bed so; else turned about z to where it does: across the bed, or aslant."""
+    """Return R if the part fits the bed so, else R turned about z until it does."""
     flat = (vertices @ R.T)[:, :2]
     outline = flat[ConvexHull(flat).vertices]
     for turn in (0.0, math.pi / 2, *np.radians(np.arange(1.0, 180.0))):
@@ -156,7 +155,7 @@ def _turned_to_fit(vertices: Array, R: Array, bed: tuple[float, float, float]) -
 
 
 def _along_bed(vertices: Array, R: Array) -> Array:
-    """R turned about z so that the smallest rectangle around the part lies along x, its longer side first."""
+    """Return R turned about z so that the smallest rectangle around the part is along x, its longer side first."""
     flat = (vertices @ R.T)[:, :2]
     outline = flat[ConvexHull(flat).vertices]
     edges = np.roll(outline, -1, axis=0) - outline

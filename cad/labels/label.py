@@ -1,9 +1,8 @@
 """Engraved label of a printed part: task, angles and configuration; FRONT at the lidar's front. Millimetres.
 
-The label goes to the largest flat face with room for it and a wall behind it, preferably one that can be read on the
-assembled scanner, else one that mates with nothing there. A part with little room gets the configuration alone, and a
-part without room no label. The label is the last cut: drawings, screws and moving parts do not contain it. The
-lettering is our own (`cad/labels/glyphs.py`), so no font and no licence of one is involved.
+The label is on the largest flat face with enough area and a wall behind it, preferably one that can be read on the
+assembled scanner, else one that touches nothing there. A small part gets the configuration alone or no label. Drawings,
+screws and checks use the part without its label.
 """
 
 from __future__ import annotations
@@ -83,7 +82,7 @@ class Ground:
     front: Place | None
 
     def room(self, flat: Flat) -> shapely.Polygon:
-        """The part of a face that the middle lines of strokes may take."""
+        """Return the part of a face that the middle lines of strokes may use."""
         half = self.groove.width / 2
         occupied = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
         if self.front is not None and flat.face.isSame(self.front.flat.face):
@@ -95,14 +94,14 @@ class Ground:
         return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(occupied))
 
     def is_thick(self, flat: Flat, points: Array) -> bool:
-        """Whether a wall stays behind grooves, at points of a face."""
+        """Return whether a wall remains behind grooves at points of a face."""
         into = -flat.frame[:, 2]
         deep = (self.groove.depth + self.wall) * into
         return not any(self.piercing.between(start + 0.05 * into, start + deep) for start in flat.at(points))
 
 
 def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
-    """Engrave every printed part that has room."""
+    """Engrave every printed part that has enough area."""
     before, done, groove = room_before(assembly), Labelled(), groove_of(scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
@@ -130,7 +129,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
 
 
 def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]:
-    """Lines of the label of a part: the task, the angles that shape it, the configuration."""
+    """Return lines of the label of a part: the task, the angles that shape it, the configuration."""
     angles = scanner.angles.angles_deg
     shaped = {
         "none": [],
@@ -141,13 +140,7 @@ def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]
 
 
 def label_on(ground: Ground, texts: list[str], before: RoomBefore) -> tuple[Place, Lettering] | None:
-    """Place and lines of a label; None if nothing has room.
-
-    Args:
-        ground: the part.
-        texts: of the label; if they do not fit, the last one alone.
-        before: the room before the faces.
-    """
+    """Return place and lines of a label, of the last text alone if all do not fit; None if no face has enough area."""
     for least in (READING, TOUCH):
         rooms = [(flat, _open(flat, ground.room(flat), before, least)) for flat in ground.flats]
         for some, longest, height in product((texts, texts[-1:]), LONGEST, HEIGHTS):
@@ -160,7 +153,7 @@ def label_on(ground: Ground, texts: list[str], before: RoomBefore) -> tuple[Plac
 
 
 def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, TriMesh]:
-    """The part with lettering, and its mesh.
+    """Return the part with lettering, and its mesh.
 
     Raises:
         BuildError: the grooves spoil the part.
@@ -172,7 +165,7 @@ def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: 
 
 
 def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -> Place | None:
-    """Place of FRONT on the plates that carry the lidar: the feet of its letters to the middle, the heads to the V."""
+    """Return the place of FRONT on the plates that carry the lidar, its letters upright towards the V."""
     R = assembly.layout.stack.R()
     width, letter = FRONT.size
     middle = assembly.layout.linkage.half_x - FRONT_INSET
@@ -187,7 +180,7 @@ def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -
 
 
 def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -> shapely.Polygon:
-    """The part of a room, in squares of STEP, before which no body is nearer than `least`."""
+    """Return the part of an area, in squares of STEP, in front of which no body is nearer than `least`."""
     x0, y0, x1, y1 = flat.outline.bounds
     xs, ys = np.arange(x0 + STEP / 2, x1 + STEP / 2, STEP), np.arange(y0 + STEP / 2, y1 + STEP / 2, STEP)
     points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
@@ -198,7 +191,7 @@ def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -
 
 
 def _places(rooms: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
-    """Places of lettering of a size: in the first room first, there nearest to its middle."""
+    """Return places of lettering of a size: in the first area first, there nearest to its middle."""
     for flat, room in rooms:
         for turn in TURNS:
             for x, y in _corners(room, size, turn):
@@ -206,7 +199,7 @@ def _places(rooms: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, fl
 
 
 def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:
-    """Lower left corners of boxes that lie in a polygon, the nearest to its middle first."""
+    """Return the lower left corners of boxes inside a polygon, the nearest to its middle first."""
     if room.is_empty:
         return []
     x0, y0, x1, y1 = room.bounds
@@ -225,6 +218,6 @@ def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> l
 
 
 def _grid(size: tuple[float, float]) -> Array:
-    """Points all over lettering of a size, shape (n, 2)."""
+    """Return points all over lettering of a size, shape (n, 2)."""
     u, v = np.meshgrid(np.linspace(0.0, size[0], 6), np.linspace(0.0, size[1], 4), indexing="ij")
     return np.column_stack([u.ravel(), v.ravel()])

@@ -1,6 +1,6 @@
-"""How much room there is before the faces of the parts of an assembled scanner. Millimetres.
+"""Free distance in front of the faces of the parts of an assembled scanner. Millimetres.
 
-The scanner stands on an endless deck, and the servo is at joint 0.
+The deck is endless and the servo is at joint 0.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def room_before(assembly: Assembly) -> RoomBefore:
 
 
 def _deck(assembly: Assembly) -> Array:
-    """Two triangles, shape (2, 3, 3)."""
+    """Return the deck as two triangles, shape (2, 3, 3)."""
     axes, centre = assembly.layout.deck.rotation(), np.array(assembly.layout.deck.centre)
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * DECK_HALF
     corners = centre - DECK_BELOW * axes[:, 2] + square @ axes[:, :2].T

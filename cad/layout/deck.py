@@ -1,9 +1,8 @@
-"""Where the deck is that the scanner is screwed to, below or above it. No kernel: plain numpy.
+"""Pose of the deck that the scanner is screwed to. No kernel.
 
 World frame: origin on the face of the deck, in the centre of the mount's deck holes; z up. The deck is below the
-scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). A tripod's head
-is a deck under a plate of its own. Everything here is expressed in the rotation frame at gamma = 0, mm, unless its name
-says world.
+scanner (face at z = 0, scanner at z > 0), or above it if the axis points down (scanner at z < 0). Everything is in the
+rotation frame at gamma = 0, mm, unless its name says world.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ class Deck:
     joints: tuple[Joint, ...]  # of what is screwed to a flat deck without a mount
 
     def rotation(self) -> Array:
-        """Axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
+        """Return axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
         along, normal = np.array(self.along), np.array(self.normal)
         return np.stack([along, np.cross(normal, along), normal], axis=1)
 
@@ -118,7 +117,7 @@ def _on_flat_deck(mounted: Mounted) -> Joint:
 
 
 def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:
-    """Seats at the middle of each side of the foot, unless a screw is there; the groove is below."""
+    """Return seats at the middle of each side of the foot, unless a screw is there; the groove is below."""
     x, y, _ = foot
     seats = [
         TieSeat(
@@ -143,7 +142,7 @@ def _near_screw(seat: TieSeat, deck_holes: tuple[tuple[float, float], ...]) -> b
 
 
 def strut_corners(deck: Deck) -> Array:
-    """Corners of back plate and a pad in the foot, shape (n, 3): the strut is the part of their hull behind the plate.
+    """Return corners of back plate and a pad in the foot, shape (n, 3): the strut is their hull behind the plate.
 
     No facet coincides with plate or foot.
     """
@@ -158,14 +157,14 @@ def strut_corners(deck: Deck) -> Array:
 
 
 def rail_wall(printer: Printer) -> float:
-    """What is left of a rail around the heads of its screws."""
+    """Return the wall of a rail around the heads of its screws."""
     return max(RAIL_WALL, printer.min_wall_mm)
 
 
 def _height_of_back(
     rotor_radius: float, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
 ) -> float:
-    """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
+    """Return the height of the back plate's centre above the deck that keeps everything FREE above the foot."""
     plate = [
         (sx * half[0], back[1] + sy * half[1], back[2] - depth)
         for sx in (1, -1)
@@ -188,9 +187,9 @@ def _foot_shift(
     along: Array,
     height: float,
 ) -> Array:
-    """Least shift of the foot in the deck's plane that keeps the drivers of the case screws off the deck screws.
+    """Return the least shift of the foot that keeps the drivers of the case screws off the deck screws.
 
-    The drivers come from behind along z, through strut and perhaps foot, where a deck screw may stand.
+    The drivers come from behind along z, through the strut and sometimes the foot.
     """
     screw = SCREWS[(scanner.deck or USUAL).screw]
     room = mounted.screw.head_room + screw.head_room
@@ -212,7 +211,7 @@ def _foot_shift(
 
 
 def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, float]:
-    """Half extents of an octagon around all holes and the strut's pad, and what is cut off its corners.
+    """Return the half extents of an octagon around all holes and the strut's pad, and the cut of its corners.
 
     Raises:
         BuildError: a hole lies under the strut, where no driver reaches its screw.

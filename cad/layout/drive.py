@@ -1,7 +1,7 @@
-"""How the servo turns the shaft, as data: a list of stations along the axis, and what each kind of drive adds.
+"""How the servo turns the shaft, as data: stations along the axis, and numbers of each kind of drive.
 
-Rotation frame at gamma = 0, mm. Only `drive_of` in `cad/layout/placement.py` knows which drives there are; each fills a
-`DriveLayout` in a separate folder (`direct/`, `belt/`), and all other code reads it.
+Rotation frame at gamma = 0, mm. `drive_of` in `cad/layout/placement.py` selects the drive; each fills a `DriveLayout`
+in its folder (`direct/`, `belt/`), which all other code reads.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Rod:
     high: float
 
     def cuboid(self) -> Cuboid:
-        """The box around it."""
+        """Return the box around it."""
         r = self.radius
         return Cuboid((-r, -r, self.low), (r, r, self.high))
 
@@ -221,7 +221,7 @@ class DriveLayout:
     borne: tuple[tuple[str, str], ...] = ()
 
     def of(self, kind: type[Record]) -> Record | None:
-        """The numbers of one kind of part; None if this drive has none."""
+        """Return the record of one kind of part; None if this drive has none."""
         return next((record for record in self.records if isinstance(record, kind)), None)
 
     @property
@@ -245,7 +245,7 @@ class DriveLayout:
 
 
 def towards(points: Array, azimuth: float) -> tuple[Array, Array]:
-    """Points (n, 3) turned about the axis by an azimuth [rad], and the unit vector at that azimuth."""
+    """Return points (n, 3) turned about the axis by an azimuth [rad], and the unit vector at that azimuth."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
 

@@ -1,7 +1,6 @@
-"""The upper end of every scanner: the hub that carries the linkage on its shaft, whatever drives it. Plain numpy.
+"""The hub that carries the linkage on its shaft, for every drive. No kernel.
 
-What is below the hub is a layout of its own: `cad/layout/direct/` with the servo on the axis, `cad/layout/belt/` with
-it beside the axis.
+All below the hub is in `cad/layout/direct/` (servo on the axis) or `cad/layout/belt/` (servo next to the axis).
 """
 
 from __future__ import annotations
@@ -36,8 +35,8 @@ Axis = Literal["x", "y"]
 class Hub(ABC):
     """The hub along the axis: radii, lengths and the z of each plane (rotation frame, mm).
 
-    If the hub covers a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
-    to the linkage from the lidar's side by its ears.
+    If the hub covers a screw of the lidar, the lidar is screwed to a sub-plate on the bench, and that to the linkage by
+    its ears, from the lidar's side.
     """
 
     h: float
@@ -138,5 +137,5 @@ class Hub(ABC):
         """Half angle [rad] of a cone inside it, of round bodies only."""
 
     def R(self) -> Array:
-        """Laser in the rotation frame, shape (3, 3)."""
+        """Return the laser in the rotation frame, shape (3, 3)."""
         return np.array(self.R_rot_laser)

@@ -1,8 +1,7 @@
-"""Joints: what holds what, by which screw, where, and how long that is. Declared here, and read by everybody.
+"""Joints: screws between two bodies, their places and lengths. Rotation frame at gamma = 0, mm.
 
-Each part declares its own (`PartSpec.joints`). Parts list, steps, drawings and findings read them; the parts cut their
-holes from the same numbers of the layout, and a test reads the joints back from the solids. Lengths are the shortest of
-the standards that hold. Rotation frame at gamma = 0, mm.
+Each part declares its own (`PartSpec.joints`); parts list, steps, drawings and checks read them. Lengths are the
+shortest sufficient ones of the standards.
 """
 
 from __future__ import annotations
@@ -117,12 +116,12 @@ class Joint:
 
 
 def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
-    """Shortest standard length that holds; in a shallow thread the longest that does not bottom.
+    """Return the shortest sufficient standard length; in a shallow thread the longest that does not bottom.
 
     Args:
         screw: the size.
-        grip: what the shank passes before it holds.
-        fixing: what holds the thread.
+        grip: length of the shank before its thread engages.
+        fixing: kind of thread.
         depth: of the thread, or of the material before the nut.
     """
     known = LENGTHS[screw.name]
@@ -138,17 +137,17 @@ def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
 
 
 def fixing_in(thread: Thread) -> Fixing:
-    """How a screw holds in a printed part."""
+    """Return how a screw is fixed in a printed part."""
     return "thread" if thread.trap is None else "trap"
 
 
 def upright_axes(points: Iterable[Sequence[float]], z: float, up: float) -> tuple[ScrewAxis, ...]:
-    """Axes of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
+    """Return axes of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
     return tuple(ScrewAxis((float(x), float(y), z), (0.0, 0.0, up)) for x, y in points)
 
 
 def inward_axes(azimuths: Iterable[float], radius: float, z: float) -> tuple[ScrewAxis, ...]:
-    """Axes of screws towards the rotation axis that start at a radius."""
+    """Return axes of screws towards the rotation axis that start at a radius."""
     outwards = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
     return tuple(ScrewAxis((radius * x, radius * y, z), (-x, -y, 0.0)) for x, y in outwards)
 
@@ -156,47 +155,47 @@ def inward_axes(azimuths: Iterable[float], radius: float, z: float) -> tuple[Scr
 def placed_axes(
     axes: Iterable[ScrewAxis], R: Array, t: Sequence[float] | Array = (0.0, 0.0, 0.0)
 ) -> tuple[ScrewAxis, ...]:
-    """The same in the rotation frame; R is the pose of their frame in it, t its origin."""
+    """Return axes in the rotation frame; R and t are the pose of their frame in it."""
     return tuple(ScrewAxis(triple(R @ axis.start + np.asarray(t)), triple(R @ axis.along)) for axis in axes)
 
 
 def round_wall_mm(inner_radius: float, outer: float, hole: float) -> float:
-    """Length of a radial hole of a diameter between the inside of a tube and a distance from its axis."""
+    """Return the length of a radial hole of a diameter between the inside of a tube and a distance from its axis."""
     return outer - math.sqrt(inner_radius**2 - (hole / 2) ** 2)
 
 
 def screws(onto: str, part: str = "") -> str:
-    """Mark for the screws of a step's part, or of another one, that end in a body."""
+    """Return the mark for the screws of a step's part, or of another one, that end in a body."""
     return f"{{{part}>{onto}}}" if part else f"{{{onto}}}"
 
 
 def lidar_thread_mm(lidar: Lidar) -> float:
-    """Depth of the threads in a lidar's base, as far as they are drawn, or thickness of its ears."""
+    """Return the drawn depth of the threads in a lidar's base, or the thickness of its ears."""
     return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
 
 
 def fixing_of(pattern: HolePattern) -> Fixing:
-    """What holds a screw that goes into the holes of a bought device: their thread, or a nut behind them."""
+    """Return how a screw is fixed in the holes of a bought device: by their thread, or a nut behind them."""
     return "nut" if pattern.kind == "through" else "thread"
 
 
 def horn_thread_mm(servo: Servo) -> float:
-    """Depth of the threads in a servo's horn."""
+    """Return the depth of the threads in a servo's horn."""
     return servo.horn_thread_depth_mm
 
 
 def horn_centres(servo: Servo) -> Array:
-    """Centres of the horn's holes, servo's frame, shape (n, 2)."""
+    """Return centres of the horn's holes, servo's frame, shape (n, 2)."""
     return polygon(servo.horn_circle_mm / 2, servo.horn_holes, math.radians(90.0 + servo.horn_first_hole_deg))
 
 
 def horn_joint(servo: Servo, part: str, onto: str, heads: float, grip: float) -> Joint:
-    """Joint of what is screwed to a servo's horn, its heads at a height, in the frame of the servo's axis."""
+    """Return the joint of a part on a servo's horn, heads at a height, in the frame of the servo's axis."""
     axes = upright_axes(horn_centres(servo), heads, -1.0)
     screw = SCREWS[servo.horn_screw]
     return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=horn_thread_mm(servo))
 
 
 def triple(v: Array) -> tuple[float, float, float]:
-    """A point or a direction as a record holds it."""
+    """Return a vector as a tuple."""
     return float(v[0]), float(v[1]), float(v[2])

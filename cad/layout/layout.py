@@ -1,6 +1,6 @@
-"""The layout of one scanner: every number that more than one of its parts needs, worked out once. No kernel.
+"""The layout of one scanner: every number that more than one of its parts needs, computed once. No kernel.
 
-`layout_of` places everything, lets the parts describe themselves, and runs the cables clear of them.
+`layout_of` places everything, collects the descriptions of the parts, and routes the cables around them.
 """
 
 from __future__ import annotations
@@ -63,11 +63,7 @@ class Layout(Placement):
 
 
 def layout_of(scanner: Scanner, parts_of: Parts) -> Layout:
-    """Lay out one scanner.
-
-    Args:
-        scanner: angles and products.
-        parts_of: the parts that it has, described from where they are, and those that it does not need.
+    """Lay out one scanner; `parts_of` returns its parts, and those that it does not need.
 
     Raises:
         BuildError: it cannot be laid out.

@@ -1,4 +1,4 @@
-"""The names of parts, of bought products and of the bodies that draw these: in files, lists and words."""
+"""Names of parts, bought products and their bodies, in files, lists and texts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where everything of one scanner is, step by step: each step is a function of the records before it. No kernel."""
+"""Places of everything of one scanner; each step is a function of earlier records. No kernel."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """Where everything is: what the parts are described from.
+    """Where everything is: the input for the descriptions of parts.
 
     Attributes:
         scanner: angles and products.
         drive: all below the hub.
         deck: that the scanner is screwed to.
-        linkage: between hub and lidar, with ear and seats of cable ties.
+        linkage: between hub and lidar.
         neck: corners of its neck, shape (n, 3).
-        counterweight: the bar as long as the estimate of the rotor needs, or why there is none.
+        counterweight: the bar with its estimated length, or why there is none.
         ties_left_out: seats of cable ties that have no place.
     """
 
@@ -73,7 +73,7 @@ def placement_of(scanner: Scanner) -> Placement:
 
 
 def drive_of(scanner: Scanner) -> DriveLayout:
-    """The drive of one scanner: a belt if the ring is a capsule, else the servo on the axis.
+    """Return the drive of one scanner: a belt if the ring is a capsule, else the servo on the axis.
 
     Raises:
         BuildError: it cannot be laid out.

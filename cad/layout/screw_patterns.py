@@ -35,12 +35,7 @@ class ScrewPattern:
 
 
 def screw_patterns(joints: Sequence[Joint], R_rot_lidar: Array) -> list[ScrewPattern]:
-    """Return the patterns in the order of `DEVICES`, each once.
-
-    Args:
-        joints: of the scanner.
-        R_rot_lidar: pose of the lidar in the rotation frame, shape (3, 3).
-    """
+    """Return the patterns in the order of `DEVICES`, each once; R_rot_lidar has shape (3, 3)."""
     patterns: dict[ScrewPattern, None] = {}
     for device in DEVICES:
         for joint in joints:

@@ -1,4 +1,4 @@
-"""A seat of a cable tie: a tongue with a slot on either side of what is tied to it. Millimetres."""
+"""A slotted tab for a cable tie. Millimetres."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GROOVE = 1.6  # depth of the tie's way where something lies on the tongue
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TieSeat:
-    """A tongue along a direction square to z, which what is tied follows.
+    """A tab with a slot on either side of the cable, along a direction across z.
 
     Attributes:
         azimuth: of the direction [rad].
@@ -56,16 +56,16 @@ class TieSeat:
         return self.half + SLOT_ACROSS + SLOT_WALL
 
     def direction(self) -> Array:
-        """Outwards, shape (3,)."""
+        """Return the unit vector outwards, shape (3,)."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), 0.0])
 
     def points(self, along: Array, across: Array, z: Array) -> Array:
-        """Points at all of some places along, across and over it, shape (n, 3)."""
+        """Return the grid of points at places along, across and above it, shape (n, 3)."""
         x, y, height = (each.ravel() for each in np.meshgrid(along, across + self.aside, z, indexing="ij"))
         out = self.direction()
         return x[:, None] * out + y[:, None] * [-out[1], out[0], 0.0] + height[:, None] * [0.0, 0.0, 1.0]
 
     def corners(self, inner: float) -> Array:
-        """Corners of the tongue from a place outwards, shape (8, 3)."""
+        """Return corners of the tab from a place outwards, shape (8, 3)."""
         across = np.array([-self.half_width, self.half_width])
         return self.points(np.array([inner, self.end]), across, np.array([self.low, self.high]))

@@ -1,7 +1,7 @@
-"""What the screws of a joint can bear, how they are tightened, and what loosens them. No kernel: plain numbers.
+"""Strength, tightening torque and loosening of the screws of a joint. No kernel.
 
-Forces in N, stresses in MPa, lengths in mm, torques in N m. Screws are of stainless steel A2-70 (ISO 3506-1), nuts as
-strong as they. Friction counts for nothing: what is here holds with every screw loose in its thread.
+Forces in N, stresses in MPa, lengths in mm, torques in N m. Screws are stainless steel A2-70 (ISO 3506-1), with nuts as
+strong. Friction is neglected.
 """
 
 from __future__ import annotations
@@ -81,12 +81,12 @@ class Hold:
 
 
 def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
-    """One of a joint's screws; None for grub screws, which hold by friction.
+    """Return the strength of one of a joint's screws; None for grub screws, which hold by friction.
 
     Args:
         joint: the joint.
-        under: what its heads bear on.
-        into: what holds its threads; where that is a nut or an insert, what carries these.
+        under: material below its heads.
+        into: material of its threads, or of the body that carries nuts or inserts.
     """
     if joint.fixing == "grub":
         return None
@@ -128,7 +128,7 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
 
 
 def _under_head_mm2(joint: Joint, hole: float) -> float:
-    """What a head or its washer bears on: less the hole, or the strip of a slot that is longer than the head."""
+    """Return the contact area of a head or washer, less the hole or the slot."""
     head = joint.washer_mm or joint.screw.head_diameter
     disc = math.pi / 4 * head**2
     if joint.slot_mm is None:
@@ -138,12 +138,12 @@ def _under_head_mm2(joint: Joint, hole: float) -> float:
 
 
 def stress_area_mm2(screw: Screw) -> float:
-    """Stress area of its thread (ISO 898-1); the pitch of a coarse thread is what its core hole is smaller."""
+    """Return the stress area of a coarse thread (ISO 898-1)."""
     return math.pi / 4 * (screw.nominal - 0.9382 * (screw.nominal - screw.core)) ** 2
 
 
 def _strips(screw: Screw, engaged: float, into: Material) -> float:
-    """Pull that shears the thread off what holds it."""
+    """Return the pull that strips the thread."""
     return FLANKS * math.pi * screw.nominal * engaged * SHEARED * into.strength_mpa
 
 

@@ -1,4 +1,4 @@
-"""Holes of a device: the walls of one axis joined, where they open, how deep they are, what screw fits. Millimetres."""
+"""Holes of a device: walls of one axis joined, with mouth, depth and likely screw. Millimetres."""
 
 from __future__ import annotations
 
@@ -130,10 +130,10 @@ def _face(scene: Scene, wall: Wall, sign: int) -> float:
 
 
 def likely_screws(bore: Bore) -> list[tuple[str, str]]:
-    """Return kind of hole and size of screw, the likelier first; none if no screw fits.
+    """Return the kind of hole and size of screw, the likelier first; none if no screw fits.
 
-    A blind hole is taken for a thread, modelled by its core (ISO 2306) or by its outer diameter; an open one may also
-    pass a screw.
+    A blind hole is assumed to be a thread, modelled by its core (ISO 2306) or its outer diameter; a through hole may
+    also be a clearance hole.
     """
     d = bore.diameter
     sizes = [(s.core, s.name) for s in SCREWS.values() if abs(d - s.core) < CORE_MM + CORE_SHARE * s.nominal]

@@ -1,4 +1,4 @@
-"""Values of a product file that a maker's model gives. All are unverified: a person compares them with the device."""
+"""Values of a product file from a maker's model. All are unverified: a person compares them with the device."""
 
 from __future__ import annotations
 

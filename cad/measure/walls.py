@@ -1,4 +1,4 @@
-"""Cylinders in a mesh: walls of holes and of bosses, as far around as the mesh has them. Millimetres."""
+"""Cylinders in a mesh: walls of holes and bosses. Millimetres."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def walls_of(triangles: Array) -> list[Wall]:
 
 
 def _axes(normals: Array, weights: Array) -> list[Array]:
-    """Return x, y, z, and the normals of larger planes that are none of them, opposite ones once."""
+    """Return x, y, z, and the other normals of larger planes, opposite ones once."""
     axes = list(np.eye(3))
     index = np.unique(np.round(normals, 2), axis=0, return_inverse=True)[1]
     shares = np.bincount(index.reshape(-1), weights) / weights.sum()

@@ -49,7 +49,7 @@ SPECS = (
 
 
 def parts_of(place: Placement) -> list[PartSpec | LeftOut]:
-    """The parts that one scanner needs, and those that it does not, with the reason."""
+    """Return the parts that one scanner needs, and those that it does not, with the reason."""
     return [part for spec_of in SPECS if (part := spec_of(place)) is not None]
 
 

@@ -48,12 +48,12 @@ def to_centre(servo: Servo) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step of putting a scanner together.
+    """One assembly step.
 
     Attributes:
         title: of it.
         words: with marks of `cad/layout/joints.py` for screws.
-        check: what must be so before one goes on.
+        check: condition to check before the next step.
         brings: bought products without a step of their own that come with it.
     """
 
@@ -154,6 +154,6 @@ class PartSpec:
         return tuple(field.removeprefix(kind) for field in (*self.shaped_by, *self.shapes) if field.startswith(kind))
 
     def density_g_cm3(self, printer: Printer) -> float:
-        """Density of its material."""
+        """Return the density of its material."""
         densities = {"printed": printer.density_g_cm3, "turned": ALUMINIUM_G_CM3, "sawn": STEEL_G_CM3}
         return densities[self.process]

@@ -1,9 +1,9 @@
-"""How far gravity moves and turns the lidar against the horn, for gravity along each axis of the rotation frame.
+"""Displacement of the lidar by gravity along each axis of the rotation frame.
 
-The printed parts between shaft and lidar by finite elements on two grids, the shaft as a beam. Linkage and
-sub-plate are one body, bonded to the spigot all around; the lidar lies on its seat and stiffens nothing. Grids lie
-along the laser frame: its seat is a face of theirs. Where a gap is narrower than a cell, the cell bridges it: the two
-grids then differ much, and the error says so.
+The printed parts between shaft and lidar by finite elements on two grids, the shaft as a beam. Linkage and sub-plate
+are one body, bonded to the spigot; the lidar rests on its seat without stiffening it. Grids are along the laser frame:
+the seat is a face of theirs. A cell bridges gaps narrower than itself; the two grids then differ, and the error
+includes it.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Sag:
 def linkage_sag(
     stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
 ) -> Sag:
-    """Sag of the printed parts alone.
+    """Return the sag of the printed parts alone.
 
     Args:
         stack: the layout.
@@ -69,7 +69,7 @@ def linkage_sag(
 
 
 def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
-    """Sag of linkage and shaft, which the whole rotor bends."""
+    """Return the sag of linkage and shaft, which the entire rotor bends."""
     end = np.array([0.0, 0.0, stack.hub_bottom / 1000])
     turned, shifted = [], []
     for along in np.eye(3):
@@ -117,7 +117,7 @@ def _on_grid(
 
 
 def _grid(triangles: Array, edge: float, seat: float) -> Grid:
-    """Grid around all triangles, with a face at the seat's height, symmetric about the lidar's axis."""
+    """Return a grid around all triangles, with a face at the seat's height, symmetric about the lidar's axis."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     start = np.array([0.0, 0.0, seat])
     before, beyond = (np.ceil((start - low) / edge), np.ceil((high - start) / edge))
@@ -126,7 +126,7 @@ def _grid(triangles: Array, edge: float, seat: float) -> Grid:
 
 
 def _spigot(stack: Hub) -> tuple[Array, float]:
-    """Points all around the shaft in the hub, and the area, rotation frame."""
+    """Return points all around the shaft in the hub, rotation frame, and the area."""
     radius, length = stack.shaft_diameter / 2, stack.spigot
     rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))
     z = stack.shoulder + (np.arange(rows) + 0.5) / rows * length
@@ -136,7 +136,7 @@ def _spigot(stack: Hub) -> tuple[Array, float]:
 
 
 def _seat(grid: Grid, body: Array, seat: Array) -> tuple[Array, Array]:
-    """Middles of the cubes' faces at the seat's height, and which of them the lidar lies on."""
+    """Return middles of the cubes' faces at the seat's height, and which of them support the lidar."""
     level = round((float(seat[2]) - float(grid.low[2])) / grid.edge) * grid.parts
     x, y = np.meshgrid(grid.middles(0), grid.middles(1), indexing="ij")
     lies = (body[:, :, level - 1] > 0.5) & (np.abs(x) < seat[0]) & (np.abs(y) < seat[1])

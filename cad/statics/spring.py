@@ -1,7 +1,7 @@
-"""A printed part between two rigid bodies as one spring with a mass: six displacements, by finite elements.
+"""A printed part between two rigid bodies as a spring with a mass: six displacements, by finite elements.
 
 Displacements and loads are six numbers at the origin of the rotation frame: a rotation [rad] before a shift [m], a
-moment [N m] before a force [N]. One origin for all springs: compliances of springs in a row simply add up.
+moment [N m] before a force [N]. With one origin, compliances of springs in a row add up.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MOMENT_FIRST, FORCE_LAST = np.eye(6)[:3], np.eye(6)[3:]  # of six unit loads, sh
 
 @dataclass(frozen=True, slots=True)
 class Spring:
-    """What lies between two rigid bodies.
+    """A spring between two rigid bodies.
 
     With q the displacement of the first body and e that of the second one against it, the kinetic energy of the spring
     is that of the mass matrix ((rigid, coupled), (coupled.T, own)) for the speeds of (q, e): Guyan's reduction.

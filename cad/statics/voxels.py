@@ -1,4 +1,4 @@
-"""How much of each small cube of a grid a closed mesh fills: rays along z, in and out by the surface's normals."""
+"""Filled share of each small cube of a grid in a closed mesh: rays along z, in and out by the surface's normals."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Grid:
     parts: int
 
     def middles(self, axis: int) -> Array:
-        """Middles of the cubes along one axis [mm]."""
+        """Return middles of the cubes along one axis [mm]."""
         return self.low[axis] + self.edge * (np.arange(self.shape[axis] * self.parts) + 0.5) / self.parts
 
 

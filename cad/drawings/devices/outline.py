@@ -1,4 +1,4 @@
-"""What a sketch shows of a device: boxes, cylinders and holes, from its record."""
+"""Geometry of a device's sketch: boxes, cylinders and holes, from its catalogue record."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def spots_of(holes: Iterable[Hole], mark: str = "") -> tuple[Spot, ...]:
 
 @singledispatch
 def outline_of(product: Product) -> DeviceOutline:
-    """Return what a sketch shows of a product.
+    """Return the geometry of a product's sketch.
 
     Raises:
         TaskError: its record has no dimensions.

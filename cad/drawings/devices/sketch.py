@@ -69,13 +69,7 @@ def sketch_svg(product: Product) -> bytes:
 
 
 def views_of(spots: Sequence[Spot], draw: Draw, heights: Sequence[float] = ()) -> list[SketchView]:
-    """Return the views that a device needs, with its holes and dimensions.
-
-    Args:
-        spots: its holes.
-        draw: its outline in a view.
-        heights: z that get a dimension as well.
-    """
+    """Return the views of a device with holes and dimensions; `heights` are z that get a dimension as well."""
     views = []
     for title, right, up in _shown(spots):
         r, u = np.asarray(right, dtype=float), np.asarray(up, dtype=float)

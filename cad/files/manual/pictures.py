@@ -1,8 +1,7 @@
 """The picture of each step: present bodies in grey, new ones in colour before they are moved into place, screws named.
 
-The rotation axis is upright, on the bench the lidar's axis. The view shows the heads of the screws: the best of eight
-sides, from above and below; without screws the first. New bodies are drawn where nothing hides them, away from their
-place along the path of their motion, with their screws and nuts. The same scanner gives the same bytes.
+The rotation axis is upright, on the bench the lidar's axis. Of eight sides, from above and below, the view is the one
+that shows the heads of the screws best; without screws it is the first.
 """
 
 from __future__ import annotations
@@ -43,12 +42,6 @@ class StepPictures:
     """Pictures of the steps of one scanner; a body is prepared once for all of them."""
 
     def __init__(self, meshes: dict[str, TriMesh], made: frozenset[str]) -> None:
-        """Keep the bodies.
-
-        Args:
-            meshes: of all bodies, rotation frame [mm].
-            made: names of those that are made, not bought.
-        """
         self._meshes, self._made = meshes, made
         self._scenes: dict[str, Scene] = {}
 
@@ -101,7 +94,7 @@ class StepPictures:
 
 
 def _side(scene: StepScene) -> tuple[float, float]:
-    """Return yaw and pitch [rad] of the view that shows most of the heads, preferably from above."""
+    """Return the yaw and pitch [rad] of the view that shows most of the heads, preferably from above."""
     heads = [-np.array(axis.along) @ scene.R_rot_picture for joint, _ in scene.joints for axis in joint.axes]
 
     def seen(yaw: float, pitch: float) -> float:

@@ -1,4 +1,4 @@
-"""The servo beside the axis, for capsule rings, as a `DriveLayout`: belt, hollow shaft, tower."""
+"""The servo next to the axis, for capsule rings, as a `DriveLayout`: belt, hollow shaft, tower."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ BUILT = (
 
 
 def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """The drive of a scanner with a capsule ring.
+    """Return the drive of a scanner with a capsule ring.
 
     Raises:
         BuildError: it cannot be laid out.
@@ -99,7 +99,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
 
 
 def _bears(_bar_g: float, _bar_z: float) -> bool:
-    """The bearings carry a counterweight, not the horn."""
+    """Return the bearings carry a counterweight, not the horn."""
     return True
 
 
@@ -168,7 +168,6 @@ def _stations(stack: BeltStack, ring: SlipRing) -> Iterator[Station]:
 
 
 def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
-    """The tower."""
     foot = [(x, y, stack.tower_bottom) for x in (-FOOT_HALF, FOOT_HALF) for y in (-FOOT_HALF, FOOT_HALF)]
     return Mounted(
         onto=names.BEARING_TOWER,
@@ -186,7 +185,7 @@ def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
 
 
 def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth: float) -> Iterator[LeadExit]:
-    """Paths of the leads up the bore and out by its two windows."""
+    """Yield the path of the leads up the bore and out by its two windows."""
     low, middle = stack.ring_top + stack.rotor.length_mm, stack.hub_bottom - WINDOW_BELOW
     ends = []
     for sign in (1.0, -1.0) if bundle.count == 1 else (1.0 - 2.0 * (bundle.number % 2),):

@@ -1,4 +1,4 @@
-"""What the belt layout carries: two bearings the rotor, the horn the pull of the belt. No kernel: plain numpy.
+"""Loads of the belt drive: rotor on two bearings, belt on the horn. SI units; the stack is in mm. No kernel.
 
 SI units; lengths of the stack are millimetres.
 """
@@ -36,7 +36,7 @@ class BeltPull:
 
 
 def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
-    """Forces of the belt at the largest torque of the servo's work."""
+    """Return the forces of the belt at the largest torque of the servo in operation."""
     working = torque_nm / (stack.pitch_radius / 1000)
     strand = max(PRELOAD_N, PRELOAD_SHARE * working)
     lever = (stack.belt_middle - stack.horn) / 1000
@@ -44,7 +44,7 @@ def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
 
 
 def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: float) -> tuple[float, float]:
-    """Force across the upper and the lower bearing [N] in the worst position: weight and belt pull the same way.
+    """Return the force across the upper and the lower bearing [N] if weight and belt pull the same way.
 
     Args:
         stack: its layout.
@@ -61,18 +61,14 @@ def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: f
 
 
 def belt_nm_per_rad(stack: BeltStack) -> float:
-    """Stiffness of both strands about the axis, the servo held."""
+    """Return the stiffness of both strands about the axis, with the servo fixed."""
     return 2 * stack.belt.stiffness_n / (stack.centre / 1000) * (stack.pitch_radius / 1000) ** 2
 
 
 def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
-    """Return how far the shaft gives way at the hub.
+    """Return the compliance of the shaft at the hub; `seat_m_per_n` is that of each support.
 
     A tube on two supports, its hub beyond the upper one; the belt is two springs against turning.
-
-    Args:
-        stack: its lengths and radii.
-        seat_m_per_n: how far a force moves each support.
     """
     EI = ALUMINIUM_PA * _second_moment(stack)
     span = (stack.upper_middle - stack.lower_middle) / 1000
@@ -94,7 +90,7 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
 
 
 def _second_moment(stack: BeltStack) -> float:
-    """Second moment of the tube [m4]."""
+    """Return the second moment of the tube [m4]."""
     return math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12
 
 
@@ -104,11 +100,11 @@ def _twist(stack: BeltStack) -> float:
 
 
 def run_out_rad(stack: BeltStack, fit_mm: float) -> float:
-    """Amplitude of the angle's error, once per turn: each pulley stands off its axis by half the play of its fit."""
+    """Return the amplitude of the angle error, once per turn: each pulley is off its axis by half of its fit."""
     off = 2 * fit_mm / 4
     return off / stack.pitch_radius
 
 
 def press_newton(stack: BeltStack, strand_n: float, give_mm: float) -> float:
-    """Force in the middle of a strand that moves it by so much: how a pre-load is felt."""
+    """Return the force in the middle of a strand that moves it by `give_mm`: a test of its pre-load."""
     return 4 * strand_n * give_mm / stack.centre

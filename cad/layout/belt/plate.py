@@ -1,4 +1,4 @@
-"""Every number of the plate that holds the servo beside the axis. No kernel."""
+"""Numbers of the plate that holds the servo next to the axis. No kernel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DrivePlate:
 
 
 def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
-    """Parameters of the plate of one scanner.
+    """Return the plate of one scanner.
 
     Raises:
         BuildError: the case has no four front holes beside the horn.
@@ -61,5 +61,5 @@ def plate_of(scanner: Scanner, stack: BeltStack) -> DrivePlate:
 
 
 def pulley_foot_radius(servo: Servo) -> float:
-    """Radius of what lies on the horn, under the drive pulley."""
+    """Return the radius of the drive pulley's foot on the horn."""
     return servo.horn_circle_mm / 2 + SCREWS[servo.horn_screw].nominal / 2 + 2.0

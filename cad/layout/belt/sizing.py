@@ -1,4 +1,4 @@
-"""Laying out the belt drive: bearings by the capsule, pulleys by the boss, the belt by the servo's place. mm."""
+"""Sizes of the belt drive: bearings by the capsule, pulleys by the boss, the belt by the servo's place. mm."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
 
 
 def centre_of(belt_teeth: int, teeth: int, pitch_mm: float) -> float:
-    """Centre distance at which a belt is tight around two equal pulleys: half of it goes around them."""
+    """Return the centre distance at which a belt is tight around two equal pulleys."""
     return (belt_teeth - teeth) * pitch_mm / 2
 
 
@@ -116,7 +116,7 @@ def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
 
 
 def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
-    """The screws of the tower's foot stand around the capsule's chamber."""
+    """Check that the screws of the tower's foot are outside the capsule's chamber."""
     corner = math.sqrt(2) * FOOT_HOLE - FOOT_SCREW.nominal / 2 - scanner.printer.min_wall_mm
     if stack.chamber_radius > corner:
         most = 2 * (corner - RING_ROOM)
@@ -127,7 +127,7 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
 
 
 def _check_horn(stack: BeltStack) -> None:
-    """The pulley's foot reaches down to the horn."""
+    """Check that the pulley's foot reaches down to the horn."""
     most = stack.teeth_low - stack.horn - stack.servo.case_max_mm[2]
     if stack.horn > stack.teeth_low:
         servo = stack.servo
@@ -139,7 +139,7 @@ def _check_horn(stack: BeltStack) -> None:
 
 
 def _check_heads(stack: BeltStack, printer: Printer) -> None:
-    """The heads of the horn's screws leave a wall below the teeth, and around the horn's boss where they reach it."""
+    """Check the wall below the teeth, and around the horn's boss, at the heads of the horn's screws."""
     servo = stack.servo
     screw = SCREWS[servo.horn_screw]
     place = f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}"
@@ -156,13 +156,13 @@ def _check_heads(stack: BeltStack, printer: Printer) -> None:
 
 
 def _least_centre(stack: BeltStack, servo: Servo) -> float:
-    """Shortest centre distance: case beside the tower, and pulleys beside each other, with the belt put on."""
+    """Return the shortest centre distance with the case next to the tower and the belt mounted."""
     case = stack.wide_radius - servo.case_min_mm[0] + CASE_ROOM
     return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
 
 
 def _quarter(scanner: Scanner, stack: BeltStack, rotor_radius: float) -> int:
-    """The side of the axis on which the servo needs the lowest deck; of equal ones, beside the axis and not above."""
+    """Return the side of the servo that allows the lowest deck; of equal ones, the one at the side of the axis."""
     up = scanner.angles.T_world_rot(0.0)[2, :3]
     normal = up if up[2] >= -1e-6 else -up
     rotor = rotor_radius + SWEEP_MARGIN

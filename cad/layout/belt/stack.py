@@ -71,7 +71,7 @@ FOOT_HOLE = 24.0  # x and y of its screws
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeltStack(Hub):
-    """The hollow shaft along its axis, and the servo beside it. Lengths in mm."""
+    """The hollow shaft along its axis, and the servo next to it. Lengths in mm."""
 
     shaft_bore: float
     carrier: Bearing  # two of them
@@ -271,12 +271,12 @@ class BeltStack(Hub):
         return math.atan2(self.rim_radius - 0.1, -self.teeth_top)
 
     def turn(self) -> Array:
-        """Servo's frame to rotation frame, shape (3, 3): a whole number of quarter turns."""
+        """Return the rotation from the servo's frame to the rotation frame, shape (3, 3): whole quarter turns."""
         c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.quarter % 4]
         return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
 
     def servo_origin(self) -> Array:
-        """Where the horn's axis meets its face, rotation frame, shape (3,)."""
+        """Return the centre of the horn's face, rotation frame, shape (3,)."""
         return self.turn() @ [self.centre, 0.0, self.horn]
 
     @property
@@ -286,14 +286,14 @@ class BeltStack(Hub):
 
 
 def case_corners(stack: BeltStack) -> Array:
-    """Corners of the servo's case where it stands, rotation frame, shape (8, 3)."""
+    """Return corners of the servo's case at its place, rotation frame, shape (8, 3)."""
     low, high = stack.servo.case_min_mm, stack.servo.case_max_mm
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     return corners @ stack.turn().T + stack.servo_origin()
 
 
 def drive_corners(stack: BeltStack) -> Array:
-    """Corners of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
+    """Return corners of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
     rim, (low, high) = stack.rim_radius, stack.plate_y
     reach = stack.centre + stack.plate_x + TRAVEL
     shelf = [(x, y, z) for x in (0.0, reach) for y in (low, high) for z in (stack.tower_top - SHELF, stack.tower_top)]

@@ -1,4 +1,4 @@
-"""Every number of the bearing tower and of what stands in it: screws of plate, foot and disc. No kernel."""
+"""Numbers of the bearing tower: screws of plate, foot and disc. No kernel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BearingTower:
 
 
 def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
-    """Parameters of the tower of one scanner."""
+    """Return the tower of one scanner."""
     printer = scanner.printer
     foot = thread_in_part(FOOT_SCREW, printer, carries=True)
     free = math.sqrt(2) * FOOT_HOLE - printer.min_wall_mm - stack.chamber_radius
@@ -46,11 +46,11 @@ def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
 
 
 def disc_azimuths(stack: BeltStack) -> list[float]:
-    """Azimuths [rad] of the radial screws of the capsule's disc, servo's frame: between the screws of its flange."""
+    """Return azimuths [rad] of the radial screws of the capsule's disc, servo's frame, between those of its flange."""
     return [math.pi / stack.flange.holes + 2 * math.pi * k / DISC_SCREWS + math.pi / 2 for k in range(DISC_SCREWS)]
 
 
 def flange_centres(flange: Flange) -> list[tuple[float, float]]:
-    """Centres of the flange's holes, servo's frame; one at its +y."""
+    """Return centres of the flange's holes, servo's frame; one at its +y."""
     centres = outlines.polygon(flange.circle_mm / 2, flange.holes, math.pi / 2)
     return [(float(x), float(y)) for x, y in centres]

@@ -1,7 +1,7 @@
 """The cables that do not turn: the servo's, and the leads of the ring's stator, each from its device to the deck.
 
-No drawing shows where either leaves: the catalogue marks it as assumed. They end tied to a side of the mount's foot, or
-on the deck beside a servo that stands on it. Rotation frame at gamma = 0, mm.
+Their exits are assumed, as the catalogue states. They end tied to a side of the mount's foot, or on the deck next to
+the servo. Rotation frame at gamma = 0, mm.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class FixedCable:
 
 @dataclass(frozen=True, slots=True)
 class Leaving:
-    """A cable before it has a path: where it leaves, and how far it runs inside of what surrounds its device."""
+    """A cable before it has a path: its exit, and its length inside of the parts around its device."""
 
     name: str
     device: str
@@ -75,7 +75,7 @@ class Leaving:
 
 
 def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
-    """Those that the catalogue describes, clear of what the parts that do not turn fill."""
+    """Return the cables that the catalogue describes, clear of the shapes to avoid."""
     room, cables = fixed_room_of(place, avoid), []
     for lane, leaving in enumerate(_leaving(place)):
         path = _path(place, room, leaving, lane)
@@ -121,7 +121,7 @@ def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Pat
 
 
 def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
-    """Ends over the slots at each side of the foot, outwards, two cables side by side."""
+    """Return ends over the slots at each side of the foot, outwards, two cables side by side."""
     ends = []
     for seat in deck.ties:
         aside = (2 * lane - 1) * (seat.half - half - FROM_SLOT)
@@ -136,7 +136,7 @@ def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
 
 
 def _next_to_case(mounted: Mounted, half: float) -> list[Ending]:
-    """Ends on a flat deck, beside the case, outwards."""
+    """Return ends on a flat deck, next to the case, outwards."""
     corners, z, ends = mounted.corners, mounted.rear + half + ON_FOOT, []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         out = sign * np.eye(3)[axis]

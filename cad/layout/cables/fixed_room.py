@@ -1,6 +1,6 @@
-"""Where a cable may run that does not turn: clear of servo, ring and mount, over the deck, below all that turns.
+"""Space for a cable that does not turn: clear of servo, ring and mount, over the deck, below all that turns.
 
-Rotation frame at gamma = 0, mm. Parts are taken for boxes, cylinders and hulls around them, as those of the rotor are.
+Rotation frame at gamma = 0, mm. Parts are represented by boxes, cylinders and hulls.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from scanwright.design.arrays import Array, Mask
 
 @dataclass(frozen=True, slots=True)
 class FixedRoom:
-    """What a cable that does not turn must stay clear of.
+    """Space for a cable that does not turn.
 
     Attributes:
-        shapes: convex shapes.
+        shapes: convex shapes to avoid.
         ceiling: height below all that turns.
         deck: that it lies on.
-        others: middles of cables that run already, shape (n, 3), and the largest radius of one.
+        others: middles of earlier cables, shape (n, 3), and the largest radius of one.
     """
 
     shapes: tuple[Shape, ...]
@@ -35,7 +35,7 @@ class FixedRoom:
     others: tuple[Array, float]
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
-        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
         room = half + gap
         over_deck = (points - np.array(self.deck.centre)) @ np.array(self.deck.normal)
         clear = (points[:, 2] < self.ceiling - room) & (over_deck > half)
@@ -45,12 +45,12 @@ class FixedRoom:
         return np.asarray(clear)
 
     def with_cable(self, middles: Array, radius: float) -> FixedRoom:
-        """The room that a cable leaves."""
+        """Return the space that a cable leaves."""
         return replace(self, others=(np.concatenate([middles, self.others[0]]), max(radius, self.others[1])))
 
 
 def fixed_room_of(place: Placement, avoid: Iterable[Shape]) -> FixedRoom:
-    """The room around all that does not turn, no cable in it yet; `avoid` is what its parts fill."""
+    """Return the space around all that does not turn, without cables; `avoid` are shapes of parts."""
     products = [_around(each.shape) for each in place.drive.stations if each.shape is not None]
     shapes = (*(shape_of(corners) for corners in products), *avoid)
     return FixedRoom(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0))

@@ -1,7 +1,7 @@
-"""Where the wires of a lidar's cable meet a lead of the ring: crimped side by side, with a shrink tube over them.
+"""Joint of a lidar's cable with a lead of the ring: crimps side by side in a shrink tube.
 
-That tube is thicker than the bundle. So it sits on the longest straight piece where all of it has room, beside what
-turns and beside the other leads; behind the first bend, where hands reach.
+The tube is thicker than the bundle: it is on the longest straight piece with enough space for it, behind the first
+bend.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ class LeadJoint:
         return self.piece.middle + self.off * self.along
 
     def points(self) -> Array:
-        """Points from one end to the other, shape (n, 3)."""
+        """Return points from one end to the other, shape (n, 3)."""
         return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along)
 
 
 def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
-    """The joint of a lead; None where no straight piece is long enough.
+    """Return the joint of a lead; None if no straight piece is long enough.
 
     Args:
         path: of the lead.
         half: its radius.
-        room: that it runs through.
-        others: middles of the other leads, shape (n, 3), and how far to keep the middle of the joint from them.
+        room: space for the lead.
+        others: middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
     """
     places = [place for piece in straights(path) for place in _places(piece)]
     for place in places:
@@ -62,14 +62,14 @@ def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Arr
 
 
 def straights(path: Path) -> list[PathPiece]:
-    """The straight pieces behind the first bend, the longest first."""
+    """Return the straight pieces behind the first bend, the longest first."""
     pieces = path.pieces()
     bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
     return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
 
 
 def _places(piece: PathPiece) -> list[LeadJoint]:
-    """Joints from the middle of a piece to its ends."""
+    """Return joints from the middle of a piece to its ends."""
     most = (piece.length - LENGTH) / 2
     steps = np.linspace(0.0, most, math.ceil(most / STEP) + 1).tolist() if most >= 0 else []
     return [LeadJoint(piece, off) for off in dict.fromkeys(side * step for step in steps for side in (-1.0, 1.0))]

@@ -1,8 +1,7 @@
-"""The leads between lidar and slip ring: where they begin and end on this scanner, and the way that each one takes.
+"""The leads between lidar and slip ring, and their paths.
 
-Behind the straight piece that its maker draws, the jacket of the lidar's cable is taken off; its wires go on, bend like
-the leads of the ring, and meet them in a joint on a straight piece. Both turn with the lidar: they bend when
-they are laid, and then no more.
+The jacket of the lidar's cable ends behind its straight piece. Its wires bend like the leads of the ring, and meet them
+in a joint. Both turn with the lidar and do not flex.
 """
 
 from __future__ import annotations
@@ -53,21 +52,19 @@ class RotorLead:
 
     @property
     def mass_g(self) -> float:
-        """Mass of the wires between ring and jacket; 0 without a path."""
+        """Return the mass of a bundle along a path; 0 without one."""
         return mass_g(self.path, self.diameter)
 
 
 def mass_g(path: Path | None, diameter: float) -> float:
-    """What a bundle weighs along a path; 0 without one."""
+    """Return the mass of a bundle along a path; 0 without one."""
     return 0.0 if path is None else math.pi / 4 * diameter**2 * path.length() * LEAD_G_CM3 / 1000
 
 
 def leads_of(place: Placement, avoid: Iterable[Shape]) -> tuple[RotorLead, ...]:
-    """One lead for each outlet of the lidar; none without a ring, or if the catalogue does not describe its leads.
+    """Return one lead for each outlet of the lidar; none if the catalogue does not describe leads of the ring.
 
-    Args:
-        place: where everything is.
-        avoid: what the parts that turn fill.
+    `avoid` are shapes of the parts that turn.
     """
     scanner = place.scanner
     ring, lidar = scanner.slip_ring, scanner.lidar
@@ -88,7 +85,7 @@ def leads_of(place: Placement, avoid: Iterable[Shape]) -> tuple[RotorLead, ...]:
 
 
 def _jointed(room: RotorRoom, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
-    """The leads with their joints, each clear of the other leads and the joints before it."""
+    """Return the leads with joints, each clear of the other leads and of earlier joints."""
     points = [np.zeros((0, 3)) if lead.path is None else lead.path.points(SAMPLE) for lead in leads]
     jointed: list[RotorLead] = []
     for i, lead in enumerate(leads):
@@ -101,7 +98,7 @@ def _jointed(room: RotorRoom, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, 
 
 
 def tied_mm(lead: RotorLead, seat: TieSeat) -> float | None:
-    """Room between a lead and the tongue of the hub that it leaves under; None if it leaves elsewhere."""
+    """Return the distance of a lead from the hub's slotted tab above it; None if it is not below the tab."""
     if lead.path is None:
         return None
     points = lead.path.points(SAMPLE / 3)
@@ -116,7 +113,7 @@ def _laid_count(leads: Sequence[RotorLead]) -> int:
 
 
 def _laid(place: Placement, room: RotorRoom, bundles: Sequence[Bundle], order: Sequence[int]) -> tuple[RotorLead, ...]:
-    """The leads in the order of the outlets, laid in an order, each from its place among those that leave the ring."""
+    """Return the leads by outlet, laid in `order`, each from its bundle at the ring."""
     linkage, outlets, hub = place.linkage, place.scanner.lidar.cable_y_mm, place.stack.hub_radius
     leads: dict[int, RotorLead] = {}
     for i in order:
@@ -140,20 +137,20 @@ def _laid(place: Placement, room: RotorRoom, bundles: Sequence[Bundle], order: S
 
 
 def outlet_mm(place: Placement, y: float, out: float) -> Array:
-    """Point at a distance behind the lidar on the middle of the cable that leaves at a y, shape (3,)."""
+    """Return a point at a distance behind the lidar on the axis of the cable at a y, shape (3,)."""
     lidar, T = place.scanner.lidar, place.scanner.angles.T_rot_laser()
     at = [-lidar.body_mm[0] / 2 - out, y, lidar.cable_z_mm - lidar.optical_height_mm]
     return np.asarray(place.stack.R() @ at + T[:3, 3] * 1000)
 
 
 def _outlet(place: Placement, y: float, half: float) -> Ending:
-    """End of a lead behind the straight piece of the lidar's cable."""
+    """Return the end of a lead behind the straight piece of the lidar's cable."""
     start = outlet_mm(place, y, place.scanner.lidar.cable_straight_mm)
     return Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
 
 
 def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> Ending:
-    """The same end with its lengths counted from the hub's rim; straight as far as it is under a tongue."""
+    """Return the end with its lengths counted from the hub's rim; straight below a slotted tab."""
     inside = hub - float(np.hypot(*start.corners[-1, :2]))
     start = replace(start, lengths=tuple(inside + out for out in OUT), clamped=inside + half + CLAMPED)
     if seat is None:
@@ -163,5 +160,5 @@ def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> E
 
 
 def _with(room: RotorRoom, path: Path, apart: float) -> RotorRoom:
-    """The room that a lead leaves."""
+    """Return the space that a lead leaves."""
     return replace(room, others=(np.concatenate([path.points(SAMPLE), room.others[0]]), apart))

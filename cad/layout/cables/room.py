@@ -1,4 +1,4 @@
-"""Where a lead may run on the rotor: clear of all that turns with it, above all that does not, out of the fan.
+"""Space for a lead on the rotor: clear of all that turns, above all that does not, out of the fan. Rotation frame, mm.
 
 Rotation frame at gamma = 0, mm.
 """
@@ -23,17 +23,17 @@ BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 
 
 @dataclass(frozen=True, slots=True)
 class RotorRoom:
-    """What a lead on the rotor must stay clear of.
+    """Space for a lead on the rotor.
 
     Attributes:
         shapes: convex shapes that turn.
         channels: cut from the neck, from their lower ends upwards, in the laser frame.
         R_rot_laser: shape (3, 3).
         bearings_rad: first and last beam; None if a lead may be in the fan.
-        hidden_half_angle: of the cone about -z in which no beam sees anything anyway [rad].
+        hidden_half_angle: of the cone about -z in which all beams are hidden [rad].
         floor: height of all that does not turn under the rotor.
         deck: that the rotor turns over.
-        others: middles of leads that run already, shape (n, 3), and how far to keep from them.
+        others: middles of earlier leads, shape (n, 3), and the distance from them.
     """
 
     shapes: tuple[Shape, ...]
@@ -46,7 +46,7 @@ class RotorRoom:
     others: tuple[Array, float]
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
-        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
         room = half + gap
         clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room)
         for is_clear in (  # the cheapest first, and of what is left only
@@ -59,11 +59,11 @@ class RotorRoom:
         return np.asarray(clear)
 
     def clear_of_others(self, points: Array) -> Mask:
-        """Whether each point, shape (n, 3), is far enough from the leads that run already, shape (n,)."""
+        """Return whether each point, shape (n, 3), is far enough from earlier leads, shape (n,)."""
         return farther(points, *self.others)
 
     def _carved(self, points: Array, room: float) -> Mask:
-        """Whether points are in the channels that the linkage leaves for the cables and for inserting the lidar."""
+        """Return whether points are in the linkage's channels for the cables and for inserting the lidar."""
         at = points @ self.R_rot_laser
         inside = [
             (at > np.array(low) + room).all(axis=1) & (at[:, :2] < np.array(high[:2]) - room).all(axis=1)
@@ -72,13 +72,13 @@ class RotorRoom:
         return np.asarray(np.any(inside, axis=0))
 
     def _over_deck(self, points: Array, room: float) -> Mask:
-        """Whether points are over the foot of the mount in every position of the turn."""
+        """Return whether points are over the foot of the mount in every position of the turn."""
         normal = np.array(self.deck.normal)
         lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
         return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + room)
 
     def _in_fan(self, points: Array, half: float) -> Mask:
-        """Whether a beam would meet a lead at points: lead and beams turn together."""
+        """Return whether a lead at points would meet a beam; both turn together."""
         if self.bearings_rad is None:
             return np.zeros(len(points), dtype=bool)
         x, y, z = (points @ self.R_rot_laser).T
@@ -92,12 +92,7 @@ class RotorRoom:
 
 
 def room_of(place: Placement, avoid: Iterable[Shape]) -> RotorRoom:
-    """The room on the rotor of one scanner, no lead in it yet.
-
-    Args:
-        place: where everything is.
-        avoid: what the parts that turn fill.
-    """
+    """Return the space on the rotor of one scanner, without leads; `avoid` are shapes of parts that turn."""
     stack, envelope, lidar = place.stack, place.drive.envelope, place.scanner.lidar
     R, sub_plate = stack.R(), stack.sub_plate
     boxes = (envelope.body, envelope.plate(sub_plate), envelope.under(sub_plate), *_stubs(lidar))
@@ -115,7 +110,7 @@ def room_of(place: Placement, avoid: Iterable[Shape]) -> RotorRoom:
 
 
 def _stubs(lidar: Lidar) -> list[Box]:
-    """The straight pieces of its cables, in the laser frame."""
+    """Return the straight pieces of its cables, in the laser frame."""
     half, back, z = lidar.cable_diameter_mm / 2, -lidar.body_mm[0] / 2, lidar.cable_z_mm - lidar.optical_height_mm
     return [
         ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm

@@ -1,8 +1,8 @@
-"""A short path of a lead through the free space on the rotor, as the corners of smooth arcs.
+"""A short path of a cable through the free space, as the corners of smooth arcs.
 
-Straight pieces between the points of a lattice about the axis make the graph; what is found is a short chain of
-them whose corners leave room for their arcs. Each piece pays for at most half of the arc at either end, so that any
-chain of allowed neighbours is a path.
+Straight pieces between the points of a lattice make the graph; the result is a short chain of them whose corners leave
+space for their arcs. Each piece provides at most half of its length to the arc at either end, so that any chain of
+allowed neighbours is a path.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ ROUNDING = 0.3  # more along the straight pieces
 
 
 class LeadRoom(Protocol):
-    """What a lead must stay clear of."""
+    """Space for a cable."""
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
-        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
         ...
 
 
@@ -45,14 +45,14 @@ Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and the leng
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """A stiff end of a lead: points that it must pass, the last of them with a free length behind.
+    """A stiff end of a cable: points that it must pass, the last of them with a free length behind.
 
     Attributes:
-        corners: from the very end on, shape (k, 3); what follows goes on along `direction`.
+        corners: from the very end on, shape (k, 3); the cable continues along `direction`.
         direction: unit vector, shape (3,).
-        lengths: of the piece behind the last corner that may be tried.
-        used: what the arc at the last corner takes of that piece.
-        clamped: length of that piece along which it may be near: it leaves its device there.
+        lengths: to try, of the piece behind the last corner.
+        used: tangent length of the arc at the last corner.
+        clamped: length of that piece that may be near its device.
     """
 
     corners: Array
@@ -62,22 +62,22 @@ class Ending:
     clamped: float
 
     def tips(self) -> Array:
-        """Where the free part of the lead may begin, shape (m, 3)."""
+        """Return the possible starts of the free part of the lead, shape (m, 3)."""
         return np.asarray(self.corners[-1] + np.array(self.lengths)[:, None] * self.direction)
 
 
 def short_path(
     room: LeadRoom, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
 ) -> Path | None:
-    """A short path from one of some ends to one of others, within GREED of the shortest; None where there is none.
+    """Return a short path between two ends, within GREED of the shortest; None if there is none.
 
     Args:
-        room: that it runs through.
-        starts: ends at the one device; any of them will do.
-        goals: ends at the other one, likewise.
-        half: radius of the lead.
-        radius: that it may be bent to.
-        lattice: points that it may turn at, shape (n, 3).
+        room: space for the cable.
+        starts: alternative ends at the one device.
+        goals: alternative ends at the other one.
+        half: radius of the cable.
+        radius: least bend radius.
+        lattice: points of possible corners, shape (n, 3).
     """
     first, last = ([pair for end in ends for pair in _tips(room, end, half)] for ends in (starts, goals))
     if not first or not last:
@@ -101,7 +101,7 @@ def _tips(room: LeadRoom, end: Ending, half: float) -> list[tuple[Ending, int]]:
 
 
 def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[Ending]) -> Array:
-    """Points about the axis, from beside a hub to beyond some ends, above a floor, shape (n, 3)."""
+    """Return points about the axis, from a hub to beyond some ends, above a floor, shape (n, 3)."""
     low, tips = floor + half + GAP + ROUNDING, np.concatenate([end.tips() for end in ends])
     turn = 2 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
     radius = np.arange(hub + FROM_HUB, float(np.hypot(tips[:, 0], tips[:, 1]).max()) + BEYOND, STEP)
@@ -111,7 +111,7 @@ def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[End
 
 
 def _clear(room: LeadRoom, end: Ending, tip: int, half: float) -> bool:
-    """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
+    """Return whether the straight piece of a stiff end is free outside its device."""
     first, last = min(end.clamped, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
     return bool(room.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
@@ -128,11 +128,11 @@ class _Ends:
 
 @dataclass(frozen=True, slots=True)
 class PathGraph:
-    """The points (n, 3) that a lead may turn at, and the straight pieces between them, looked at when asked for.
+    """Points (n, 3) where a cable may turn, and the straight pieces between them, computed when needed.
 
     Attributes:
-        room: that the lead runs through.
-        half: radius of the lead.
+        room: space for the cable.
+        half: radius of the cable.
         radius: of the arcs between two pieces.
         points: first those at the ring, last those at the lidar.
     """
@@ -144,7 +144,7 @@ class PathGraph:
     _joined: dict[int, tuple[NDArray[np.int64], Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def chain(self, starts: dict[int, Stiff], goals: dict[int, Stiff]) -> list[int]:
-        """Points of a short chain of pieces from a start to a goal; empty where there is none.
+        """Return the points of a short chain of pieces from a start to a goal; empty if there is none.
 
         Args:
             starts: first points, the direction of the stiff piece that ends there, and its length left for an arc.
@@ -182,7 +182,7 @@ class PathGraph:
         return along / length, length / 2
 
     def _onwards(self, here: int, stiff: Stiff, ends: _Ends, open_: Mask) -> NDArray[np.int64]:
-        """Which of the open pieces from a point one may go on along from a stiff one."""
+        """Return which of the open pieces from a point can follow a stiff one."""
         others, along, lengths = self._pieces_at(here)
         direction, left = stiff
         fits = open_ & (_arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2))
@@ -197,7 +197,7 @@ class PathGraph:
         return chosen[free]
 
     def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
-        """Points that a free straight piece leads to from one, directions (m, 3) and lengths (m,)."""
+        """Return points reached by a free straight piece, directions (m, 3) and lengths (m,)."""
         if here not in self._joined:
             along = self.points - self.points[here]
             lengths = np.linalg.norm(along, axis=1)
@@ -219,15 +219,15 @@ def _back(came: dict[tuple[int, int], tuple[int, int]], last: tuple[int, int]) -
 
 
 def _arc(radius: float, cosine: Array) -> Array:
-    """What an arc takes of the pieces that it joins, without end where they turn back."""
+    """Return the tangent length of an arc between two pieces, infinite if they turn back."""
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     return np.where(angle < SHARPEST, radius * np.tan(np.minimum(angle, SHARPEST) / 2), np.inf)
 
 
 def _on_arcs(radius: float, direction: Array, along: Array) -> Array:
-    """Vectors from a corner to the quarters of its arc, for each way on (m, 3): shape (3, m, 3).
+    """Return vectors from a corner to the quarters of its arc, for each next direction (m, 3): shape (3, m, 3).
 
-    The widest arcs are four times as long as SAMPLE; where they begin and end, they touch the straight pieces.
+    The widest arcs are four times as long as SAMPLE.
     """
     half = np.arccos(np.clip(along @ direction, -1.0, 1.0)) / 2
     turned = np.array([-0.5, 0.0, 0.5])[:, None] * half

@@ -1,4 +1,4 @@
-"""Every number of the slip-ring adapter's fork on the servo's ears. No kernel."""
+"""Numbers of the slip-ring adapter's fork on the servo's ears. No kernel."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ UNDER_ROOF = 12.0  # how far the arms end below the ring's top, under a cage
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipRingAdapter:
-    """The arms around the ring, and the fork that they stand on, unless that is the base of a cage."""
+    """The arms around the ring, and their fork, unless that is the base of a cage."""
 
     stack: DirectStack
     fork: Ears | None
 
 
 def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter | None:
-    """Parameters of the adapter of one scanner; None without a ring.
+    """Return the adapter of one scanner; None without a ring.
 
     Raises:
         BuildError: no bearing carries the axis, and the case has no four holes beside the turning flange.
@@ -59,12 +59,12 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> SlipRingAdapter | None:
 
 
 def arm_top(p: SlipRingAdapter) -> float:
-    """Height of the arms' upper ends."""
+    """Return the height of the arms' upper ends."""
     return p.stack.ring_bottom + min(30.0, p.stack.ring_length - (UNDER_ROOF if p.fork is None else 5.0))
 
 
 def fork_holes(servo: Servo, stack: DirectStack) -> tuple[tuple[float, float], ...]:
-    """The nearest and the furthest pair of front holes behind the turning flange; none if there are no two pairs."""
+    """Return the nearest and the furthest pair of front holes behind the turning flange; none without two pairs."""
     behind = sorted({y for _, y in servo.front.places if y < _behind(stack)}, reverse=True)
     rows = [sorted(hole for hole in servo.front.places if hole[1] == y) for y in behind]
     widest = max((row[-1][0] for row in rows), default=0.0)

@@ -1,4 +1,4 @@
-"""Every number of the bearing's cage: its base on the servo's ears, and how stiff it holds the bearing. No kernel."""
+"""Numbers of the bearing's cage: its base on the servo's ears, and its stiffness. No kernel."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class BearingCage:
 
 
 def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
-    """The holes for the base of a cage.
+    """Return the holes for the base of a cage.
 
     Raises:
         BuildError: the case has no four holes beside the turning flange.
@@ -108,7 +108,7 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
 
 
 def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | None:
-    """Parameters of the cage of one scanner; None if the horn carries the rotor alone."""
+    """Return the cage of one scanner; None if the horn carries the rotor alone."""
     if stack.bearing is None:
         return None
     printer = scanner.printer
@@ -130,13 +130,13 @@ def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | N
 
 
 def stator_leads_y(scanner: Scanner, stack: DirectStack) -> float:
-    """Distance from the axis of the leads of a ring's stator: beside the flange and the case, at +y."""
+    """Return the distance from the axis of the leads of a ring's stator, at +y."""
     half = 0.0 if scanner.slip_ring is None else (scanner.slip_ring.lead_diameter_mm or 0.0) / 2
     return max(stack.flange_radius, scanner.servo.case_max_mm[1]) + TURNS_CLEAR + half
 
 
 def lead_hole(scanner: Scanner, stack: DirectStack) -> tuple[float, float]:
-    """Half width and end in y of a hole that a ring's leads and their plugs pass at +y; zeros without a ring."""
+    """Return the half width and end in y of the hole for a ring's leads and plugs at +y; zeros without a ring."""
     ring = scanner.slip_ring
     if ring is None:
         return 0.0, 0.0
@@ -147,7 +147,7 @@ def lead_hole(scanner: Scanner, stack: DirectStack) -> tuple[float, float]:
 
 
 def plate_half_x(servo: Servo, screw: Screw) -> float:
-    """Half width of a plate on the servo's front: that of the case, or what the heads of the ears' screws need."""
+    """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
     return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.head_room + HEAD_WALL)
 
 
@@ -160,15 +160,15 @@ def _boss_top(stack: DirectStack, low: float) -> float:
 
 
 def has_room(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
-    """Whether a nut in the boss has a floor below it and does not reach the ring above."""
+    """Return whether a nut in the boss has a floor below it and does not reach the ring above."""
     quarter = (_boss_top(stack, low) - low) / 4
     return 3 * quarter - trap.corner >= wall and trap.corner <= quarter + RING_ABOVE_BASE / 2
 
 
 def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
-    """Sideways stiffness of a cage at the bearing: legs (shear, bending, rocking) and base by beam formulas, halved.
+    """Return the sideways stiffness of a cage at the bearing: legs and base by beam formulas, halved.
 
-    Screws and plates are stiffer or softer than beams: assumed to be right within a factor of two.
+    It is assumed to be right within a factor of two.
     """
     E = PLASTIC_PA * 1e-6  # N/mm2
     G = E / (2 + 2 * POISSON)
@@ -191,7 +191,7 @@ def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
 
 
 def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius: float) -> float:
-    """Azimuth [rad] within a leg whose radial screw stays furthest from the ears' screws."""
+    """Return the azimuth [rad] within a leg whose radial screw stays furthest from the ears' screws."""
 
     def clearance(azimuth: float) -> float:
         reach = np.linspace(radius - SCREW_DEPTH, radius, 11)
@@ -202,7 +202,7 @@ def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius
 
 
 def share_weight(scanner: Scanner, stack: DirectStack, cage: BearingCage | None, weight: Weight) -> Supported:
-    """How horn and bearing share the weight of all that turns."""
+    """Return how horn and bearing share the weight of all that turns."""
     if cage is None:
         return hanging(weight, stack, shaft_modulus_pa(scanner, stack))
     return supported(weight, stack, stiffness_n_per_m(stack, cage.ears))

@@ -1,8 +1,7 @@
-"""The printed shaft of a scanner that needs neither ring nor bearing. No kernel.
+"""The printed shaft of a scanner without ring and bearing. No kernel.
 
-Nothing has to pass over such a shaft, so that it need be no thinner than a ring's bore or the circle of the horn's
-screws: it is a cup around the heads of these screws, low and wide. What is wide enough needs no metal: a cup of 30 mm
-with a bore of 20 bends no more than a rod of aluminium of 12. Nuts in slots of its wall hold the hub.
+A cup around the heads of the horn's screws, low and wide: a cup of 30 mm with a bore of 20 bends no more than an
+aluminium rod of 12. Nuts in slots of its wall hold the hub.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ CAGE_HEADS = 4.0  # of the screws of the cage, beyond it
 
 
 def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """The drive of a scanner whose ring lets the shaft through, or that has none.
+    """Return the drive of a scanner with a through-bore ring or without a ring.
 
     Raises:
         BuildError: it cannot be laid out.
@@ -154,14 +154,14 @@ def _stations(
 
 
 def _bears(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
-    """Only a horn without a bearing can have too much by a bar; if it has too much without one, the check says so."""
+    """Return whether the horn bears a bar; with a bearing, or if it is overloaded without the bar, a check decides."""
     if stack.bearing is not None or not horn_bears(scanner, stack):
         return True
     return horn_bears_balanced(scanner, stack, bar_g, bar_z)
 
 
 def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Mounted:
-    """The servo's case, or the frame that holds it.
+    """Return the servo's case, or the frame that holds it, on the mount.
 
     Raises:
         BuildError: it has no holes that may carry it.

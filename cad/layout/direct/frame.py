@@ -1,7 +1,7 @@
-"""Every number of the frame that holds a servo by the threads in its front. No kernel.
+"""Numbers of the frame that holds a servo by the threads in its front. No kernel.
 
-A servo whose rear has only case screws, such as those of the X series, hangs from a plate on its front.
-Four legs carry the plate, and their feet are screwed to the deck or to the base mount.
+For servos whose rear has only case screws, such as the X series: the servo hangs from a plate on four legs, whose feet
+are screwed to the deck or to the base mount.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class ServoFrame:
         return min(abs(end - y) for end in self.ends_y)
 
     def legs(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
-        """Boxes of the four legs with their feet, as low and high corners."""
+        """Return the boxes of the four legs with their feet, as low and high corners."""
         spans = ((self.ends_y[0], self.window_y[0]), (self.window_y[1], self.ends_y[1]))
         return [
             (
@@ -107,7 +107,7 @@ def needs_frame(servo: Servo) -> bool:
 
 
 def heads_over_horn_mm(servo: Servo) -> float:
-    """Return the height over the horn's face that whatever is wider than the frame's opening must keep."""
+    """Return the height over the horn's face of the heads of the frame's screws, with clearance."""
     return servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
 
 

@@ -1,4 +1,4 @@
-"""Laying out the direct drive: shaft and flange by ring and horn, the hub by the lidar, and the bearing. mm."""
+"""Sizes of the direct drive: shaft and flange by ring and horn, the hub by the lidar, and the bearing. mm."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less only whe
 
 
 def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ears | None]:
-    """Lay out the stack of one scanner with its servo on the axis, and the ears that a bearing's cage stands on.
+    """Lay out the stack of one scanner with its servo on the axis, and the ears of a bearing's cage.
 
     Raises:
         BuildError: the ring has no bore, a bore too small for a shaft, the case has no holes for a cage, or the lidar
@@ -47,7 +47,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
 
 
 def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
-    """A cup if neither ring nor bearing needs a turned shaft."""
+    """Return the stack, a cup if neither ring nor bearing needs a turned shaft."""
     cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
@@ -85,12 +85,12 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
 
 
 def _needs_bearing(scanner: Scanner, stack: DirectStack) -> bool:
-    """If the horn is not rated for the rotor, or if only the base of a bearing's cage finds holes for a ring."""
+    """Return whether the horn is not rated for the rotor, or only the base of a cage has holes for a ring's adapter."""
     return not horn_bears(scanner, stack) or (scanner.slip_ring is not None and not fork_holes(scanner.servo, stack))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
-    """Shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
+    """Return the shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
     ring = scanner.slip_ring
     if ring is None:
         return _between_heads(scanner.servo), 0.0, 0.0, 0.0
@@ -116,12 +116,12 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
 
 
 def _between_heads(servo: Servo) -> float:
-    """Diameter of a shaft that no ring asks for: thinner where the heads of the horn's screws stand close."""
+    """Return the diameter of a shaft without a ring, thinner if the heads of the horn's screws are close."""
     return max(SHAFT_MIN, min(SHAFT_PLAIN, math.floor(4 * _room_on_horn(servo)) / 2))
 
 
 def _room_on_horn(servo: Servo) -> float:
-    """Radius that the heads of the horn's screws leave."""
+    """Return the radius inside the heads of the horn's screws."""
     return (servo.horn_circle_mm - SCREWS[servo.horn_screw].head_diameter) / 2
 
 
@@ -130,7 +130,7 @@ def _least_bore() -> float:
 
 
 def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, float]:
-    """Radius and thickness of the horn flange, radius and height of the collar over the horn's boss."""
+    """Return the radius and thickness of the horn flange, radius and height of the collar over the horn's boss."""
     screw = SCREWS[servo.horn_screw]
     circle = servo.horn_circle_mm / 2
     radius = max(servo.horn_diameter_mm / 2, circle + screw.head_diameter / 2 + 0.5)

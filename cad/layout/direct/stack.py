@@ -155,14 +155,14 @@ class DirectStack(Hub):
         return max(size for size in GROOVES if size <= self.shaft_diameter)
 
     def radius_at(self, above_horn: Array, waist_diameter: float) -> Array:
-        """Radius of the shaft at heights above the horn; the pocket of the horn's boss is left out.
+        """Return the radius of the shaft at heights above the horn, without the pocket of the horn's boss.
 
-        The floor of a cup counts as wide as the circle of the screws that clamp it: finite elements of a cup that the
-        face of its horn holds turn 1.2 times as far.
+        The floor of a cup counts as wide as the circle of its screws: finite elements of a cup on the face of its horn
+        turn 1.2 times as far.
 
         Args:
             above_horn: heights, any shape.
-            waist_diameter: of its waist, in the metal at hand.
+            waist_diameter: of its waist, in the metal used.
         """
         z, shaft = np.asarray(above_horn), self.shaft_diameter / 2
         if self.foot_radius > 0:  # a cone of 45 deg above the foot
@@ -177,15 +177,15 @@ class DirectStack(Hub):
         return np.where(z < self.flange_thickness, np.maximum(self.flange_radius, radius), radius)
 
     def bore_at(self, above_horn: Array) -> Array:
-        """Radius inside the shaft at heights above the horn: 0 where it is solid."""
+        """Return the radius inside the shaft at heights above the horn: 0 if it is solid."""
         return np.where(np.asarray(above_horn) < self.horn_grip, 0.0, self.cup_bore / 2)
 
     def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
-        """Middles and thicknesses of slices of the shaft above the horn; none of them spans an edge of it.
+        """Return middles and thicknesses of slices of the shaft above the horn; none crosses an edge of it.
 
         Args:
             length: of the piece above the horn.
-            waist_diameter: of its waist, in the metal at hand.
+            waist_diameter: of its waist, in the metal used.
         """
         waist = self.collar_height + self.waist_length
         slope = (self.shaft_diameter - waist_diameter) / 2

@@ -1,8 +1,8 @@
-"""Every number of the plate between the mount's foot and a tripod. No kernel: plain numpy.
+"""Numbers of the plate between the mount's foot and a tripod. No kernel.
 
-The nut of the tripod's screw lies in a pocket that is open towards the mount, on a thin floor that tripod and nut clamp
-between them: no thread is in plastic, and the mount keeps the nut in. Millimetres, in the axes of the deck
-(`Deck.rotation`), z from the lower face of the mount's foot.
+The nut of the tripod's screw is in a pocket that is open towards the mount, on a thin floor that tripod and nut clamp:
+no thread is in plastic. Millimetres, in the axes of the deck (`Deck.rotation`), z from the lower face of the mount's
+foot.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ HEEL = 19.0  # half the width of the narrowest plate of a tripod's head that it 
 
 @dataclass(frozen=True, slots=True)
 class TripodFoot:
-    """One plate; `mount` and `tripod` are what their screws hold on to."""
+    """One plate; `mount` and `tripod` are the threads of their screws."""
 
     thickness: float
     mount: Thread
@@ -36,7 +36,7 @@ class TripodFoot:
 
 
 def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
-    """The plate under so much of the mount, for one size of its screws, none of which stands out below the plate."""
+    """Return the plate below a thickness of the mount, so thick that no screw of the mount stands out."""
     longest = shank_mm(screw, above, "trap", OVER_NUTS)
     mount = thread_in_part(screw, printer, carries=True)
     thickness = max(LEAST, longest - above) if mount.trap is not None else LEAST
@@ -44,5 +44,5 @@ def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
 
 
 def corner_turn(hole: tuple[float, float]) -> float:
-    """Turn [rad] of a nut's hexagon that puts a flat towards the middle of the plate."""
+    """Return the turn [rad] of a nut's hexagon that puts a flat towards the middle of the plate."""
     return math.atan2(hole[1], hole[0]) + math.pi / 6

@@ -1,11 +1,10 @@
-"""The counterweight of a tilted axis: which bar, how long, and where it has room. Rotation frame, mm and grams.
+"""The counterweight of a tilted axis: section, length and place of a bar. Rotation frame, mm and grams.
 
-Lidar and linkage hang on one side of the axis. Where that is tilted, gravity turns the rotor to and fro, and the gears
-change their flank by the play between them. A piece of bright bar, screwed to an ear of the hub on the other side,
-takes that away. It must leave the lidar, its cables and screws, the neck, the deck and the fan alone, wherever its
-slots let it slide: where no bar does, there is none.
+Gravity turns the unbalanced rotor of a tilted axis back and forth, and the gears change flank through their backlash. A
+piece of steel bar, screwed to an ear of the hub on the other side, prevents that. It must stay clear of lidar, cables,
+screws, neck, deck and fan wherever its slots let it slide; if no bar does, there is none.
 
-The bar is chosen before there are solids, from an estimate of what it balances; only its length waits for them.
+The bar is chosen before there are solids, from an estimate of the imbalance; its length is then cut to the solids.
 """
 
 from __future__ import annotations
@@ -94,7 +93,7 @@ class Counterweight:
         return tuple((first + last) / 2 for first, last in self.ear.slots)
 
     def balancing(self, moment: Array) -> Counterweight:
-        """The same bar, cut to balance a moment of all else that turns, shape (2,) [g mm]."""
+        """Return the bar, cut to balance a moment of all else that turns, shape (2,) [g mm]."""
         needed = max(0.0, -float(moment @ _direction(self.ear.azimuth)))
         length = math.sqrt(self.start**2 + 2 * needed / _grams_per_mm(self.section)) - self.start
         return replace(self, length=SAW * round(length / SAW))
@@ -108,16 +107,7 @@ def counterweight_of(
     plate_ties: tuple[TieSeat, ...],
     neck: Array,
 ) -> Counterweight | LeftOut:
-    """The lightest bar that balances the rotor and has room, or why there is none.
-
-    Args:
-        scanner: angles and products.
-        drive: below the hub.
-        deck: that the bar must stay clear of.
-        linkage: that carries it.
-        plate_ties: tongues of its plate.
-        neck: corners of its neck, shape (n, 3).
-    """
+    """Return the lightest bar that balances the rotor and fits, or why there is none; neck of shape (n, 3)."""
     if not backlash_matters(scanner):
         return _without(f"the play of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
     if tilt_sine(scanner) < UPRIGHT:
@@ -185,7 +175,7 @@ class _FreeSpace:
     neck: Array
 
     def fault(self, scanner: Scanner, bar: Counterweight) -> str:
-        """What a bar, wherever it slides, and its ear would meet; empty if nothing."""
+        """Return what a bar with its ear would collide with wherever it slides; empty if nothing."""
         linkage = self.linkage
         ear, half, stack = bar.ear, bar.section[0] / 2, linkage.stack
         inner, outer = bar.start - TRIM, bar.end + TRIM + LONGER
@@ -214,14 +204,14 @@ class _FreeSpace:
 
 
 def _height_over(deck: Deck, rims: tuple[tuple[float, float], ...]) -> float:
-    """Least height over the deck of circles about the axis, each a radius and a z."""
+    """Return the least height over the deck of circles about the axis, each a radius and a z."""
     normal = np.array(deck.normal)
     lean = math.hypot(normal[0], normal[1])
     return float(min(z * normal[2] - around * lean for around, z in rims) - np.array(deck.centre) @ normal)
 
 
 def _points(low: tuple[float, float, float], high: tuple[float, float, float], azimuth: float) -> Array:
-    """Points of a box whose first axis has an azimuth, its faces included, in the rotation frame, shape (n, 3)."""
+    """Return points of a box whose first axis has an azimuth, rotation frame, shape (n, 3)."""
     axes = [np.linspace(a, b, max(2, math.ceil((b - a) / STEP) + 1)) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     out = _direction(azimuth)

@@ -1,4 +1,4 @@
-"""Every number of the alignment linkage. Rotation frame at gamma = 0, mm."""
+"""Numbers of the alignment linkage. Rotation frame at gamma = 0, mm."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class AlignmentLinkage(LinkageBody):
 
 
 def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> LinkageBody:
-    """Parameters of the linkage of one scanner, before anything is attached.
+    """Return the linkage of one scanner, before anything is attached.
 
     Raises:
         BuildError: the screw holes come too near to the plate's edge.
@@ -153,9 +153,9 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
 
 
 def neck_corners(p: LinkageBody, attempt: int) -> Array:
-    """Corners of the neck's hull, shape (n, 3): the hub's core, raised to just under the lidar, and the plate.
+    """Return corners of the neck's hull, shape (n, 3): the hub's core, raised to just under the lidar, and the plate.
 
-    No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
+    For safe booleans no facet coincides with hub, plate or body.
     """
     stack = p.stack
     turn = math.radians(0.7 + 1.9 * attempt)
@@ -172,7 +172,7 @@ def neck_corners(p: LinkageBody, attempt: int) -> Array:
 
 
 def _foot(plate: Array, stack: Hub) -> Array:
-    """The lower half of the plate's corners, moved down, and back: else a lying plate hangs on a wedge with an edge."""
+    """Return the lower half of the plate's corners, moved down and back: it thickens the neck of a lying plate."""
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
         return plate
@@ -184,15 +184,15 @@ def _foot(plate: Array, stack: Hub) -> Array:
 
 
 def _grown(box: Box) -> Box:
-    """A box with the lidar's gap around its sides."""
+    """Return a box with the lidar's gap around its sides."""
     (x0, y0, z0), (x1, y1, z1) = box
     return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
 
 
 def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ...]:
-    """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there.
+    """Return the fan without the sector that the ring hides: a lying linkage needs the material there.
 
-    What lies between two pieces is no fin: a full fan is closed where it begins and ends.
+    A full fan is closed at its start.
     """
     first, last = float(bearings.min()), float(bearings.max())
     pieces = [(first, last)]
@@ -220,19 +220,19 @@ def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ..
 
 
 def _cross_azimuths(normal: Array) -> tuple[float, ...]:
-    """The two of CROSS_AT on the side away from the plate."""
+    """Return the two of CROSS_AT on the side away from the plate."""
     towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else 0.0
     middle = round(towards / (math.pi / 2) - 1e-6) * (math.pi / 2)
     return middle - math.pi / 4, middle + math.pi / 4
 
 
 def cross_seat_mm(stack: Hub) -> float:
-    """Distance from the axis of the washers' faces that the heads of the cross screws bear on."""
+    """Return the distance of the cross screws' washers from the axis."""
     return stack.hub_radius - CROSS_SUNK
 
 
 def cross_floor_mm(p: LinkageBody, azimuth: float) -> float:
-    """Distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
+    """Return the distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
     bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.cross_hole / 2
     flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
     on_flat = (flat - half * abs(math.cos(azimuth))) / out if out > 0 else bore
@@ -240,7 +240,7 @@ def cross_floor_mm(p: LinkageBody, azimuth: float) -> float:
 
 
 def cross_thread_mm(p: LinkageBody) -> float:
-    """Thread that a cross screw finds in the shaft before the other one crosses it, or in a cup before its nut."""
+    """Return the thread length of a cross screw in the shaft up to the other one, or in a cup up to its nut."""
     outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
     if thread is None:
         return outer - CROSS_SCREW.nominal / 2 - CROSSING

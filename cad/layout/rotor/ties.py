@@ -1,7 +1,7 @@
-"""Where leads are tied to the parts, so that a pull on one ends there.
+"""Slotted tabs for cable ties, which take the pull off the cables.
 
-The hub has a tongue over the way out of the ring's leads, rotation frame; the plate one under each cable of the lidar,
-laser frame. Millimetres. No kernel.
+The hub has one above the exit of the ring's leads, rotation frame; the plate one under each cable of the lidar, laser
+frame. Millimetres. No kernel.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PLATE_LOW, BELOW_SEAT = 5.0, 0.5  # lower and upper face of a tongue of the plat
 
 
 def plate_ties_of(lidar: Lidar, p: LinkageBody, neck: Array) -> tuple[TieSeat, ...] | LeftOut:
-    """A tongue below each cable of the lidar, laser frame, or why there is none."""
+    """Return a tab below each cable of the lidar, laser frame, or why there is none."""
     if p.stack.sub_plate == "x" or not lidar.cable_y_mm:
         return _without(PLATE_TIE, "an ear of the sub-plate, or no cable, is where it would be")
     seats = tuple(
@@ -64,15 +64,7 @@ def plate_ties_of(lidar: Lidar, p: LinkageBody, neck: Array) -> tuple[TieSeat, .
 
 
 def hub_tie_of(scanner: Scanner, drive: DriveLayout, p: LinkageBody, ear: Ear | None, neck: Array) -> TieSeat | LeftOut:
-    """The tongue of the hub, rotation frame, or why there is none.
-
-    Args:
-        scanner: angles and products.
-        drive: below the hub.
-        p: the linkage.
-        ear: of a counterweight.
-        neck: corners of the linkage's neck, shape (n, 3).
-    """
+    """Return the tab of the hub, rotation frame, or why there is none; `neck` has shape (n, 3)."""
     if scanner.slip_ring is None or not scanner.lidar.cable_y_mm:
         return _without(HUB_TIE, "no leads leave a ring below the hub")
     if drive.no_hub_tie:
@@ -86,7 +78,7 @@ def _without(which: str, why: str) -> LeftOut:
 
 
 def _candidates(p: LinkageBody, ear: Ear | None) -> Iterator[TieSeat]:
-    """Seats between the cross screws, where the leads of a bearing's sleeve leave; else on their free sides too."""
+    """Yield seats between the cross screws; if the leads do not leave by a sleeve, on the other sides too."""
     stack, free = p.stack, sum(p.cross_azimuths) / 2
     wired = stack.bearing is not None
     low = stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS if wired else stack.shoulder
@@ -107,7 +99,7 @@ def _candidates(p: LinkageBody, ear: Ear | None) -> Iterator[TieSeat]:
 
 
 def _has_room(seat: TieSeat, p: LinkageBody, neck: Array) -> bool:
-    """Whether a tongue of the hub is out of the way of all else, and a tie reaches around it."""
+    """Return whether a tab of the hub is clear of all else, with space for a tie around it."""
     body = _filled(seat, seat.first - FROM_SIDE, seat.end, seat.half_width, (seat.low, seat.high))
     over = (seat.high + 0.1, seat.high + TIE_OVER)
     tie = _filled(seat, seat.first, seat.last, seat.half + SLOT_ACROSS, over)

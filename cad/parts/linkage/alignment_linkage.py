@@ -1,12 +1,11 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the shaft's spigot (blind bore with a flat
-at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all that must stay
-free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT),
-a groove in the hub at +y (index). Where a bearing holds the shaft, the wires of the ring's rotor leave its sleeve
-through a channel of the hub. Tongues of hub and plate have slots for the ties of leads and cables. Under a sub-plate
-(`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the heads of its screws. Where a
-counterweight balances the rotor, an ear of the hub carries it.
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub is on the shaft's spigot (blind bore with a flat at
++y, two screws that cross into it); a neck, the convex hull of hub and plate without all free space, leads to the plate
+whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT), a groove in the hub at
++y (index). If a bearing holds the shaft, the wires of the ring's rotor leave its sleeve through a channel of the hub.
+Tabs of hub and plate have slots for cable ties. Under a sub-plate (`sub_plate.py`) the plate is lower, with nuts for
+its ears and pockets for the heads of its screws. An ear of the hub carries a counterweight.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ DRIVER_WALL = 3.0  # what would be less is open
 
 
 def linkage_spec(place: Placement) -> PartSpec:
-    """The linkage of one scanner; the shaft that it sits on has the words of its step."""
+    """Return the linkage of one scanner; its step is in the spec of its shaft."""
     p = place.linkage
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
@@ -102,7 +101,7 @@ def linkage_spec(place: Placement) -> PartSpec:
 
 
 def _crossed(p: AlignmentLinkage, shaft: str) -> Joint:
-    """The hub on the shaft: cap screws through its wall into threads or nuts of the shaft."""
+    """Return the joint of hub and shaft: cap screws through its wall into threads or nuts of the shaft."""
     heads = cross_seat_mm(p.stack)
     return Joint(
         ALIGNMENT_LINKAGE,
@@ -118,7 +117,7 @@ def _crossed(p: AlignmentLinkage, shaft: str) -> Joint:
 
 
 def _around(place: Placement) -> Iterator[Shape]:
-    """Hub, tongues, and the neck, from which the channels of the cables are cut."""
+    """Yield the hub, tabs, and the neck, from which the channels of the cables are cut."""
     p, stack = place.linkage, place.stack
     yield shape_of(around_axis(stack.hub_radius, stack.shoulder, -stack.h))
     for tie in p.plate_ties:
@@ -131,9 +130,8 @@ def _around(place: Placement) -> Iterator[Shape]:
 def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     """Make the linkage.
 
-    A sliver where two cuts nearly meet can open the mesh of a valid solid; the neck is then turned a little, the ways
-    of drivers are made wider, and nothing else, so that the height, and with it the frame chain, stays what the layout
-    said.
+    A sliver between two cuts can open the mesh of a valid solid; further attempts turn the neck a little and widen the
+    paths of drivers. The frame chain does not change.
 
     Raises:
         BuildError: no attempt gave one valid watertight solid.
@@ -149,10 +147,10 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
 
 @dataclass(frozen=True, slots=True)
 class Shapes:
-    """What the linkage is made of, each in its place: `alignment_linkage` and the preview put it together.
+    """The shapes of the linkage, in place: `alignment_linkage` and the preview join them in the same order.
 
-    Both do it in this order: plate and neck, less room and fins, of which the body of the plate stays; with the hub,
-    less the room; less the holes.
+    Plate and neck, without room and fins, of which the body of the plate is kept; with the hub, without the room;
+    without the holes.
     """
 
     plate: cq.Shape
@@ -164,7 +162,7 @@ class Shapes:
 
 
 def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
-    """The shapes; `attempt` turns the neck a little, and widens the ways of drivers.
+    """Return the shapes; `attempt` turns the neck a little, and widens the paths of drivers.
 
     Raises:
         BuildError: the kernel fails at one.
@@ -211,14 +209,14 @@ def _tilt(p: AlignmentLinkage) -> str:
 
 
 def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
-    """What must stay free so that the lidar can be put in along its own z: body and cables, swept upwards."""
+    """Return the space for inserting the lidar along its z: body and cables, swept upwards."""
     over = [box for box in (p.body, p.ears) if box is not None]
     boxes = [*(((x, y, p.top), high) for (x, y, _), high in over), *p.cables]
     return [solids.box(low, (x, y, FAR)) for low, (x, y, _) in boxes]
 
 
 def _plate(p: AlignmentLinkage) -> cq.Shape:
-    """The plate with the tongues behind it, and under a sub-plate its ears."""
+    """Return the plate with its tabs, and under a sub-plate its ears."""
     low = p.top - PLATE_THICKNESS
     plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
     if p.plate_ties:
@@ -230,7 +228,7 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
-    """Heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
+    """Return heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
     if p.ears is not None:
         return []
     low = p.top - PLATE_THICKNESS
@@ -238,7 +236,7 @@ def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
 
 
 def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
-    """Cuts from the ways of drivers or heads outwards, if they run near the surface: else a skin would be left."""
+    """Return cuts outwards from drivers or heads near the surface, which would leave a skin."""
     low, high = p.top - PLATE_THICKNESS - DRIVER_LENGTH, p.top - PLATE_THICKNESS
     below = high - DRIVER_DEEP
     if p.ears is not None:
@@ -255,17 +253,17 @@ def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
 
 
 def _pockets(p: AlignmentLinkage) -> tuple[float, float]:
-    """Heights of the pockets for the heads of the lidar's screws, under a sub-plate."""
+    """Return heights of the pockets for the heads of the lidar's screws, under a sub-plate."""
     return p.top - p.screw.head_height - 0.5, p.top + 1.0
 
 
 def _for_screws(p: AlignmentLinkage, radius: float, low: float, high: float) -> list[cq.Shape]:
-    """Cuts for the base screws: round ones, or as long as their slots."""
+    """Return cuts for the base screws: round ones, or as long as their slots."""
     return [solids.slot(radius, *slot_ends(place, p.screw_travel), low, high) for place in p.holes]
 
 
 def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
-    """Holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
+    """Return holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
         return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
     pockets = _for_screws(p, p.screw.head_room, *_pockets(p))
@@ -275,14 +273,14 @@ def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
 
 
 def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.Solid:
-    """Pocket in the plate's lower face and the nut's way into it; its flats face the ends of the ear."""
+    """Return the pocket of a nut in the plate's lower face, its flats towards the ends of the ear."""
     outline = outlines.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
     low = p.top - PLATE_THICKNESS
     return solids.prism(outline, low - TRAP_LENGTH, low + trap.depth)
 
 
 def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
-    """FRONT: a V in the edge at +x, half the plate deep, and through what the neck has there. Laser frame."""
+    """Return FRONT: a V in the edge at +x, half the plate deep, and through the neck there. Laser frame."""
     x = p.half_x if p.stack.sub_plate != "x" else p.half_x + EAR_REACH
     low, high = p.top - PLATE_THICKNESS / 2, p.top + 1.0
     beyond = np.arange(2.0, MARK_LENGTH, 0.5)
@@ -292,7 +290,7 @@ def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
 
 
 def _largest(shape: cq.Shape) -> cq.Shape:
-    """The body that holds the plate; crumbs under 2 % of it are dropped, more than that is a broken neck."""
+    """Return the body that holds the plate; pieces under 2 % of it are dropped, a larger one is a broken neck."""
     bodies = sorted(shape.Solids(), key=lambda solid: -solid.Volume())
     if len(bodies) > 1 and bodies[1].Volume() < 0.02 * bodies[0].Volume():
         return bodies[0]

@@ -25,13 +25,13 @@ from scanwright.design.left_out import LeftOut
 
 
 def counterweight_spec(place: Placement) -> PartSpec | LeftOut:
-    """The bar of one scanner, or why it has none."""
+    """Return the bar of one scanner, or why it has none."""
     bar = place.counterweight
     return bar if isinstance(bar, LeftOut) else bar_spec(place, bar)
 
 
 def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
-    """A bar that may be cut to another length than the layout estimated."""
+    """Return the spec of a bar, whose length may differ from the layout's estimate."""
     tie = place.linkage.hub_tie
     first = (
         ""
@@ -64,7 +64,7 @@ def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
 
 
 def _joint(bar: Counterweight) -> Joint:
-    """The bar on the ear of the hub, from below."""
+    """Return the joint of bar and ear, screwed from below."""
     ear, slide = bar.ear, bar.ear.slots[0]
     x, y = math.cos(ear.azimuth), math.sin(ear.azimuth)
     return Joint(
@@ -80,7 +80,7 @@ def _joint(bar: Counterweight) -> Joint:
 
 
 def _around(bar: Counterweight) -> Iterator[Shape]:
-    """The bar on its ear, and the heads of its screws wherever it slides."""
+    """Yield the bar on its ear, and the heads of its screws wherever it slides."""
     ear, half = bar.ear, max(bar.ear.half_width, bar.section[0] / 2)
     above, below = ear.high + bar.section[1], ear.low - SCREW.head_height
     wide = SCREW.head_diameter / 2
@@ -91,11 +91,7 @@ def _around(bar: Counterweight) -> Iterator[Shape]:
 
 
 def counterweight(p: Counterweight) -> cq.Solid:
-    """Make the bar.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the bar."""
     half, low, high = p.section[0] / 2, p.ear.high, p.ear.high + p.section[1]
     with building(COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm") as checked:
         threads = [solids.upright(SCREW.core / 2, low - 1.0, high + 1.0, at, 0.0) for at in p.screws]

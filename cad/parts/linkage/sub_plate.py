@@ -1,8 +1,8 @@
-"""Sub-plate: between lidar and linkage where the hub would cover one of the lidar's screws.
+"""Sub-plate between lidar and linkage, used if the hub would cover one of the lidar's screws.
 
-Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. On the
-bench it is screwed to the lidar from below; then its two ears are screwed to the linkage from the lidar's side, where
-nothing is in the way. The heads of the lidar's screws stand in pockets of the linkage.
+Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. It is screwed to
+the lidar on the bench; then its two ears are screwed to the linkage from the lidar's side. The heads of the lidar's
+screws are in pockets of the linkage.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ CHAMFER = 3.0
 
 
 def sub_plate_spec(place: Placement) -> PartSpec | None:
-    """The sub-plate of one scanner; None if a driver reaches all screws of the lidar."""
+    """Return the sub-plate of one scanner; None if a driver reaches all screws of the lidar."""
     scanner, axis = place.scanner, place.stack.sub_plate
     if axis is None:
         return None
@@ -60,7 +60,7 @@ def sub_plate_spec(place: Placement) -> PartSpec | None:
 
 
 def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
-    """The lidar on the linkage, or on its sub-plate."""
+    """Return the joint of the lidar with the linkage, or with its sub-plate."""
     p = place.linkage
     axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), p.stack.R())
     slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
@@ -79,7 +79,6 @@ def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
 
 
 def _ears_joint(p: AlignmentLinkage) -> Joint:
-    """The sub-plate on the linkage."""
     thread = p.ear_thread
     return Joint(
         SUB_PLATE,
@@ -94,11 +93,7 @@ def _ears_joint(p: AlignmentLinkage) -> Joint:
 
 
 def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
-    """Make the sub-plate, its ears along an axis of the laser frame.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the sub-plate, its ears along an axis of the laser frame."""
     lidar, printer = scanner.lidar, scanner.printer
     half_x, half_y = lidar.half_mm
     low, high = -lidar.optical_height_mm - SUB_PLATE_THICKNESS, -lidar.optical_height_mm
@@ -116,5 +111,5 @@ def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
 
 
 def front_mark(x: float, beyond: float = 2.0) -> Array:
-    """FRONT: outline of a V that is cut from a plate where it ends at x, and goes on beyond."""
+    """Return FRONT: outline of a V cut from a plate that ends at x, continued beyond."""
     return np.array([[x - 3.0, 0.0], [x + 1.0, -4.0], [x + beyond, -4.0], [x + beyond, 4.0], [x + 1.0, 4.0]])

@@ -1,10 +1,10 @@
-"""Base mount: holds the servo case, or the tower of a belt, on a deck with the rotation axis where the angles want it.
+"""Base mount: holds the servo case, frame or belt tower on a deck, with the rotation axis at the angles of the task.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm; the deck is that of `cad/layout/deck.py`. Two
-rails with feet take the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut
-that stays wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with the deck's
-holes: four M4 on 80 x 80 mm unless the task names others. Slots at the sides of the foot take the ties of cables.
-Screws: first the case from behind through the strut, then the foot on the deck.
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm; the deck is that of `cad/layout/deck.py`. Two rails with
+feet hold the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut behind the
+back plate's front face, and a foot with the deck's holes: four M4 on 80 x 80 mm unless the task states others. Slots at
+the sides of the foot are for cable ties. Screws: first the case from behind through the strut, then the foot on the
+deck.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_S
 
 
 def mount_spec(place: Placement) -> PartSpec | LeftOut:
-    """The mount of one scanner, or why the servo is screwed to the deck."""
+    """Return the mount of one scanner, or why the servo is screwed to the deck."""
     if place.deck.flat:
         return LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts")
     onto = place.drive.mounted.onto
@@ -93,7 +93,7 @@ def mount_spec(place: Placement) -> PartSpec | LeftOut:
 
 
 def _joints(place: Placement) -> Iterator[Joint]:
-    """What the mount carries, and the mount on the deck unless a plate is between them."""
+    """Yield the joint of mount and load, and of mount and deck unless a plate is between them."""
     mounted, deck = place.drive.mounted, place.deck
     yield Joint(
         BASE_MOUNT,
@@ -111,7 +111,7 @@ def _joints(place: Placement) -> Iterator[Joint]:
 
 
 def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
-    """Back plate, rails, strut and foot; what is under the foot is below the face of the deck."""
+    """Yield the back plate, rails, strut and foot."""
     (x, y), (_, cy, cz) = deck.back_half, deck.back_centre
     yield shape_of(box_corners(((-x, cy - y, cz - BACK_THICKNESS), (x, cy + y, cz))))
     for side in (1.0, -1.0):
@@ -127,11 +127,7 @@ def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
 
 
 def base_mount(place: Placement) -> cq.Solid:
-    """Make the mount.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the mount."""
     deck, mounted, printer = place.deck, place.drive.mounted, place.scanner.printer
     hole, deck_hole = passing_hole(mounted.screw, printer) / 2, passing_hole(deck.screw, printer) / 2
     axis = f"({deck.normal[0]:.4f}, {deck.normal[1]:.4f}, {deck.normal[2]:.4f})"
@@ -161,7 +157,7 @@ def _back_plate(deck: Deck) -> cq.Solid:
 
 
 def _strut(deck: Deck) -> cq.Shape:
-    """Hull of back plate and a pad in the foot, behind the front of the back plate."""
+    """Return the hull of back plate and a pad in the foot, behind the front of the back plate."""
     high = deck.back_centre[2] - STRUT_BEHIND
     return solids.hull(strut_corners(deck)).cut(solids.box((-400.0, -400.0, high), (400.0, 400.0, high + 400.0)))
 

@@ -1,15 +1,14 @@
-"""Bearing cage: holds a thin-section bearing around the shaft's sleeve where the axis is tilted too far for the horn.
+"""Bearing cage: holds a thin-section bearing around the shaft's sleeve if the axis is tilted too far for the horn.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Two parts, since the cage must come down over
-the ring:
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Two parts, since the cage is put over the ring:
 
     cage_base     thick plate on the ears of the servo's front, with a boss that centres the cage; with a ring it is
                   the plate of `slip_ring_adapter`
     bearing_cage  a bell around ring and adapter: legs between windows, a roof of 45 deg, the bearing's seat
 
-Put together: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell when the
-bearing has found the sleeve, and the bond in its seat when all of that is in line. The sleeve slides in the bearing:
-along the axis the horn carries alone.
+Order: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell when the bearing
+is centred on the sleeve, and the bond in its seat last. The sleeve slides in the bearing: the horn alone carries axial
+loads.
 """
 
 from __future__ import annotations
@@ -59,7 +58,7 @@ ROOM = 0.7  # between the bell's foot and what stands beside it
 
 
 def bell_spec(place: Placement) -> PartSpec | None:
-    """The bell of one scanner; None if no bearing carries its axis."""
+    """Return the bell of one scanner; None if no bearing carries its axis."""
     p = place.drive.of(BearingCage)
     if p is None:
         return None
@@ -84,7 +83,6 @@ def bell_spec(place: Placement) -> PartSpec | None:
 
 
 def _bell_joint(p: BearingCage, base: str) -> Joint:
-    """The bell on its base, by radial screws."""
     stack, heads = p.stack, p.stack.cage_inner + UNDER_CAGE_HEAD
     return Joint(
         BEARING_CAGE,
@@ -99,7 +97,7 @@ def _bell_joint(p: BearingCage, base: str) -> Joint:
 
 
 def base_spec(place: Placement) -> PartSpec | None:
-    """Its base as a separate part; None if it is the plate of the adapter, or nothing."""
+    """Return the base as a separate part; None if it is part of the adapter, or not needed."""
     p = place.drive.of(BearingCage)
     if p is None or place.scanner.slip_ring is not None:
         return None
@@ -119,7 +117,7 @@ def base_spec(place: Placement) -> PartSpec | None:
 
 
 def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
-    """A plate on the front of the servo's case."""
+    """Return the joint of a plate on the front of the servo's case."""
     heads = stack.horn + ears.front + SEAT_GAP + UNDER_HEAD
     axes, grip = upright_axes(ears.holes, heads, -1.0), heads - (stack.horn + ears.seats)
     return Joint(
@@ -134,17 +132,13 @@ def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
 
 
 def around_base(servo: Servo, p: BearingCage) -> Shape:
-    """What the base fills beside the bell."""
+    """Return the shape of the base next to the bell."""
     wide, back = plate_half_x(servo, SCREWS[servo.front.screw]), servo.case_min_mm[1]
     return shape_of(box_corners(((-wide, back, p.low), (wide, 0.0, p.stack.ring_bottom))))
 
 
 def bearing_cage(p: BearingCage) -> cq.Solid:
-    """Make the bell.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the bell."""
     stack = p.stack
     size = f"{p.bearing.outer_mm:g}"
     with building(BEARING_CAGE, "bell", "outer_mm", size) as checked:
@@ -175,11 +169,7 @@ def bearing_cage(p: BearingCage) -> cq.Solid:
 
 
 def cage_base(p: BearingCage) -> cq.Solid:
-    """Make the plate on the servo.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the plate on the servo."""
     stack, ears = p.stack, p.ears
     seats = stack.horn + ears.seats
     last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
@@ -208,7 +198,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
 
 
 def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
-    """Slot in the boss that a nut is dropped into from above, before the ring and the bell come."""
+    """Return the slot in the boss for a nut, inserted from above before ring and bell."""
     middle, half = (p.foot + p.high) / 2, trap.across / 2
     outer = p.stack.cage_inner - p.fit / 2 - TRAP_WALL
     slot = solids.box((outer - trap.depth, -half, middle - trap.corner), (outer, half, p.high + 1.0))
@@ -216,7 +206,7 @@ def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
 
 
 def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
-    """Recess of one screw's head; one beside the opening is open to it, else a sliver would stand between them."""
+    """Return the recess of one screw's head; next to the opening it is open, else a sliver would remain."""
     radius, low, high = p.ears.screw.head_room, p.low + UNDER_HEAD, p.high + 1.0
     recess: cq.Shape = solids.upright(radius, low, high, x, y)
     reach = math.hypot(x, y)
@@ -227,7 +217,7 @@ def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
 
 
 def _windows(p: BearingCage) -> list[cq.Solid]:
-    """Windows: at +-x open below, for the adapter's arms; at +-y closed, so that the legs stand in pairs."""
+    """Return the windows: at +-x open below, for the adapter's arms; at +-y closed, which joins the legs in pairs."""
     cuts = []
     for k in range(4):
         out = np.array([1.0, 0.0, 0.0]) if k % 2 == 0 else np.array([0.0, 1.0, 0.0])

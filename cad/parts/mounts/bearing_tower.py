@@ -1,11 +1,11 @@
-"""Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo beside them.
+"""Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo next to them.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; the servo's side is that of `BeltStack.quarter`.
-A tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
-screws; at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the
-arms. Nuts, where the printer's profile asks for them, go into the arms from below and into the foot from its corners.
-A round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints upside
-down. An index groove in the edge of its top at +y meets the groove of the linkage's hub.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; the servo's side is that of `BeltStack.quarter`. A
+tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
+screws; at its top a shelf of two arms, between which the servo hangs from its plate. Nuts are inserted into the arms
+from below and into the foot from its corners. Through a round window on the far side a driver reaches the grub screws
+of `shaft_ring`. It prints upside down on its flat top. An index groove in the edge of its top at +y meets the groove of
+the linkage's hub.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ MARKED = 6.0  # half of the edge that it is in
 
 
 def tower_spec(place: Placement) -> PartSpec | None:
-    """The tower of one scanner; None without a belt."""
+    """Return the tower of one scanner; None without a belt."""
     p = place.drive.of(BearingTower)
     if p is None:
         return None
@@ -82,7 +82,6 @@ def tower_spec(place: Placement) -> PartSpec | None:
 
 
 def _disc_joint(p: BearingTower, printer: Printer) -> Joint:
-    """The capsule's disc in the tower, by radial screws."""
     stack, heads = p.stack, p.stack.chamber_radius + UNDER_HEAD
     return Joint(
         BEARING_TOWER,
@@ -97,7 +96,7 @@ def _disc_joint(p: BearingTower, printer: Printer) -> Joint:
 
 
 def _around(stack: BeltStack) -> Iterator[Shape]:
-    """Tower with its foot."""
+    """Yield the tower and its foot."""
     yield shape_of(around_axis(stack.wide_radius, stack.tower_bottom, stack.tower_top))
     flares = max(0.0, math.sqrt(2) * FOOT_HALF - stack.wide_radius)  # the cone on the foot, at 45 deg
     foot = stack.tower_bottom + FOOT + flares
@@ -105,7 +104,7 @@ def _around(stack: BeltStack) -> Iterator[Shape]:
 
 
 def _nuts_words(p: BearingTower) -> tuple[str, ...]:
-    """What the drawing says of the room for nuts."""
+    """Return the notes of the drawing on spaces for nuts."""
     words = []
     if p.plate.trap is not None:
         words.append(f"Hexagons under the arms for nuts {PLATE_SCREW.name}: {p.plate.trap.across:g} across flats.")
@@ -115,11 +114,7 @@ def _nuts_words(p: BearingTower) -> tuple[str, ...]:
 
 
 def bearing_tower(p: BearingTower) -> cq.Solid:
-    """Make the tower.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the tower."""
     stack = p.stack
     size = f"{stack.carrier.outer_mm:g}"
     with building(BEARING_TOWER, "tube, shelf and foot", "outer_mm", size) as checked:
@@ -151,7 +146,7 @@ def _tube(p: BearingTower) -> cq.Solid:
 
 
 def _inside(p: BearingTower) -> cq.Shape:
-    """Seats, the way between them, and the chamber."""
+    """Return the seats, the passage between them, and the chamber."""
     stack = p.stack
     seat, width = stack.carrier.outer_mm / 2 + p.fit / 4, stack.carrier.width_mm
     passage = stack.carrier.outer_mm / 2 - LIP
@@ -163,7 +158,7 @@ def _inside(p: BearingTower) -> cq.Shape:
 
 
 def _foot(p: BearingTower) -> cq.Shape:
-    """The square of the mount's screws, on a cone that needs no support upside down."""
+    """Return the square of the mount's screws, on a cone that needs no support upside down."""
     stack = p.stack
     low, high = stack.tower_bottom, stack.tower_bottom + FOOT
     plate = solids.prism(outlines.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), low, high)
@@ -184,7 +179,7 @@ def _foot(p: BearingTower) -> cq.Shape:
 
 
 def _shelf(p: BearingTower) -> cq.Shape:
-    """A plate around the tube's top, forked around the servo's case; servo's frame."""
+    """Return a plate around the tube's top, forked around the servo's case; servo's frame."""
     stack = p.stack
     low, high = stack.plate_y
     (inner_low, _), (inner_high, _) = stack.arms_y
@@ -198,7 +193,7 @@ def _shelf(p: BearingTower) -> cq.Shape:
 
 
 def _corner_slot(trap: Trap, floor: float, azimuth: float) -> cq.Solid:
-    """Slot in a corner of the foot that a nut is pushed into from outside, before the mount comes."""
+    """Return the slot in a corner of the foot for a nut, inserted from outside before the mount."""
     start, half = math.sqrt(2) * FOOT_HOLE - trap.corner, trap.across / 2
     slot = solids.box((start, -half, floor), (math.sqrt(2) * FOOT_HALF, half, floor + trap.depth))
     return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))

@@ -2,8 +2,7 @@
 
 Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; turned with the servo's side. The capsule hangs
 through its middle, its flange on top, screws from below with nuts on the flange; then the disc slides into the tower
-from below, and three radial screws hold it. The flange's own wide holes and the soft tube on the rotor take what is
-not in line.
+from below, and three radial screws hold it. The wide holes of the flange and the soft tube compensate misalignment.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ RING_STEP = Step(
 
 
 def holder_spec(place: Placement) -> PartSpec | None:
-    """The disc of one scanner; None if it has no capsule."""
+    """Return the disc of one scanner; None if it has no capsule."""
     stack, printer = place.drive.of(BeltStack), place.scanner.printer
     if stack is None:
         return None
@@ -65,11 +64,7 @@ def holder_spec(place: Placement) -> PartSpec | None:
 
 
 def capsule_holder(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the disc.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the disc."""
     low, high = stack.disc_top - DISC, stack.disc_top
     hole = passing_hole(SCREWS[stack.flange.screw], printer)
     thread = thread_in_part(DISC_SCREW, printer, room_for_nut=False)

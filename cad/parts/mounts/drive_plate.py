@@ -1,8 +1,7 @@
 """Drive plate of the belt layout: holds the servo by its front ears and slides on the tower's arms to tighten the belt.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; the servo's place and turn are those of the
-stack. A flat plate with an opening for horn and pulley, feet down to the ears, and four slots along the line of
-centres.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A flat plate with an opening for horn and pulley,
+feet down to the ears, and four slots along the line of centres.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ FOOT_RADIUS = 3.0
 
 
 def plate_spec(place: Placement) -> PartSpec | None:
-    """The plate of one scanner; None without a belt."""
+    """Return the plate of one scanner; None without a belt."""
     p, tower = place.drive.of(DrivePlate), place.drive.of(BearingTower)
     if p is None or tower is None:
         return None
@@ -57,7 +56,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
 
 
 def _joints(servo: Servo, p: DrivePlate, thread: Thread) -> Iterator[Joint]:
-    """The plate on the servo, and on the tower."""
+    """Yield the joints of the plate with servo and tower."""
     stack = p.stack
     R, t, heads = stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_HEAD
     axes, grip = placed_axes(upright_axes(p.holes, heads, -1.0), R, t), heads - p.ears
@@ -85,7 +84,7 @@ def _joints(servo: Servo, p: DrivePlate, thread: Thread) -> Iterator[Joint]:
 
 
 def _around(stack: BeltStack) -> Shape:
-    """Plate and arms of the tower, with the pulley on the horn."""
+    """Return the plate and arms of the tower, with the pulley on the horn."""
     corners = drive_corners(stack)
     low = np.where(np.arange(3) == 2, stack.tower_top - SHELF, corners.min(axis=0))
     high = np.where(np.arange(3) == 2, stack.tower_top + PLATE, corners.max(axis=0))
@@ -93,11 +92,7 @@ def _around(stack: BeltStack) -> Shape:
 
 
 def drive_plate(p: DrivePlate) -> cq.Solid:
-    """Make the plate.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the plate."""
     stack = p.stack
     low, high = stack.tower_top, stack.tower_top + PLATE
     y0, y1 = stack.plate_y

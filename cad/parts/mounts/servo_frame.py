@@ -1,7 +1,7 @@
-"""Servo frame: holds a servo by the threads in its front, where its rear has none that may carry it.
+"""Servo frame: holds a servo by the threads in its front, if its rear has no usable ones.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/frame.py`), mm. A plate with an opening around the horn, sides
-beside the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
+along the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
 """
 
 from __future__ import annotations
@@ -56,11 +56,7 @@ def _on_servo(servo: Servo, frame: ServoFrame) -> Joint:
 
 
 def servo_frame(p: ServoFrame) -> cq.Solid:
-    """Make the frame.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the frame."""
     (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + LEG
     with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
         body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))

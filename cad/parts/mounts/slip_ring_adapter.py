@@ -1,12 +1,12 @@
 """Slip-ring adapter: keeps the ring's stator from turning, from the servo's front holes.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. The rotor of the ring is clamped to the shaft
-and carries the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in
-their groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides round the horn flange
-from -y after the shaft is on, then the ring comes down over the spigot between the arms.
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. The rotor of the ring is clamped to the shaft and
+carries the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in their
+groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides around the horn flange from -y
+after the shaft is on, then the ring is lowered over the spigot between the arms.
 
 Under the cage of a bearing (`bearing_cage.py`) it is a thick closed plate with a boss that centres the cage, held by
-every pair of ears beside the flange; it comes down over the shaft. Without a ring it has no arms and is `cage_base`.
+every pair of ears outside the flange; it is lowered over the shaft. Without a ring it has no arms and is `cage_base`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead
 
 
 def adapter_spec(place: Placement) -> PartSpec | None:
-    """The adapter of one scanner; None without a ring."""
+    """Return the adapter of one scanner; None without a ring."""
     p, cage = place.drive.of(SlipRingAdapter), place.drive.of(BearingCage)
     if p is None:
         return None
@@ -65,7 +65,7 @@ def adapter_spec(place: Placement) -> PartSpec | None:
 
 
 def _around(servo: Servo, p: SlipRingAdapter) -> Iterator[Shape]:
-    """Arms and fork."""
+    """Yield arms and fork."""
     stack, front = p.stack, p.stack.horn + servo.case_max_mm[2] + SEAT_GAP
     outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo, SCREWS[servo.front.screw]))
     yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
@@ -73,11 +73,7 @@ def _around(servo: Servo, p: SlipRingAdapter) -> Iterator[Shape]:
 
 
 def slip_ring_adapter(p: SlipRingAdapter, cage: BearingCage | None) -> cq.Solid:
-    """Make the adapter: the fork, or the base of a cage, and the arms.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the adapter: the fork, or the base of a cage, and the arms."""
     stack = p.stack
     inner = stack.ring_radius + ARM_GAP
     outer = inner + ARM
@@ -104,7 +100,7 @@ def slip_ring_adapter(p: SlipRingAdapter, cage: BearingCage | None) -> cq.Solid:
 
 
 def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
-    """The plate on the servo, open at +y."""
+    """Return the plate on the servo, open at +y."""
     low, seats = stack.horn + p.front + SEAT_GAP, stack.horn + p.seats
     top = low + PLATE
     ys = [y for _, y in p.holes]

@@ -1,8 +1,8 @@
 """Tripod foot: a plate under the mount, with a nut 1/4-20 UNC for a tripod's screw.
 
-Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/modules/tripod_foot.py`. It lies on the
-lower face of the mount's foot and has its outline. The tripod's nut lies in a pocket that the mount closes; those of
-the mount's screws in pockets from below.
+Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/modules/tripod_foot.py`. It is below the
+mount's foot and has its outline. The tripod's nut is in a pocket that the mount closes; those of the mount's screws in
+pockets from below.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from scanwright.design.left_out import LeftOut
 
 
 def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
-    """The plate of one scanner, if the task requires it."""
+    """Return the plate of one scanner, if the task requires it."""
     p = place.deck.tripod
     if p is None:
         return LeftOut(TRIPOD_FOOT, f"the task does not ask for it by modules.{TRIPOD_FOOT}", 1, "parts")
@@ -55,7 +55,7 @@ def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
 
 
 def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
-    """The mount on its plate, and that on the tripod."""
+    """Yield the joints of the plate with mount and tripod."""
     R = deck.rotation()
     yield Joint(
         BASE_MOUNT,
@@ -82,11 +82,7 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
 
 
 def tripod_foot(deck: Deck, p: TripodFoot) -> cq.Solid:
-    """Make the plate.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the plate."""
     with building(TRIPOD_FOOT, "plate and pockets", "deck.screw", deck.screw.name) as checked:
         plate = solids.prism(outlines.octagon(*deck.foot), -p.thickness, 0.0)
         cuts = [solids.upright(p.tripod.hole / 2, -p.thickness - 1.0, 1.0)]

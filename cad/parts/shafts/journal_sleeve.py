@@ -1,8 +1,8 @@
-"""Sleeve of the shaft that the bearing of a tilted axis runs on: turned, since a bearing wants a round journal.
+"""Sleeve of the shaft in the bearing of a tilted axis: turned, since a bearing needs a round journal.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. It slides over the spigot when the ring is on,
-down to a retaining ring, is bonded there, and the hub above keeps it down: no play and no way out. The wires of the
-ring's rotor pass in a channel along it, inside the bearing, under the way out that the hub leaves them.
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. It slides over the spigot after the ring, down to
+a retaining ring, is bonded there, and the hub above keeps it down. The wires of the ring's rotor pass in a channel
+along it, inside the bearing, below the channel of the hub.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ RETAINING = "groove of the shaft, under the bearing's sleeve"
 
 
 def sleeve_spec(place: Placement) -> PartSpec | None:
-    """The sleeve of one scanner; None if no bearing of a cage carries its axis."""
+    """Return the sleeve of one scanner; None if no bearing of a cage carries its axis."""
     stack = place.drive.of(DirectStack)
     if stack is None or stack.bearing is None:
         return None
@@ -65,11 +65,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
 
 
 def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
-    """Make the sleeve.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the sleeve."""
     assert stack.bearing is not None
     low, high = stack.hub_bottom, stack.shoulder - UNDER_HUB
     assert high > stack.bearing_top > stack.shoulder - BEARING_STEP - 1e-9

@@ -1,8 +1,8 @@
-"""Main shaft of the belt layout: a tube in two bearings, with the spigot that the linkage sits on. One turned part.
+"""Main shaft of the belt layout: a tube in two bearings, with the spigot of the linkage. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. The spigot is the one of `servo_shaft`, its flat
-at +y. A collar lies on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave
-through two windows below the web under the spigot.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. The spigot is that of `servo_shaft`, its flat at
++y. A collar rests on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave through
+two windows below the web under the spigot.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ LINKAGE_WORDS = (
 
 
 def main_shaft_spec(place: Placement) -> PartSpec | None:
-    """The shaft of one scanner; None if it has another one."""
+    """Return the shaft of one scanner; None without a belt."""
     scanner, stack = place.scanner, place.drive.of(BeltStack)
     if stack is None:
         return None
@@ -59,11 +59,7 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
 
 
 def main_shaft(stack: BeltStack) -> cq.Solid:
-    """Make the shaft.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the shaft."""
     radius, top = stack.shaft_diameter / 2, stack.hub_bottom - UNDER_HUB
     with building(MAIN_SHAFT, "body", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         body: cq.Shape = solids.upright(stack.seat_diameter / 2, stack.shaft_bottom, top)
@@ -83,5 +79,5 @@ def main_shaft(stack: BeltStack) -> cq.Solid:
 
 
 def _ring_words() -> str:
-    """What the sheet says of the threads of `shaft_ring`."""
+    """Return the note of the sheet on the threads of `shaft_ring`."""
     return f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads pass."

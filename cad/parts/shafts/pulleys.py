@@ -1,11 +1,11 @@
 """The two pulleys of the belt layout: one on the shaft, one on the servo's horn, with the same teeth.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. Teeth between two rims; a groove is a half circle
-with flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press,
-half of the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
+with flanks that widen to the tips, the belt's round tooth with the clearance of a print. Both have a light press fit,
+half of the sliding fit: their offset from the axis changes the angle once per turn (`belt_angle` in `checks.json`).
 
-    shaft_pulley  lies on the shaft's collar, held by two grub screws in its boss; the belt is set by turning it
-    drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above; shortens the lever of the belt
+    shaft_pulley  on the shaft's collar, held by two grub screws in its boss; the belt is set by turning it
+    drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of ch
 
 
 def shaft_pulley_spec(place: Placement) -> PartSpec | None:
-    """The pulley on the shaft of one scanner; None without a belt."""
+    """Return the pulley on the shaft of one scanner; None without a belt."""
     stack, printer = place.drive.of(BeltStack), place.scanner.printer
     if stack is None:
         return None
@@ -87,7 +87,7 @@ def shaft_pulley_spec(place: Placement) -> PartSpec | None:
 
 
 def _bore(stack: BeltStack, printer: Printer) -> float:
-    """Radius of the pulley on the shaft: a light press."""
+    """Return the bore radius of the pulley on the shaft: a light press fit."""
     return stack.tube_diameter / 2 + printer.fit_clearance_mm / 4
 
 
@@ -96,7 +96,7 @@ def _grub_thread(printer: Printer) -> Thread:
 
 
 def drive_pulley_spec(place: Placement) -> PartSpec | None:
-    """The pulley on the horn of one scanner; None without a belt."""
+    """Return the pulley on the horn of one scanner; None without a belt."""
     scanner, stack = place.scanner, place.drive.of(BeltStack)
     if stack is None:
         return None
@@ -124,11 +124,7 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
 
 
 def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the pulley on the shaft.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the pulley on the shaft."""
     bore, grub = _bore(stack, printer), _grub_thread(printer)
     with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
         boss = solids.upright(stack.boss_radius, stack.teeth_top - 0.5, stack.pulley_top)
@@ -141,11 +137,7 @@ def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
 
 
 def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the pulley on the horn.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the pulley on the horn."""
     servo, horn, top = stack.servo, stack.horn, stack.teeth_top + 1.0
     screw, boss = SCREWS[servo.horn_screw], servo.horn_boss_diameter_mm / 2
     with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
@@ -164,7 +156,7 @@ def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
 
 
 def drive_envelope(stack: BeltStack) -> cq.Solid:
-    """What the pulley on the horn fills while it turns about its own axis."""
+    """Return the space that the pulley on the horn fills while it turns about its own axis."""
     rim, tip = stack.rim_radius, stack.tip_radius
     low, high = stack.teeth_low, stack.teeth_top
     foot = solids.upright(pulley_foot_radius(stack.servo), stack.horn, low + 0.5)
@@ -177,7 +169,7 @@ def drive_envelope(stack: BeltStack) -> cq.Solid:
 
 
 def _teeth_words(stack: BeltStack) -> str:
-    """What a pulley's drawing says of its teeth."""
+    """Return the note of a pulley's drawing on its teeth."""
     belt = stack.belt
     return (
         f"{stack.teeth} teeth for {belt.name}, pitch {belt.pitch_mm:g}: pitch diameter {2 * stack.pitch_radius:.2f}, "
@@ -187,9 +179,9 @@ def _teeth_words(stack: BeltStack) -> str:
 
 
 def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -> cq.Shape:
-    """Teeth between two rims about the axis, each rim in one with what is on its far side.
+    """Return teeth between two rims about the axis, each rim joined with the solid on its far side.
 
-    Rims and teeth touch and do not overlap: the kernel then glues them in half the time.
+    Rims and teeth touch without overlap: the kernel then glues them in half the time.
     """
     low, high = stack.teeth_low + RIM, stack.teeth_top - RIM
     teeth = cq.Solid.extrudeLinear(_outline(stack), [], cq.Vector(0, 0, high - low))
@@ -200,7 +192,7 @@ def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -
 
 
 def _outline(stack: BeltStack) -> cq.Wire:
-    """Outline of the teeth at z = 0: for each a flank, the groove's half circle in chords, a flank, the tip."""
+    """Return the outline of the teeth at z = 0: a flank, the groove's half circle in chords, a flank, the tip."""
     groove, tip = stack.belt.groove_radius_mm, stack.tip_radius
     centre = tip - stack.belt.tooth_height_mm + groove
     half = (groove + MOUTH) / tip  # rad, of the mouth

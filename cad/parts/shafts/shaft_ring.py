@@ -1,7 +1,7 @@
-"""Ring under the lower bearing of the belt layout: with the collar above it keeps the shaft where it is.
+"""Ring under the lower bearing of the belt layout: with the collar above it fixes the shaft along its axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that only the inner ring touches, and two
-screws into threads of the shaft, 90 deg apart; they and a driver pass the window of the tower.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that touches only the inner ring, and two
+screws into threads of the shaft, 90 deg apart; a driver reaches them through the window of the tower.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scanwright.design.catalogue.products import Printer
 
 
 def shaft_ring_spec(place: Placement) -> PartSpec | None:
-    """The ring of one scanner; None without a belt."""
+    """Return the ring of one scanner; None without a belt."""
     stack, printer = place.drive.of(BeltStack), place.scanner.printer
     if stack is None:
         return None
@@ -59,11 +59,7 @@ def _bore(stack: BeltStack, printer: Printer) -> float:
 
 
 def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the ring.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the ring."""
     hole, head = passing_hole(RING_SCREW, printer) / 2, RING_SCREW.head_room
     with building(SHAFT_RING, "ring", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         low, high = stack.collar_low, stack.collar_low + BOSS
