@@ -1,7 +1,7 @@
 """`bom.csv`: everything to print, turn and buy for one scanner, with quantities and prices.
 
-Prices are those of the catalogue, each with its source and year. If it has none, a range of `prices.py` stands in
-separate columns, stated as an estimate; the last row adds up both and names the rows that have neither.
+Prices are those of the catalogue, each with its source and year, or a range of `prices.py` in separate columns. The
+last row adds up both and names the rows that have neither.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports an
 
 @dataclass(frozen=True, slots=True)
 class BomItem:
-    """One row; the fields but `estimate` are the columns. Empty texts and None are unknown.
+    """One row; all fields except `estimate` are columns. Empty texts and None are unknown.
 
     Attributes:
         kind: printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total.
-        part: what it is.
+        part: name, or type of product.
         number: drawing number of a made part, designation of a standard part.
         quantity: pieces.
         supplier: maker.
-        supplier_number: what to order there.
+        supplier_number: order number.
         unit_usd: price of one.
         total_usd: price of all.
-        low_usd: least that all of them may cost: from the price, or an estimate.
-        high_usd: most.
+        low_usd: least price of all: from the price, or an estimate.
+        high_usd: largest price of all.
         priced: year of the price.
         mass_g: of one.
-        source: where the price, or the row, comes from.
-        verified: whether that value is verified; empty if there is none.
-        note: for the person who buys.
+        source: of the price, or of the row.
+        verified: whether the price is verified; empty if there is none.
+        note: for the buyer.
         estimate: name in `prices.EACH_USD`; empty if there is none.
     """
 
@@ -122,26 +122,24 @@ def bom_text(items: list[BomItem]) -> str:
 
 def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
-        if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
-            orders = (station.order for station in drive.stations if station.product == product and station.order)
-            yield _bought(product, max(1, drive.products.count(product)), next(orders, product.name))
-
-
-def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
-    origin, price = product.provenance().get("price_usd"), product.price_usd
-    return BomItem(
-        kind="bought",
-        part=product.kind.replace("_", " "),
-        number=number,
-        quantity=quantity,
-        supplier=product.maker,
-        supplier_number=number,
-        unit_usd=price,
-        total_usd=None if price is None else quantity * price,
-        mass_g=product.mass_g,
-        source=origin.source if origin is not None else "",
-        verified="" if origin is None else "yes" if origin.verified else "no",
-    )
+        if not isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
+            continue
+        orders = (station.order for station in drive.stations if station.product == product and station.order)
+        number, quantity = next(orders, product.name), max(1, drive.products.count(product))
+        origin, price = product.provenance().get("price_usd"), product.price_usd
+        yield BomItem(
+            kind="bought",
+            part=product.kind.replace("_", " "),
+            number=number,
+            quantity=quantity,
+            supplier=product.maker,
+            supplier_number=number,
+            unit_usd=price,
+            total_usd=None if price is None else quantity * price,
+            mass_g=product.mass_g,
+            source=origin.source if origin is not None else "",
+            verified="" if origin is None else "yes" if origin.verified else "no",
+        )
 
 
 def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
@@ -278,21 +276,15 @@ def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomIt
     yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
     sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
     yield BomItem("tool", "hexagon keys", source=JOINTS, note=f"for {sizes}", estimate="hexagon keys")
-    yield BomItem(
-        "tool", f"torque screwdriver{_torques(assembly, joints)}", source=STEPS, estimate="torque screwdriver"
-    )
+    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
+    torques_nm = [hold.torque_nm for hold in holds if hold is not None]
+    torques = f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
+    yield BomItem("tool", f"torque screwdriver{torques}", source=STEPS, estimate="torque screwdriver")
     yield BomItem("tool", "caliper", source=STEPS, note="for the values to measure", estimate="caliper")
     yield BomItem("tool", "multimeter", source=WIRING_TEXT, estimate="multimeter")
     yield from (need for need in needs if need.kind == "tool")
     if any(joint.inserts for joint in joints):
         yield BomItem("tool", "soldering iron", source=STEPS, note="for the inserts", estimate="soldering iron")
-
-
-def _torques(assembly: Assembly, joints: Sequence[Joint]) -> str:
-    """Return the range of the torques of some joints, as the end of the name of a tool."""
-    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
-    torques_nm = [hold.torque_nm for hold in holds if hold is not None]
-    return f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
 
 
 def _ranged(item: BomItem) -> BomItem:
@@ -320,7 +312,7 @@ def _total(items: list[BomItem]) -> BomItem:
     note = (
         f"sum of {len(known)} known prices, {doubtful} of them not verified; {unknown} rows without a price: the range "
         f"counts them by estimates, tools up to {tools:.0f}; "
-        f"{'not in the range: ' + ', '.join(open_) if open_ else 'nothing is without an estimate'}; no tax, no carriage"
+        f"{'not in the range: ' + ', '.join(open_) if open_ else 'every row has an estimate'}; no tax, no shipping"
     )
     low, high = (
         round(sum(usd for item in items if (usd := getattr(item, end)) is not None)) for end in ("low_usd", "high_usd")

@@ -1,7 +1,6 @@
 """Binary glTF 2.0 from canonical meshes: metres, a tree of named nodes, the same bytes for the same scene.
 
-glTF is y-up and the project z-up: the tree hangs under one node that turns z to y, so every pose below it is the
-project's own. Normals are those of the surface: round where it is round, sharp at its edges.
+glTF is y-up and the project z-up: one root node turns z to y. Normals are smooth on round surfaces and sharp at edges.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ class Node:
 
     Attributes:
         name: unique.
-        parent: name of the node that it hangs under; empty for the root.
+        parent: name of its parent node; empty for the root.
         T_parent_node: its pose [m], shape (4, 4).
         mesh: in the frame of the node [mm]; None for a bare frame.
         colour: sRGB, 0 to 1.

@@ -24,11 +24,6 @@ from scanwright.design.scanner import Scanner
 GAP_MM = 15.0  # between the products of the exploded view
 
 
-def product_of(body: str, assembly: Assembly) -> str:
-    """Return the made part, or the bought product that several bodies show."""
-    return body if body in assembly.made else assembly.bodies[body].product
-
-
 def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh], config_hash: str) -> dict[str, bytes]:
     """Return both files; `meshes` are of the made parts, rotation frame."""
     T = scanner.angles.T_rot_laser()
@@ -62,7 +57,7 @@ def _exploded(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> list
     for node in nodes:
         if node.mesh is not None:
             shifted = np.eye(4)
-            shifted[:3, 3] = np.round(to_rot[node.parent].T @ lifts[product_of(node.name, assembly)] / 1000, 9) + 0.0
+            shifted[:3, 3] = np.round(to_rot[node.parent].T @ lifts[assembly.thing(node.name)] / 1000, 9) + 0.0
             node = replace(node, T_parent_node=shifted)
         moved.append(node)
     return moved
@@ -76,7 +71,7 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
             cloud = node.mesh.vertices
             if node.parent == "laser":
                 cloud = cloud @ T_rot_laser[:3, :3].T + T_rot_laser[:3, 3] * 1000
-            clouds.setdefault(product_of(node.name, assembly), []).append(cloud)
+            clouds.setdefault(assembly.thing(node.name), []).append(cloud)
     points = {product: np.concatenate(parts) for product, parts in clouds.items()}
     axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
     lifts: dict[str, Array] = {}

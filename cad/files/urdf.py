@@ -2,8 +2,8 @@
 
     world --fixed--> servo --spin_joint, about z--> rot --fixed--> laser
 
-The origins of `servo` and `rot` are the optical centre and they coincide at joint position 0, so every mesh, made in
-the rotation frame, has the identity for its pose. Transforms are the angle set's own. SI units.
+The origins of `servo` and `rot` are the optical centre, so every mesh, made in the rotation frame, has the identity as
+its pose. Transforms are those of the angle set. SI units.
 """
 
 from __future__ import annotations

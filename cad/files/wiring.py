@@ -42,7 +42,7 @@ def wiring_text(network: Network, title: str) -> str:
         "Slip ring": _ring(network),
         "Wires": _wires(network),
         "Data through the ring": ([], [*network.risks]),
-        "Not known": ([sentence(unknown) for unknown in network.unknown], []),
+        "Unknown": ([sentence(unknown) for unknown in network.unknown], []),
     }
     blocks = [f"# {title}"]
     for heading, (items, paragraphs) in sections.items():
@@ -87,9 +87,9 @@ def _ring(network: Network) -> Section:
             use = f"{circuit.net}, {load if circuit.amps else 'signal'}"
         items.append(f"{circuit.number}: {use}")
     numbers = (
-        "The numbers are ours: the makers of these rings number no circuit. If the leads differ in thickness, the "
-        "thick ones are the circuits with the higher current. Set a multimeter to continuity, find the two ends of "
-        "each circuit, stator and rotor, and write its number on both."
+        "The numbers are assigned here: the makers of these rings number no circuits. If the leads differ in "
+        "thickness, the thick ones are the circuits with the higher current. Set a multimeter to continuity, find the "
+        "two ends of each circuit, stator and rotor, and write its number on both."
     )
     return items, [numbers] if items else []
 

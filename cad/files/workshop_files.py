@@ -29,19 +29,14 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True)
 class Exports:
-    """Written files, relative to the build folder, files not included, and remarks for a person."""
+    """Written files, relative to the build folder, files that are not included, and remarks for a person."""
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     findings: tuple[Finding, ...]
 
 
-def export_scanner(
-    scanner: Scanner,
-    made: PartsResult,
-    folder: Path,
-    progress: Progress,
-) -> Exports:
+def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: Progress) -> Exports:
     """Write all of them into a build folder; `made` is the result of `part_files.build_parts`."""
     assembly, masses = made.assembly, made.masses_g()
     digest, joints = assembly.layout.digest, assembly.layout.joints

@@ -26,8 +26,8 @@ NUTS = (
 )
 LOCKED = (
     "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
-    "which then cracks. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
-    "creeps. `checks.json` lists under `retention` and `screw` the margin of each joint."
+    "which can crack. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
+    "creeps. `checks.json` lists the margin of each joint under `retention` and `screw`."
 )
 LOOK = "Look, then wire"
 HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
@@ -38,11 +38,7 @@ IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then jo
 
 
 def instructions_text(
-    scanner: Scanner,
-    assembly: Assembly,
-    scenes: Sequence[StepScene],
-    plates: Sequence[Sequence[str]],
-    config_hash: str,
+    scanner: Scanner, assembly: Assembly, scenes: Sequence[StepScene], plates: Sequence[Sequence[str]], config_hash: str
 ) -> str:
     """Return the Markdown file; scenes of `scenes.scenes_of`, `plates` are the parts printed together."""
     joints = [joint for scene in scenes for joint, _ in scene.joints]

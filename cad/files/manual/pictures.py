@@ -151,7 +151,7 @@ def _call_out(
         heads = []
         for axis in joint.axes:
             start, along = np.array(axis.start) / 1000, np.array(axis.along)
-            straight = float(np.linalg.norm(np.cross(moved, along))) < 1e-6  # else it bends where the part has come
+            straight = float(np.linalg.norm(np.cross(moved, along))) < 1e-6  # else it bends at the part's final place
             end = start + (0 if straight else moved)
             heads.append(view.at(start - _out(joint) / 1000 * along + moved))
             pen.line([*view.at(start - OUT_MM / 1000 * along + moved), *view.at(end)], fill=INK, width=1)
