@@ -5,7 +5,7 @@ The lidar is placed by `T_rot_laser` of the angle set, the same transform as for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -19,8 +19,6 @@ from scanwright.cad.assembly.tube import LEAD_CHORDS, cable_solid, lead_solid
 from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.fixed import FixedCable
-from scanwright.cad.layout.cables.leads import RotorLead
 from scanwright.cad.layout.drive import DriveLayout, Station
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.parts.part_spec import STEEL, Colour
@@ -43,14 +41,14 @@ class BodySpec:
 
     Attributes:
         name: unique in the scanner.
-        product: that it is a piece of, of `cad/layout/names.py`.
+        product: that it belongs to, of `cad/layout/names.py`.
         frame: that it moves with.
         colour: sRGB.
         make: its solid, rotation frame.
-        meets: body that it may touch though the other one moves: the other half of a ring, or what it drives.
+        meets: moving body that it may touch: the other half of a ring, or a driven part.
         clear: whether beams pass it.
-        from_below: whether it is put in from below, where its product comes twice.
-        chords: what the mesh may be off by [mm], and the angle between two of its facets [rad].
+        from_below: whether it is inserted from below, if its product is used twice.
+        chords: tolerance of the mesh [mm], and angle between its facets [rad].
     """
 
     name: str
@@ -73,7 +71,7 @@ def bought_of(layout: Layout) -> list[BodySpec]:
     """Return the bodies of all bought products and cables of one scanner."""
     drawn = [body for station in layout.drive.stations for body in _of_station(layout.drive, station)]
     drawn.sort(key=lambda body: body.product != names.SERVO)
-    return [*drawn, *_of_lidar(layout), *_of_leads(layout.leads), *_of_cables(layout.cables)]
+    return [*drawn, *_of_lidar(layout), *_of_cables(layout)]
 
 
 def _of_station(drive: DriveLayout, station: Station) -> Iterator[BodySpec]:
@@ -91,16 +89,10 @@ def _of_station(drive: DriveLayout, station: Station) -> Iterator[BodySpec]:
         yield _ring(names.RING_STATOR, "servo", stator, meets=names.RING_ROTOR)
         yield _ring(names.RING_ROTOR, "rot", rotor)
     elif isinstance(product, Belt):
-        stack = drive.of(BeltStack)
-        assert stack is not None  # what a belt is laid out by
-        yield BodySpec(
-            name=names.BELT,
-            product=names.BELT,
-            frame="servo",
-            colour=RUBBER,
-            make=partial(draw.belt, stack),
-            meets=names.SHAFT_PULLEY,
-        )
+        stack, belt = drive.of(BeltStack), names.BELT
+        assert stack is not None  # of every belt
+        make = partial(draw.belt, stack)
+        yield BodySpec(name=belt, product=belt, frame="servo", colour=RUBBER, make=make, meets=names.SHAFT_PULLEY)
 
 
 def _of_servo(drive: DriveLayout, servo: Servo) -> Iterator[BodySpec]:
@@ -157,32 +149,16 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
         )
 
 
-def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
-    """Return those that have a path."""
-    for i, lead in enumerate(leads, start=1):
+def _of_cables(layout: Layout) -> Iterator[BodySpec]:
+    """Yield the leads on the rotor and the fixed cables that have a path."""
+    drawn = partial(BodySpec, colour=LEAD, chords=LEAD_CHORDS)
+    for i, lead in enumerate(layout.leads, start=1):
         if lead.path is not None:
-            yield BodySpec(
-                name=f"{names.ROTOR_LEAD}_{i}",
-                product=names.ROTOR_LEADS,
-                frame="rot",
-                colour=LEAD,
-                make=partial(lead_solid, lead),
-                chords=LEAD_CHORDS,
-            )
-
-
-def _of_cables(cables: Sequence[FixedCable]) -> Iterator[BodySpec]:
-    """Return those that have a path."""
-    for cable in cables:
+            name, make = f"{names.ROTOR_LEAD}_{i}", partial(lead_solid, lead)
+            yield drawn(name=name, product=names.ROTOR_LEADS, frame="rot", make=make)
+    for cable in layout.cables:
         if cable.path is not None:
-            yield BodySpec(
-                name=cable.name,
-                product=names.FIXED_CABLES,
-                frame="servo",
-                colour=LEAD,
-                make=partial(cable_solid, cable),
-                chords=LEAD_CHORDS,
-            )
+            yield drawn(name=cable.name, product=names.FIXED_CABLES, frame="servo", make=partial(cable_solid, cable))
 
 
 def _moved(R: Array, t: Array, make: Callable[[], cq.Solid]) -> cq.Solid:

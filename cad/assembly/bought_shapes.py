@@ -22,7 +22,7 @@ from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 
 CAP_INSET = 1.5
-CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide
+CHORDS = 0.02  # overlap of the facets of a round seat and its hole: no fit is as wide
 EAR_ROOM = 3.6  # radius of the recess around a case hole
 BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
 THROUGH = 0.25  # of a plain hole around its screw

@@ -53,7 +53,7 @@ def _balanced(assembly: Assembly) -> Assembly:
     bar = layout.counterweight
     assert not isinstance(bar, LeftOut)
     if len(assembly.carriers()) == sum(part.seat is not None for part in assembly.parts.values()):
-        bar = bar.balancing(rotor_moment(layout.scanner, assembly))
+        bar = bar.balancing(rotor_moment(layout.scanner, assembly))  # all other parts are there
     spec = bar_spec(layout, bar)
     parts, made = assembly.parts | {spec.name: spec}, assembly.made | {spec.name: spec.make()}
     return replace(assembly, parts=parts, made=made)
@@ -69,15 +69,14 @@ def require_room_on_bed(assembly: Assembly) -> None:
     for name in assembly.made:
         if assembly.parts[name].metal or _across(assembly, name) <= min(printer.bed_mm):
             continue
-        pose = assembly.print_pose(name)
-        if pose.fits:
+        if (pose := assembly.print_pose(name)).fits:
             continue
         size, bed = (" x ".join(f"{edge:.0f}" for edge in edges) for edges in (pose.size_mm, printer.bed_mm))
         least = [float(np.ceil(edge - SLACK_MM)) for edge in pose.size_mm]
         smaller = ", or a smaller pattern of holes in [deck]" if name in (BASE_MOUNT, TRIPOD_FOOT) else ""
         raise BuildError(
-            f"{name}: {size} mm as it is printed: the bed of {printer.name} is {bed} mm (bed_mm); a printer with "
-            f"bed_mm = {least} would hold it{smaller}, or other angles"
+            f"{name}: {size} mm in its print pose: the bed of {printer.name} is {bed} mm (bed_mm); use a printer with "
+            f"bed_mm = {least}{smaller}, or other angles"
         )
 
 

@@ -15,12 +15,13 @@ from scanwright.cad.layout.drive import Mass
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.loads import Weight, weight_of
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.scanner import Scanner
 
 LIDAR_CENTRE_ERROR_MM = 2.0
-"""How far a lidar's centre of mass may be from the middle of its box, in any direction: assumed, no data sheet tells.
+"""Error of a lidar's centre of mass from the middle of its box, in any direction: assumed, undocumented.
 
-Motor, mirror and most of the boards lie around its axis; plugs and windows, a tenth of it, do not: 20 mm aside.
+Motor, mirror and most boards are around its axis; plugs and windows, a tenth of it, are 20 mm off.
 """
 
 
@@ -29,17 +30,20 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
 
     Bought parts are homogeneous boxes, of which a share may turn; cables are lines.
     """
-    lidar, masses = scanner.lidar, assembly.layout.drive.masses
+    masses = assembly.layout.drive.masses
     fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
     fixed += [_share(mass, 1 - mass.turning) for mass in masses]
     fixed += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.cables if lead.path]
     turning = [assembly.inertial(name) for name in assembly.turning_parts()]
     turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
     turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.leads if lead.path]
-    x, y, z = lidar.body_mm
-    base = -lidar.optical_height_mm
-    laser = inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
-    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": laser}
+    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": lidar_body(scanner.lidar)}
+
+
+def lidar_body(lidar: Lidar) -> Inertial:
+    """Return the lidar as a homogeneous box, laser frame."""
+    (x, y, z), base = lidar.body_mm, -lidar.optical_height_mm
+    return inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
 
 
 def rotor_of(scanner: Scanner, bodies: Mapping[str, Inertial]) -> Inertial:

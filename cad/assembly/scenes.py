@@ -6,7 +6,7 @@ A step works on the scanner, or on the bench, where it assembles what is later p
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,14 +25,14 @@ class StepScene:
     """One step.
 
     Attributes:
-        thing: part or product that it puts in.
+        thing: part or product that it adds.
         step: its text.
         joints: that it closes, each with its mark in the text; an empty mark if the text has none.
         there: present bodies, in alphabetical order.
         comes: new bodies.
         against: those of them that come from the opposite side.
-        along: unit vector, rotation frame, from which they come; 0 for leads, which are shown where they are laid.
-        R_rot_picture: the frame that is upright on the bench: the lidar's own, or the rotation frame.
+        along: unit vector, rotation frame, from which they come; 0 for cables, which are shown in place.
+        R_rot_picture: the frame that is upright in the picture: the lidar's, or the rotation frame.
     """
 
     thing: str
@@ -98,25 +98,15 @@ def _closed(steps: Sequence[tuple[str, Step]], joints: Sequence[Joint]) -> list[
 
 
 def _scene(
-    assembly: Assembly,
-    thing: str,
-    step: Step,
-    own: tuple[tuple[Joint, str], ...],
-    there: set[str],
-    comes: set[str],
+    assembly: Assembly, thing: str, step: Step, own: tuple[tuple[Joint, str], ...], there: set[str], comes: set[str]
 ) -> StepScene:
-    if not there and comes - {thing}:  # what is brought to the first of all
+    if not there and comes - {thing}:  # the first of all
         there, comes = {thing}, comes - {thing}
     along, R = _from(assembly, thing, there, comes)
-    stand, come = (tuple(sorted(_bodies(things, assembly))) for things in (there, comes))
+    names = sorted((*assembly.made, *assembly.bought))
+    present, come = (tuple(name for name in names if assembly.thing(name) in things) for things in (there, comes))
     against = tuple(name for name in come if name in assembly.bodies and assembly.bodies[name].from_below)
-    return StepScene(thing, step, own, stand, come, against if thing not in comes else (), along, R)
-
-
-def _bodies(things: set[str], assembly: Assembly) -> Iterator[str]:
-    for name in (*assembly.made, *assembly.bought):
-        if assembly.thing(name) in things:
-            yield name
+    return StepScene(thing, step, own, present, come, against if thing not in comes else (), along, R)
 
 
 def _from(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tuple[Vector, Rotation]:

@@ -25,7 +25,7 @@ from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
 
-APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
+APERTURE_M = 0.003  # radius of the beam at its exit: assumed, undocumented
 SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
 BEAM_RAYS = 6
 

@@ -10,21 +10,21 @@ from scanwright.cad.parts.part_spec import Step
 
 ON_DECK = Step(
     "Servo on the deck",
-    "The axis stands upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
-    f"{screws(SERVO_CASE, DECK)} Leave room for the plugs.",
-    "the horn turns freely, and the case lies flat on the deck",
+    "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
+    f"{screws(SERVO_CASE, DECK)} Leave space for the plugs.",
+    "the horn turns freely, and the case is flat on the deck",
     (SERVO,),
 )
 FRAME_ON_DECK = Step(
     "Frame on the deck",
-    "The axis stands upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
+    "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
     f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame.",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
 LEADS_TITLE = "Leads between lidar and ring"
-LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
+LEADS_CHECK = "turned by hand through its entire range, no lead touches a fixed part, and none pulls at its ends"
 CABLES_TITLE = "Cables that do not turn"
-CABLES_CHECK = "turned by hand, nothing that turns comes near a cable; a pull on one is not felt at its plug"
+CABLES_CHECK = "turned by hand, nothing comes near a cable; a pull on a cable does not reach its plug"
 
 
 def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:

@@ -1,4 +1,4 @@
-"""A lead as a solid: a round section along its path, thicker where its joint sits. Millimetres."""
+"""A cable as a solid: a round section along its path, thicker at its joint. Millimetres."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.cables import joint
 from scanwright.cad.layout.cables.fixed import FixedCable
 from scanwright.cad.layout.cables.leads import RotorLead
-from scanwright.cad.layout.cables.path import Path, PathPiece
+from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.solids import building
 from scanwright.design.errors import BuildError
@@ -52,12 +52,12 @@ def _closed(name: str, solid: cq.Solid) -> cq.Solid:
 
 
 def _tube(path: Path, half: float) -> cq.Shape:
-    pieces, corners = path.pieces(), np.array(path.corners, dtype=float)
-    wire = cq.Wire.assembleEdges([_edge(piece) for piece in pieces])
+    corners = np.array(path.corners, dtype=float)
+    edges = []
+    for piece in path.pieces():
+        start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
+        line = cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)
+        edges.append(line)
+    wire = cq.Wire.assembleEdges(edges)
     ring = cq.Wire.makeCircle(half, solids.vector(corners[0]), solids.vector(corners[1] - corners[0]))
     return cq.Solid.sweep(ring, [], wire)
-
-
-def _edge(piece: PathPiece) -> cq.Edge:
-    start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
-    return cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)

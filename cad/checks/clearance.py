@@ -68,7 +68,9 @@ def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Fi
     names = sorted(meshes)
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
-            if (one in turning) != (other in turning) or _apart(meshes[one], meshes[other]):
+            a, b = meshes[one].vertices, meshes[other].vertices
+            apart = (a.min(axis=0) > b.max(axis=0)).any() or (b.min(axis=0) > a.max(axis=0)).any()
+            if (one in turning) != (other in turning) or apart:
                 continue
             volume = float((bodies[one] ^ bodies[other]).volume())
             if volume > most:
@@ -164,10 +166,3 @@ def _contains(outer: TriMesh, inner: TriMesh) -> bool:
     scene = ray_caster.build_scene(outer.vertices[outer.faces] / 1000)
     (face,) = ray_caster.cast(scene, point / 1000, RAY[None]).triangle
     return bool(face >= 0 and scene.normals[face] @ RAY > 0)
-
-
-def _apart(one: TriMesh, other: TriMesh) -> bool:
-    gap = np.maximum(
-        one.vertices.min(axis=0) - other.vertices.max(axis=0), other.vertices.min(axis=0) - one.vertices.max(axis=0)
-    )
-    return bool(gap.max() > 0)

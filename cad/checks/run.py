@@ -73,6 +73,6 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
         *([] if linkage is None else vibration_checks(scanner, assembly, bodies, linkage, mount)),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *module_checks(scanner, layout.left_out),
-        *unverified(products, assembly),
+        *(warning for product in products for warning in unverified(product, assembly)),
     ]
     return checks, shadow

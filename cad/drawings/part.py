@@ -24,15 +24,15 @@ PLANES = 9  # the largest faces of one direction that get an ordinate: more do n
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a drawing shows of a part.
+    """Content of the drawing of a part.
 
     Attributes:
-        solid: rotation frame, moved so that the axis it is measured from is x = y = 0.
+        solid: rotation frame, moved so that the axis of its ordinates is x = y = 0.
         patterns: its holes off the axis, then its slots.
-        axial: its cylinders about the axis that it is measured from.
+        axial: its cylinders about that axis.
         datum: height of the lowest point.
         lidar_axis: z of the lidar that it carries; None for other parts.
-        fits: of its cylinders about that axis.
+        fits: of its cylinders about the axis.
     """
 
     solid: cq.Solid

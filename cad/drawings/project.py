@@ -43,7 +43,7 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """A straight piece, by its two ends, or any other curve, by points close together."""
+    """A straight piece by its two ends, or another curve by points close together."""
 
     points: tuple[tuple[float, float], ...]
     hidden: bool
@@ -169,8 +169,9 @@ def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
     """Join arcs of one circle in the same way."""
     groups: list[tuple[Array, float, tuple[list[Span], list[Span]]]] = []
     for centre, radius, (low, high), hidden in sorted(pieces, key=lambda piece: (*np.round(piece[0], 2), piece[1])):
-        alike = (i for i, (other, size, _) in enumerate(groups) if _alike(other - centre, size - radius))
-        i = next(alike, len(groups))
+        i = 0
+        while i < len(groups) and np.abs([*(groups[i][0] - centre), groups[i][1] - radius]).max() >= TOLERANCE_MM:
+            i += 1
         if i == len(groups):
             groups.append((centre, radius, ([], [])))
         turns = math.floor(low / (2 * math.pi)) * 2 * math.pi
@@ -180,10 +181,6 @@ def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
             for low, high in _closed(shown):
                 if (high - low) * radius > SHORTEST_MM:
                     yield Arc(_point(centre), round(radius, 3), round(low, 5) + 0.0, round(high, 5) + 0.0, hidden)
-
-
-def _alike(shift: Array, growth: float) -> bool:
-    return abs(growth) < TOLERANCE_MM and float(np.abs(shift).max()) < TOLERANCE_MM
 
 
 def _within_turn(low: float, high: float) -> list[Span]:

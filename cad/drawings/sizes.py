@@ -38,11 +38,11 @@ class Sizes:
 
     Attributes:
         box: left, bottom, right and top of its lines.
-        below: horizontal positions, and the height of what lies there.
-        heights: vertical positions, and the place of what lies there across them.
+        below: horizontal positions, and the height of their features.
+        heights: vertical positions, and the place of their features across them.
         callouts: diameters, holes and slots.
-        holes: what gets a cross: middle and half of its size.
-        circles: that holes lie on: middle and radius.
+        holes: middle and half of the size of each cross.
+        circles: middle and radius of circles through holes.
     """
 
     box: tuple[float, float, float, float]
@@ -130,7 +130,7 @@ def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, flo
 
 
 def _name_centre(pen: Pen, view: View, at: Point) -> None:
-    """Write the name at the optical centre, at the first side of it where it meets no line of the part."""
+    """Write the name at the optical centre, on the first side without a line of the part."""
     words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP_MM
     below = y - 1.0 - TEXT_MM
     choices = [((x - CENTRE_GAP_MM, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP_MM, below), "right")]
@@ -141,7 +141,7 @@ def _name_centre(pen: Pen, view: View, at: Point) -> None:
 
 
 def _points(curve: Curve) -> list[Point]:
-    """Return points that a curve of a view passes."""
+    """Return points on a curve of a view."""
     if not isinstance(curve, Arc):
         return list(curve.points)
     (x, y), radius = curve.centre, curve.radius

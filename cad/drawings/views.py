@@ -24,7 +24,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A view and what it shows.
+    """A view of a part.
 
     Attributes:
         title: above the view.
@@ -32,8 +32,8 @@ class View:
         up: unit vector upwards.
         origin: point whose projection is 0 of the ordinates.
         curves: lines of the part, model mm.
-        kind: front and top carry ordinates of planes too, angle, section and iso none.
-        hatching: lines over what is cut.
+        kind: front and top have ordinates of planes too, angle, section and iso none.
+        hatching: lines over cut faces.
     """
 
     title: str

@@ -97,7 +97,7 @@ def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
 def pdf_bytes(pages: Sequence[tuple[Sheet, Drawn]]) -> bytes:
     """Return a file of sheets, each with what is `drawn_on` it, in Helvetica; its title is the name of the first."""
     file = io.BytesIO()
-    # not compressed: what a compressor makes of it depends on its version
+    # not compressed: the output of a compressor depends on its version
     canvas = Canvas(file, invariant=1, pageCompression=0)
     canvas.setTitle(pages[0][0].name)
     canvas.setCreator("scanwright")
