@@ -11,7 +11,7 @@ import cadquery as cq
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
-from scanwright.cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
+from scanwright.cad.layout.joints import horn_centres, lidar_thread_mm
 from scanwright.cad.layout.names import BELT, RING_STATOR
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
@@ -73,7 +73,7 @@ def servo_horn(servo: Servo, z: float) -> cq.Solid:
     """Return the horn's disc with its threaded holes and boss, its face at height z."""
     disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
     radius = SCREWS[servo.horn_screw].nominal / 2
-    low, centres = z - horn_thread_mm(servo), horn_centres(servo)
+    low, centres = z - servo.horn_thread_depth_mm, horn_centres(servo)
     disc = disc.cut(*(solids.upright(radius, low, z + 1.0, float(x), float(y)) for x, y in centres))
     if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
         disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))

@@ -11,7 +11,6 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.cables.leads import SAMPLE
-from scanwright.cad.layout.drive import Mass
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.loads import Weight, weight_of
 from scanwright.design.arrays import Array
@@ -32,10 +31,12 @@ def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
     """
     masses = assembly.layout.drive.masses
     fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
-    fixed += [_share(mass, 1 - mass.turning) for mass in masses]
+    fixed += [inertia.of_box((1 - each.turning) * mass_g, box.low, box.high) for each, mass_g, box in masses]
     fixed += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.cables if lead.path]
     turning = [assembly.inertial(name) for name in assembly.turning_parts()]
-    turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
+    turning += [
+        inertia.of_box(each.turning * mass_g, box.low, box.high) for each, mass_g, box in masses if each.turning > 0
+    ]
     turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.leads if lead.path]
     return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": lidar_body(scanner.lidar)}
 
@@ -68,7 +69,3 @@ def rotor_moment(scanner: Scanner, assembly: Assembly) -> Array:
     """Return the mass times distance from the axis of all that turns, shape (2,) [g mm]."""
     rotor = rotor_of(scanner, link_bodies(scanner, assembly))
     return np.asarray(1e6 * rotor.mass_kg * rotor.centre_m[:2])
-
-
-def _share(mass: Mass, share: float) -> Inertial:
-    return inertia.of_box(share * mass.mass_g, mass.box.low, mass.box.high)

@@ -30,8 +30,8 @@ LENGTHS = {
     "M5": (6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
     "M6": (8, 10, 12, 16, 20, 25, 30, 35, 40),
 }
-HOLDS = 2.0  # diameters of thread that hold
-NUT = 1.0  # diameters: a nut, 0.8, and the thread that looks out
+HOLDS = 2.0  # diameters of thread that are sufficient
+NUT = 1.0  # diameters: a nut, 0.8, and the protruding thread
 THREAD_FREE = 0.5  # that a screw may not bottom
 DECK_MM = 5.0  # thickness of the robot's deck, assumed
 ALL_SCREWS = "{*}"  # mark for all screws of a step's part
@@ -41,7 +41,7 @@ Fixing = Literal["thread", "trap", "nut", "deck", "grub"]
 
 @dataclass(frozen=True, slots=True)
 class ScrewAxis:
-    """One screw: where its head bears, or its hole begins, and the unit vector from there to what it holds on to."""
+    """One screw: place of its head, or start of its hole, and the unit vector from there to its thread."""
 
     start: tuple[float, float, float]
     along: tuple[float, float, float]
@@ -52,19 +52,19 @@ class Joint:
     """Equal screws between two bodies.
 
     Attributes:
-        part: that the screws go through, or sit in if they are grub screws.
-        onto: the body that they hold it to; a deck is that of the robot.
-        fixing: what holds the thread: the body itself, a nut in a trap of the body, a nut, a nut under the deck, or the
-            part (grub screws).
+        part: that the screws go through, or are in if they are grub screws.
+        onto: the body that they fix it to; a deck is that of the robot.
+        fixing: kind of thread: in the body itself, a nut in a pocket of the body, a nut, a nut under the deck, or in
+            the part (grub screws).
         screw: the size.
         axes: of each screw.
-        grip_mm: what the shank passes before it holds.
+        grip_mm: length of the shank before its thread engages.
         thread_mm: of thread, or of material before the nut.
-        thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
-        slot_mm: width and length of the slots that they may slide in, if not holes.
-        protrudes_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
+        thread: in a printed part; None for another body, or a nut.
+        slot_mm: width and length of slots; None for holes.
+        protrudes_mm: length outside of `part` of screws that belong to it; None if they are bought by length.
         washer_mm: diameter of the washers under their heads; None without washers.
-        heel_mm: from a lone screw, or the line of a pair, to the edge over which the part tips off; None for others.
+        heel_mm: from a single screw, or the line of a pair, to the edge over which the part tips; None for others.
     """
 
     part: str
@@ -179,9 +179,12 @@ def fixing_of(pattern: HolePattern) -> Fixing:
     return "nut" if pattern.kind == "through" else "thread"
 
 
-def horn_thread_mm(servo: Servo) -> float:
-    """Return the depth of the threads in a servo's horn."""
-    return servo.horn_thread_depth_mm
+def front_joint(
+    servo: Servo, part: str, case: str, axes: tuple[ScrewAxis, ...], grip: float, heel: float | None = None
+) -> Joint:
+    """Return the joint of a part on the front of a servo's case; `heel` as for `Joint`."""
+    fixing, screw = fixing_of(servo.front), SCREWS[servo.front.screw]
+    return Joint(part, case, fixing, screw, axes, grip_mm=grip, thread_mm=servo.front.depth_mm, heel_mm=heel)
 
 
 def horn_centres(servo: Servo) -> Array:
@@ -193,7 +196,7 @@ def horn_joint(servo: Servo, part: str, onto: str, heads: float, grip: float) ->
     """Return the joint of a part on a servo's horn, heads at a height, in the frame of the servo's axis."""
     axes = upright_axes(horn_centres(servo), heads, -1.0)
     screw = SCREWS[servo.horn_screw]
-    return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=horn_thread_mm(servo))
+    return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=servo.horn_thread_depth_mm)
 
 
 def triple(v: Array) -> tuple[float, float, float]:

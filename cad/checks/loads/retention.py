@@ -109,9 +109,9 @@ def _screws(joint: Joint, hold: Hold, subject: str) -> Finding:
 def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:
     """Return parts and products as one body; a product of which half turns counts in full on either side."""
     bodies = [assembly.inertial(name) for name in sorted(names & assembly.made.keys())]
-    for mass in assembly.layout.drive.masses:
-        if mass.product in names or (mass.turning > 0 and assembly.layout.drive.shaft in names):
-            bodies.append(inertia.of_box(mass.mass_g, mass.box.low, mass.box.high))
+    for each, mass_g, box in assembly.layout.drive.masses:
+        if each.name in names or (each.turning > 0 and assembly.layout.drive.shaft in names):
+            bodies.append(inertia.of_box(mass_g, box.low, box.high))
     if LIDAR in names:
         bodies.append(lidar_body(scanner.lidar).moved(scanner.angles.T_rot_laser()))
     return inertia.together(bodies)

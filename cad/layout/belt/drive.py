@@ -25,7 +25,7 @@ from scanwright.cad.layout.belt.stack import (
     case_corners,
     drive_corners,
 )
-from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, BearingTower, tower_of
+from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, tower_foot_of
 from scanwright.cad.layout.drive import (
     Body,
     Bundle,
@@ -40,6 +40,7 @@ from scanwright.cad.layout.drive import (
 from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
 from scanwright.cad.layout.tie_seat import TieSeat
+from scanwright.cad.screws import Thread
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
@@ -72,13 +73,12 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     """
     stack, ring = belt_stack(scanner, envelope), scanner.slip_ring
     assert ring is not None
-    tower, plate = tower_of(scanner, stack), plate_of(scanner, stack)
-    mounted = _mounted(stack, tower)
+    plate, mounted = plate_of(scanner), _mounted(stack, tower_foot_of(scanner.printer, stack))
     return DriveLayout(
         envelope=envelope,
         stack=stack,
         stations=tuple(_stations(stack, ring)),
-        records=(stack, tower, plate),
+        records=(stack, plate),
         shaft=names.MAIN_SHAFT,
         bend=belt_shaft_bend(stack),
         gives=belt_shaft_bend(stack, 1 / SEAT_N_PER_M),
@@ -167,7 +167,7 @@ def _stations(stack: BeltStack, ring: SlipRing) -> Iterator[Station]:
     yield round_one(names.ALIGNMENT_LINKAGE, "rotor", stack.hub_radius, stack.shoulder, -stack.h)
 
 
-def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
+def _mounted(stack: BeltStack, thread: Thread) -> Mounted:
     foot = [(x, y, stack.tower_bottom) for x in (-FOOT_HALF, FOOT_HALF) for y in (-FOOT_HALF, FOOT_HALF)]
     return Mounted(
         onto=names.BEARING_TOWER,
@@ -179,8 +179,8 @@ def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
         corners=np.concatenate([drive_corners(stack), np.array(foot)]),
         discs=((stack.wide_radius, stack.tower_bottom), (stack.wide_radius, stack.tower_top)),
         on_flat_deck=False,
-        thread_mm=FOOT - 1.0 if tower.foot.trap is None else UNDER_FOOT_NUT,
-        thread=tower.foot,
+        thread_mm=FOOT - 1.0 if thread.trap is None else UNDER_FOOT_NUT,
+        thread=thread,
     )
 
 
@@ -191,7 +191,7 @@ def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth:
     for sign in (1.0, -1.0) if bundle.count == 1 else (1.0 - 2.0 * (bundle.number % 2),):
         side = sign * (bundle.half + BUNDLE_GAP)
         ends.append((np.array([[side, 0.0, low], [side, 0.0, middle]]), np.array([sign, 0.0, 0.0])))
-    yield LeadExit(tie, tuple(ends))
+    yield tie, tuple(ends)
 
 
 def _around_belt(stack: BeltStack) -> Cuboid:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from scanwright.cad import outlines
-from scanwright.cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, PLATE_SCREW, BeltStack
-from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
+from scanwright.cad.layout.belt.stack import FOOT_HOLE, FOOT_SCREW, BeltStack
+from scanwright.cad.screws import SCREWS, Thread, thread_in_part
+from scanwright.design.catalogue.products import Printer
 from scanwright.design.catalogue.slip_ring import Flange
-from scanwright.design.scanner import Scanner
 
 DISC_SCREW = SCREWS["M3"]
 DISC_SCREWS = 3
@@ -18,31 +17,12 @@ UNDER_HEAD = 3.5  # of the wall
 UNDER_FOOT_NUT = 4.0  # of the foot
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BearingTower:
-    """Lengths in mm."""
-
-    stack: BeltStack
-    fit: float  # diametral clearance of a sliding fit
-    plate: Thread  # of the plate's screws; nuts below the arms
-    foot: Thread  # of the mount's screws; nuts from the corners of the foot
-    disc_hole: float  # diameter
-
-
-def tower_of(scanner: Scanner, stack: BeltStack) -> BearingTower:
-    """Return the tower of one scanner."""
-    printer = scanner.printer
+def tower_foot_of(printer: Printer, stack: BeltStack) -> Thread:
+    """Return the thread of the mount's screws in the foot; nuts are inserted from its corners."""
     foot = thread_in_part(FOOT_SCREW, printer, carries=True)
     free = math.sqrt(2) * FOOT_HOLE - printer.min_wall_mm - stack.chamber_radius
-    if foot.trap is not None and foot.trap.corner > free:
-        foot = thread_in_part(FOOT_SCREW, printer, room_for_nut=False, carries=True)
-    return BearingTower(
-        stack=stack,
-        fit=printer.fit_clearance_mm,
-        plate=thread_in_part(PLATE_SCREW, printer),
-        foot=foot,
-        disc_hole=passing_hole(DISC_SCREW, printer),
-    )
+    fits = foot.trap is None or foot.trap.corner <= free
+    return foot if fits else thread_in_part(FOOT_SCREW, printer, room_for_nut=False, carries=True)
 
 
 def disc_azimuths(stack: BeltStack) -> list[float]:

@@ -25,11 +25,11 @@ from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.arrays import Array
 
-SAMPLE = 1.5  # mm between the points that stand for a lead that is laid
+SAMPLE = 1.5  # mm between the points of a lead
 OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
-CLAMPED = 1.0  # beyond the face that a lead leaves by, and its own radius
+CLAMPED = 1.0  # beyond the face at its exit, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
-LEAD_G_CM3 = 1.5  # reckoned: five wires of 1.3 mm over 0.14 mm2 of copper are 2.9 g/m each, in a bundle of 3.5 mm
+LEAD_G_CM3 = 1.5  # calculated: five wires of 1.3 mm over 0.14 mm2 of copper, 2.9 g/m each, in a bundle of 3.5 mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +37,11 @@ class RotorLead:
     """The lead to one outlet of the lidar.
 
     Attributes:
-        y: of the outlet in the lidar's frame, which tells it from the others.
+        y: of the outlet in the lidar's frame.
         diameter: of the bundle.
-        radius: least one that it may be bent to.
+        radius: least bend radius.
         path: its middle from the ring to the lidar, rotation frame at gamma = 0; None if there is none.
-        joint: where its wires meet the ring's; None if no straight piece is long enough.
+        joint: of its wires with the ring's; None if no straight piece is long enough.
     """
 
     y: float
@@ -73,15 +73,15 @@ def leads_of(place: Placement, avoid: Iterable[Shape]) -> tuple[RotorLead, ...]:
     numbers, radius, room = range(len(lidar.cable_y_mm)), ring.lead_bend_radius_mm, room_of(place, avoid)
     half = ring.leads_mm(len(numbers)) / 2
     best: tuple[RotorLead, ...] = ()
-    # who comes first takes the short way, and may bar it to the others: then they come first, or change places
+    # the first lead takes the short path, and may block it for the others: then other orders and places are tried
     for places, order in product((numbers, numbers[::-1]), repeat=2):
         bundles = [Bundle(number, len(numbers), half, radius) for number in places]
         leads = _laid(place, room, bundles, order)
         if not best or _laid_count(leads) > _laid_count(best):
             best = leads
         if _laid_count(best) == len(numbers) or leads[order[0]].path is None:
-            break  # the first has all the room: what has no path then has none
-    return _jointed(replace(room, bearings_rad=None), best)  # a path may be in the fan; its joint is then, too
+            break  # the first has all the space: without a path then, there is none
+    return _jointed(replace(room, bearings_rad=None), best)  # a path may be in the fan, and then its joint
 
 
 def _jointed(room: RotorRoom, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
@@ -117,22 +117,22 @@ def _laid(place: Placement, room: RotorRoom, bundles: Sequence[Bundle], order: S
     linkage, outlets, hub = place.linkage, place.scanner.lidar.cable_y_mm, place.stack.hub_radius
     leads: dict[int, RotorLead] = {}
     for i in order:
-        bundle, path = bundles[i], None
-        half, outlet = bundle.half, _outlet(place, outlets[i], bundle.half)
+        bundle, path, half = bundles[i], None, bundles[i].half
+        start = outlet_mm(place, outlets[i], place.scanner.lidar.cable_straight_mm)
+        outlet = Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
         exits = place.drive.lead_exits(bundle, linkage.hub_tie, sum(linkage.cross_azimuths) / 2)
-        # tied if it can be; rather in the fan, where its shadow counts, than not at all
-        for within, exit_ in product((room, replace(room, bearings_rad=None)), exits):
-            starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in exit_.ends]
-            starts = [
-                _from_hub(start, hub, half, exit_.tie) for start in starts if room.clear_of_others(start.corners).all()
-            ]
+        # tied if possible; a path in the fan, where its shadow counts, is better than none
+        for within, (tie, ends) in product((room, replace(room, bearings_rad=None)), exits):
+            starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in ends]
+            starts = [_from_hub(start, hub, half, tie) for start in starts if room.clear_of_others(start.corners).all()]
             lattice = lattice_about_axis(room.floor, half, hub, [*starts, outlet])
             path = short_path(within, starts, [outlet], half, bundle.radius, lattice)
             if path is not None:
                 break
         leads[i] = RotorLead(outlets[i], 2 * half, bundle.radius, path)
         if path is not None:
-            room = _with(room, path, 2 * half + BUNDLE_GAP / 2)
+            middles = np.concatenate([path.points(SAMPLE), room.others[0]])
+            room = replace(room, others=(middles, 2 * half + BUNDLE_GAP / 2))
     return tuple(leads[i] for i in sorted(leads))
 
 
@@ -143,12 +143,6 @@ def outlet_mm(place: Placement, y: float, out: float) -> Array:
     return np.asarray(place.stack.R() @ at + T[:3, 3] * 1000)
 
 
-def _outlet(place: Placement, y: float, half: float) -> Ending:
-    """Return the end of a lead behind the straight piece of the lidar's cable."""
-    start = outlet_mm(place, y, place.scanner.lidar.cable_straight_mm)
-    return Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
-
-
 def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> Ending:
     """Return the end with its lengths counted from the hub's rim; straight below a slotted tab."""
     inside = hub - float(np.hypot(*start.corners[-1, :2]))
@@ -157,8 +151,3 @@ def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> E
         return start
     clamped = start.clamped + seat.end - hub
     return replace(start, clamped=clamped, used=clamped - CLAMPED)
-
-
-def _with(room: RotorRoom, path: Path, apart: float) -> RotorRoom:
-    """Return the space that a lead leaves."""
-    return replace(room, others=(np.concatenate([path.points(SAMPLE), room.others[0]]), apart))

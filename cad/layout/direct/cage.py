@@ -9,11 +9,11 @@ import numpy as np
 
 from scanwright.cad.layout.direct.loads import Supported, hanging, shaft_modulus_pa, supported
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Ears, ears_on
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import CAGE_BASE
-from scanwright.cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
+from scanwright.cad.screws import SCREWS, Thread, Trap, passing_hole, thread_in_part
 from scanwright.design.catalogue.products import Bearing
-from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
@@ -22,29 +22,15 @@ RING_ABOVE_BASE = 1.5
 SEAT_GAP = 0.2  # the feet carry, not the plate
 FOOT_RADIUS = 3.0
 UNDER_HEAD = 3.0  # of the plate
-HEAD_WALL = 2.0  # beside the recess of a head
 CAGE_SCREW = SCREWS["M3"]
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
 UNDER_CAGE_HEAD = 3.5  # of a leg
 TRAP_WALL = 3.0  # of the boss outside a nut
-WINDOW_HALF_WIDTH = 11.5  # the adapter's arms stand in the windows at +-x; by those at +-y a tie is closed
+WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
 TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator beside it
-PLUG_PLAY = 1.0  # around a plug that is passed through a hole
+PLUG_PLAY = 1.0  # clearance around a plug in a hole
 PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
 POISSON = 0.35
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ears:
-    """The front holes of a servo that a plate is screwed to, heights above the horn; x and y of the rotation frame."""
-
-    front: float  # of the case
-    seats: float  # of the planes around the holes
-    opening: float  # radius, or half width of a fork, around the horn flange
-    half_x: float  # of the plate
-    screw: Screw
-    hole: float  # diameter
-    holes: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,10 +69,8 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
         BuildError: the case has no four holes beside the turning flange.
     """
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.front.screw]
-    hole = passing_hole(screw, printer)
     opening = stack.flange_radius + 1.0
-    least = opening + hole / 2 + printer.min_wall_mm
+    least = opening + passing_hole(SCREWS[servo.front.screw], printer) / 2 + printer.min_wall_mm
     free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
@@ -96,15 +80,7 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
             f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
             f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
-    return Ears(
-        front=servo.case_max_mm[2],
-        seats=servo.front.z_mm,
-        opening=opening,
-        half_x=plate_half_x(servo, screw),
-        screw=screw,
-        hole=hole,
-        holes=holes,
-    )
+    return ears_on(scanner, opening, holes)
 
 
 def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | None:
@@ -144,11 +120,6 @@ def lead_hole(scanner: Scanner, stack: DirectStack) -> tuple[float, float]:
     wide, thick = ring.plug_mm or (lead, lead)
     y = max(stack.flange_radius + TURNS_CLEAR + thick, stator_leads_y(scanner, stack) + lead / 2) + PLUG_PLAY
     return max(wide, lead) / 2 + PLUG_PLAY, y
-
-
-def plate_half_x(servo: Servo, screw: Screw) -> float:
-    """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.head_room + HEAD_WALL)
 
 
 def _base_low(stack: DirectStack, ears: Ears) -> float:

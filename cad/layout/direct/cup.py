@@ -12,7 +12,7 @@ from scanwright.cad.layout.direct.frame import heads_over_horn_mm, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import Envelope, hub_height, rows_of
 from scanwright.cad.layout.hub import CUP_HUB_WALL
-from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE, horn_thread_mm
+from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.servo import Servo
@@ -20,9 +20,9 @@ from scanwright.design.scanner import Scanner
 
 CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it
 FLOOR = 4.0  # on the horn
-ROUND_HOLE = 0.05  # what the facets of a hole take from the wall beside it
+ROUND_HOLE = 0.05  # loss of wall by the facets of a hole
 FLOOR_ON_FOOT = 3.0  # over the foot of a cup on a servo frame
-OVER_BOSS = 2.0  # of the horn: play, and a floor that is no skin
+OVER_BOSS = 2.0  # of the horn: clearance, and a printable floor
 
 
 def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
@@ -63,7 +63,7 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
 
 
 def _grip(servo: Servo, least: float) -> float:
-    """Return the thickness from a least one on at which a screw of a standard length fills the horn's thread."""
-    deep = horn_thread_mm(servo) - THREAD_FREE
+    """Return the thickness, at least `least`, at which a screw of a standard length fills the horn's thread."""
+    deep = servo.horn_thread_depth_mm - THREAD_FREE
     lengths = LENGTHS[servo.horn_screw]
     return max(least, next((length for length in lengths if length >= least + deep), lengths[-1]) - deep)

@@ -17,7 +17,6 @@ from scanwright.cad.layout.direct.frame import (
     corner_holes,
     frame_of,
     needs_frame,
-    no_rear_holes,
 )
 from scanwright.cad.layout.direct.lead_exits import lead_exits, stator_exit
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
@@ -28,12 +27,13 @@ from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
 from scanwright.cad.screws import SCREWS
+from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-# The order that always works: what comes over the shaft follows what carries it.
+# Assembly order: parts over the shaft follow the parts that carry it.
 BUILT = (
     names.SERVO_FRAME,
     names.BASE_MOUNT,
@@ -69,7 +69,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     if frame is not None and (scanner.slip_ring is not None or stack.bearing is not None):
         raise BuildError(
             f"{names.SERVO_FRAME}: holes: {scanner.servo.name} has usable holes in its front only, which its frame "
-            "takes: take no slip ring, or another servo"
+            "uses: use no slip ring, or another servo"
         )
     leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
     cage_n_per_m = 0.0 if cage is None else stiffness_n_per_m(stack, cage.ears)
@@ -167,7 +167,10 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
         BuildError: it has no holes that may carry it.
     """
     if frame is None and not corner_holes(servo.rear.places):
-        raise no_rear_holes(servo)
+        raise BuildError(
+            f"{names.SERVO_FRAME}: holes: {servo.name} has no four equal holes in its rear and no two in its front "
+            f"({what_holds(servo.holes)}{servo.caution('holes')}): use another servo"
+        )
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
@@ -208,7 +211,7 @@ def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
         yield LeftOut(names.SERVO_FRAME, f"{scanner.servo.name} is held by the holes in its rear", 1, "parts")
     if stack.bearing is None:
         servo = scanner.servo
-        why = f"the horn of {servo.name} carries an axis this upright alone"
+        why = f"the horn of {servo.name} alone carries an axis this upright"
         if servo.radial_load_n is None:
-            why = f"{why}, by what such a horn is trusted with: its maker rates none"
+            why = f"{why} (rating assumed: its maker states none)"
         yield LeftOut(names.BEARING_CAGE, why, 1, "parts")

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.names import SERVO_FRAME
-from scanwright.cad.screws import SCREWS, Screw, passing_hole
-from scanwright.design.catalogue.holes import what_holds
+from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
@@ -43,8 +42,7 @@ class ServoFrame:
         half_x: of the room for the case.
         ends_y: of legs and plate.
         window_y: between the legs of a side.
-        screw: that holds the servo.
-        hole: diameter.
+        hole: diameter, of the servo's screws.
         holes: places of these screws.
         feet: places of the screws in the feet.
         foot_hole: diameter.
@@ -56,7 +54,6 @@ class ServoFrame:
     half_x: float
     ends_y: tuple[float, float]
     window_y: tuple[float, float]
-    screw: Screw
     hole: float
     holes: tuple[tuple[float, float], ...]
     feet: tuple[tuple[float, float], ...]
@@ -118,8 +115,7 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
         BuildError: the servo's screws come too close to its horn.
     """
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.front.screw]
-    hole = passing_hole(screw, printer)
+    hole = passing_hole(SCREWS[servo.front.screw], printer)
     opening = max(servo.horn_diameter_mm / 2, stack.foot_radius) + HORN_ROOM
     wall = min(math.hypot(x, y) for x, y in servo.front.places) - hole / 2 - opening
     if wall < printer.min_wall_mm:
@@ -145,17 +141,8 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
         half_x=half_x,
         ends_y=(y0, y1),
         window_y=window,
-        screw=screw,
         hole=hole,
         holes=servo.front.places,
         feet=((out, front), (-out, front), (-out, back), (out, back)),
         foot_hole=passing_hole(FOOT_SCREW, printer),
-    )
-
-
-def no_rear_holes(servo: Servo) -> BuildError:
-    """Return the error of a servo that neither its rear nor its front can hold."""
-    return BuildError(
-        f"{SERVO_FRAME}: holes: {servo.name} has no four equal holes in its rear and no two in its front "
-        f"({what_holds(servo.holes)}{servo.caution('holes')}): take another servo"
     )

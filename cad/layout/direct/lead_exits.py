@@ -25,14 +25,14 @@ def lead_exits(stack: DirectStack, bundle: Bundle, tie: TieSeat | None, free_azi
     half, low = bundle.half, stack.leads_low
     aside = (2 * half + BUNDLE_GAP) * (bundle.number - (bundle.count - 1) / 2)
     if stack.bearing is not None:
-        yield LeadExit(tie, (_upwards(stack.leads_radius, aside, low, stack.leads_corner, free_azimuth),))
+        yield tie, (_upwards(stack.leads_radius, aside, low, stack.leads_corner, free_azimuth),)
         return
     inner = stack.ring_bore / 2 + half + BUNDLE_GAP  # on the rotor of the ring
     if tie is not None:
         high = max(low + bundle.radius, tie.low - BELOW_HUB - half)
-        yield LeadExit(tie, (_upwards(inner, aside, low, high, tie.azimuth),))
+        yield tie, (_upwards(inner, aside, low, high, tie.azimuth),)
     around = np.radians(np.arange(0.0, 360.0, AROUND_DEG)).tolist()
-    yield LeadExit(None, tuple(_upwards(inner, 0.0, low, low + bundle.radius, azimuth) for azimuth in around))
+    yield None, tuple(_upwards(inner, 0.0, low, low + bundle.radius, azimuth) for azimuth in around)
 
 
 def _upwards(inner: float, aside: float, low: float, high: float, azimuth: float) -> tuple[Array, Array]:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from scanwright.cad.layout.direct.cage import BearingCage, Ears, stiffness_n_per_m
+from scanwright.cad.layout.direct.cage import BearingCage, stiffness_n_per_m
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, ShaftMetal, heaviest, supported
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.loads import UNRATED_NM, Weight, rated_moment_nm
 from scanwright.design.scanner import Scanner
 

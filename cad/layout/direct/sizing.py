@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 from scanwright.cad.layout.direct.adapter import fork_holes
-from scanwright.cad.layout.direct.cage import Ears, ears_of
+from scanwright.cad.layout.direct.cage import ears_of
 from scanwright.cad.layout.direct.cup import cup_stack
 from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
 from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT

@@ -31,16 +31,15 @@ from scanwright.cad.layout.direct.cage import (
     UNDER_HEAD,
     WINDOW_HALF_WIDTH,
     BearingCage,
-    Ears,
-    plate_half_x,
 )
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
+from scanwright.cad.layout.drive import Ears, plate_half_x
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import (
     ALL_SCREWS,
     Joint,
     fixing_in,
-    fixing_of,
+    front_joint,
     inward_axes,
     round_wall_mm,
     screws,
@@ -50,11 +49,11 @@ from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
 from scanwright.cad.parts.tolerances import OnSheet, printed_seat
-from scanwright.cad.screws import SCREWS, Trap
+from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
-ROOM = 0.7  # between the bell's foot and what stands beside it
+ROOM = 0.7  # around the bell's foot
 
 
 def bell_spec(place: Placement) -> PartSpec | None:
@@ -62,13 +61,23 @@ def bell_spec(place: Placement) -> PartSpec | None:
     p = place.drive.of(BearingCage)
     if p is None:
         return None
+    heads = p.stack.cage_inner + UNDER_CAGE_HEAD
+    joint = Joint(
+        BEARING_CAGE,
+        CAGE_BASE if place.scanner.slip_ring is None else SLIP_RING_ADAPTER,
+        fixing_in(p.thread),
+        CAGE_SCREW,
+        inward_axes(p.legs, heads, (p.foot + p.high) / 2),
+        grip_mm=round_wall_mm(p.stack.cage_inner, heads, p.cage_hole),
+        thread_mm=SCREW_DEPTH - p.fit / 2 if p.thread.trap is None else TRAP_WALL,
+        thread=p.thread,
+    )
     leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
     words = (
         f"With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, {leads}and lower the cage "
         f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once "
-        "around, so that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the "
-        "epoxy set before anything hangs on the shaft: it fills what the print leaves, and the bearing is where the "
-        "shaft runs."
+        "around, so that the bearing centres on the sleeve, tighten the screws crosswise, turn once more, and let the "
+        "epoxy set before you load the shaft: it fills the gaps of the print."
     )
     return PartSpec(
         name=BEARING_CAGE,
@@ -76,23 +85,9 @@ def bell_spec(place: Placement) -> PartSpec | None:
         make=partial(bearing_cage, p),
         step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
         sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
-        joints=(_bell_joint(p, CAGE_BASE if place.scanner.slip_ring is None else SLIP_RING_ADAPTER),),
+        joints=(joint,),
         avoid=(shape_of(around_axis(p.stack.cage_outer, p.low, p.stack.cage_top)),),
         rows=(Row("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat"),),
-    )
-
-
-def _bell_joint(p: BearingCage, base: str) -> Joint:
-    stack, heads = p.stack, p.stack.cage_inner + UNDER_CAGE_HEAD
-    return Joint(
-        BEARING_CAGE,
-        base,
-        fixing_in(p.thread),
-        CAGE_SCREW,
-        inward_axes(p.legs, heads, (p.foot + p.high) / 2),
-        grip_mm=round_wall_mm(stack.cage_inner, heads, p.cage_hole),
-        thread_mm=SCREW_DEPTH - p.fit / 2 if p.thread.trap is None else TRAP_WALL,
-        thread=p.thread,
     )
 
 
@@ -108,7 +103,7 @@ def base_spec(place: Placement) -> PartSpec | None:
         step=Step(
             "Base of the cage on the servo",
             f"Lower the base over the shaft. {screws(SERVO_CASE)}",
-            "the shaft turns a whole turn without touching the base",
+            "the shaft turns a full turn without touching the base",
         ),
         shaped_by=ON_CASE,
         joints=(on_ears(place.scanner.servo, p.stack, p.ears, CAGE_BASE),),
@@ -119,21 +114,13 @@ def base_spec(place: Placement) -> PartSpec | None:
 def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
     """Return the joint of a plate on the front of the servo's case."""
     heads = stack.horn + ears.front + SEAT_GAP + UNDER_HEAD
-    axes, grip = upright_axes(ears.holes, heads, -1.0), heads - (stack.horn + ears.seats)
-    return Joint(
-        part,
-        SERVO_CASE,
-        fixing_of(servo.front),
-        ears.screw,
-        axes,
-        grip_mm=grip,
-        thread_mm=servo.front.depth_mm,
-    )
+    grip = heads - (stack.horn + ears.seats)
+    return front_joint(servo, part, SERVO_CASE, upright_axes(ears.holes, heads, -1.0), grip)
 
 
 def around_base(servo: Servo, p: BearingCage) -> Shape:
     """Return the shape of the base next to the bell."""
-    wide, back = plate_half_x(servo, SCREWS[servo.front.screw]), servo.case_min_mm[1]
+    wide, back = plate_half_x(servo), servo.case_min_mm[1]
     return shape_of(box_corners(((-wide, back, p.low), (wide, 0.0, p.stack.ring_bottom))))
 
 

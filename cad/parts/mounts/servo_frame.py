@@ -14,12 +14,11 @@ from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.direct.frame import FOOT, GRIP, HEADER, LEAST_BRIDGE, LEG, ServoFrame
 from scanwright.cad.layout.envelope import box_corners
-from scanwright.cad.layout.joints import Joint, fixing_of, screws, upright_axes
+from scanwright.cad.layout.joints import front_joint, screws, upright_axes
 from scanwright.cad.layout.names import SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.servo import Servo
 
 
 def frame_spec(place: Placement) -> PartSpec | None:
@@ -27,6 +26,7 @@ def frame_spec(place: Placement) -> PartSpec | None:
     frame, servo = place.drive.of(ServoFrame), place.scanner.servo
     if frame is None:
         return None
+    heel = frame.heel_mm if len(frame.holes) == 2 else None
     words = (
         "Push the servo into the frame from below, its horn through the opening. "
         f"{screws(SERVO_CASE)} Do not loosen the screws that close its case."
@@ -37,21 +37,8 @@ def frame_spec(place: Placement) -> PartSpec | None:
         make=partial(servo_frame, frame),
         step=Step("Servo into its frame", words, "the horn turns freely in the opening", (SERVO,)),
         shaped_by=("servo.case_min_mm", "servo.cable_exit_mm", *ON_CASE),
-        joints=(_on_servo(servo, frame),),
+        joints=(front_joint(servo, SERVO_FRAME, SERVO_CASE, upright_axes(frame.holes, frame.high, -1.0), GRIP, heel),),
         avoid=tuple(shape_of(box_corners(leg)) for leg in frame.legs()),
-    )
-
-
-def _on_servo(servo: Servo, frame: ServoFrame) -> Joint:
-    return Joint(
-        SERVO_FRAME,
-        SERVO_CASE,
-        fixing_of(servo.front),
-        frame.screw,
-        upright_axes(frame.holes, frame.high, -1.0),
-        grip_mm=GRIP,
-        thread_mm=servo.front.depth_mm,
-        heel_mm=frame.heel_mm if len(frame.holes) == 2 else None,
     )
 
 

@@ -27,7 +27,7 @@ from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
 from scanwright.cad.layout.belt.sizing import QUARTERS
 from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
-from scanwright.cad.layout.belt.tower import tower_of
+from scanwright.cad.layout.belt.tower import tower_foot_of
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import ROTOR_LEAD
@@ -213,7 +213,8 @@ def test_index_grooves_of_hub_and_tower_lie_at_plus_y_whatever_the_servos_side(m
         section(made.meshes["bearing_tower"], stack.tower_top - 1.0),
     ]
     for quarter in set(QUARTERS) - {stack.quarter}:
-        mesh = mesh_of(bearing_tower(tower_of(made.scanner, replace(stack, quarter=quarter))))
+        printer, turned = made.scanner.printer, replace(stack, quarter=quarter)
+        mesh = mesh_of(bearing_tower(turned, printer, tower_foot_of(printer, turned)))
         outlines.append(section(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False), stack.tower_top - 1.0))
     assert len(outlines) == 4
     for outline in outlines:
@@ -511,7 +512,8 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
         "Slots in the foot for nuts M3: 5.7 wide, from its corners.",
     } <= said
     wide = replace(stack, flange=stack.flange.model_copy(update={"diameter_mm": 58.0}))
-    assert tower_of(scanner, wide).foot.trap is None and tower_of(scanner, stack).foot.trap is not None
+    printer = scanner.printer
+    assert tower_foot_of(printer, wide).trap is None and tower_foot_of(printer, stack).trap is not None
 
 
 def test_the_rails_of_the_mount_leave_the_least_wall_around_the_heads_of_their_screws(made):
