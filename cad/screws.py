@@ -10,7 +10,7 @@ from scanwright.design.catalogue.products import Printer
 
 @dataclass(frozen=True, slots=True)
 class Screw:
-    """Thread, head and driver of one size."""
+    """Thread and head of one size [mm]."""
 
     name: str
     nominal: float
@@ -46,11 +46,6 @@ TRIPOD_SCREW = Screw("1/4-20 UNC", 6.35, 9.53, 6.35, 5.1, 11.11, 5.74, nut_stand
 INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts is deeper
 
 
-def thread_hole(screw: Screw, printer: Printer) -> float:
-    """Return the diameter of the hole for a thread, or of the seat of an insert."""
-    return screw.insert if printer.thread == "insert" and screw.insert is not None else screw.core
-
-
 @dataclass(frozen=True, slots=True)
 class Trap:
     """Pocket for a hexagon nut in a part, and the hole through it.
@@ -77,7 +72,7 @@ def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | 
     Args:
         screw: the size.
         printer: the profile.
-        carries: whether the lidar hangs on it: threads in bare plastic creep, so these get nuts whatever it asks for.
+        carries: whether the lidar hangs on it: threads in bare plastic creep, so these always get nuts.
     """
     bare = printer.thread == "cut" or screw.insert is None
     if printer.thread != "nut" and not (carries and bare):
@@ -115,8 +110,8 @@ def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True,
         if carries and screw.insert is not None:
             return Thread(screw.insert, None, True)
         trap = None
-    hole = thread_hole(screw, printer) if trap is None else trap.hole
-    return Thread(hole, trap, printer.thread == "insert" and screw.insert is not None)
+    insert = screw.insert if printer.thread == "insert" else None
+    return Thread(trap.hole if trap is not None else insert or screw.core, trap, insert is not None)
 
 
 def passing_hole(screw: Screw, printer: Printer) -> float:

@@ -14,7 +14,7 @@ from OCP.TopAbs import TopAbs_REVERSED
 
 from scanwright.design.arrays import Array
 
-LEAST_TURN = math.pi * 1.02  # an arc of less than about half a turn holds no screw and has no diameter to measure
+LEAST_TURN = math.pi * 1.02  # a shorter arc holds no screw and has no measurable diameter
 SAME = 1e-3  # mm, and for directions
 
 

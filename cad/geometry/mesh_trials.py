@@ -56,7 +56,7 @@ def _off(solid: cq.Solid) -> tuple[float, int]:
         count += mesh.NbTriangles()
         if face.geomType() == "PLANE":
             continue
-        surface = BRep_Tool.Surface_s(face.wrapped)  # where it is in space: the place of the face is in it
+        surface = BRep_Tool.Surface_s(face.wrapped)  # in space: the location of the face is included
         nodes = np.array([mesh.Node(i + 1).Transformed(place.Transformation()).Coord() for i in range(mesh.NbNodes())])
         at = np.array([mesh.UVNode(i + 1).Coord() for i in range(mesh.NbNodes())])
         corners = np.array([mesh.Triangle(i + 1).Get() for i in range(mesh.NbTriangles())]) - 1

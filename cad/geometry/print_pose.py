@@ -18,7 +18,7 @@ from scanwright.design.arrays import Array
 from scanwright.design.frames import rigid
 
 OVERHANG_RAD = math.radians(45.0)
-CONTACT_SHARE = 0.25  # of the largest flat on the hull: what is smaller holds badly
+CONTACT_SHARE = 0.25  # of the largest flat on the hull: smaller ones adhere badly
 FLAT = 1e-3  # mm, within which points count as one plane
 SUPPORT_STEP_MM3 = 1000.0  # poses closer than this print alike
 

@@ -118,7 +118,7 @@ def _rows(scanner: Scanner, stack: Hub) -> list[_Row]:
     """Return the rows: spigots first if the shaft is turned, nut pockets last if the profile uses nuts."""
     printer = scanner.printer
     fits, screws = _around(printer.fit_clearance_mm), _around(printer.screw_clearance_mm)
-    # a cup is printed, too, and the screws take up its play: bores as wide as that would cost an hour
+    # a cup is printed too, and the screws clamp it: bores as wide as that would take an hour to print
     rows = [] if stack.cup_bore > 0 else [_Row(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
     for name in sorted({scanner.lidar.base.screw, scanner.servo.front.screw}):
         rows.append(_Row(name, SCREWS[name].nominal, screws))

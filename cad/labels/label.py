@@ -31,14 +31,14 @@ from scanwright.design.scanner import Scanner
 
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
 MARGIN = 1.5  # of a face around its label
-HOLE_MARGIN = 3.0  # around a hole: the head of a screw may come there
-FACES = 12  # that are tried, the largest first
-LEAST_MM2 = 200.0  # of a face: the configuration alone takes more
-READING = 200.0  # before a face: room for a head
-TOUCH = 1.0  # before a face: a nearer body lies on it
-STEP = 2.0  # between the places that are tried on a face, and the points whose room is measured
+HOLE_MARGIN = 3.0  # around a hole: for the head of a screw
+FACES = 12  # to try, the largest first
+LEAST_MM2 = 200.0  # of a face: the configuration alone needs more
+READING = 200.0  # in front of a face, to read it
+TOUCH = 1.0  # in front of a face: a nearer body touches it
+STEP = 2.0  # between tried places on a face, and between points of measured distance
 OVERLAP = 0.01  # of the squares around these points
-PLACES = 5  # of these, the nearest to its middle, whose wall is measured
+PLACES = 5  # of these, the nearest to its middle, with a measured wall
 LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
 FRONT_INSET = 10.0  # of its middle from the edge
@@ -52,7 +52,7 @@ class Labelled:
     Attributes:
         parts: with their labels, by name.
         meshes: of these.
-        left_out: labels for which there was no room.
+        left_out: labels that did not fit.
     """
 
     parts: dict[str, cq.Solid] = field(default_factory=dict)
@@ -65,13 +65,13 @@ FRONT = Lettering(("FRONT",), HEIGHTS[0])
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A part that takes a label.
+    """A part to label.
 
     Attributes:
-        flats: faces that it may go to, the largest first.
+        flats: possible faces, the largest first.
         piercing: of the part.
         groove: of the lettering.
-        wall: that stays behind it.
+        wall: least wall behind it.
         front: place of the word FRONT, if the part has it.
     """
 
@@ -111,12 +111,12 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
         if part.seat is not None:
             front = _front(assembly, solid, part.seat, groove)
             if front is None:
-                why = "a hole of the seat is in the way of the word; the V in the edge marks the front too"
+                why = "a hole of the seat is in its place; the V in the edge also marks the front"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         ground = Ground(flats_of(solid, FACES, LEAST_MM2), Piercing(solid), groove, scanner.printer.min_wall_mm, front)
         label = label_on(ground, label_texts(scanner, part, config_hash), before)
         if label is None:
-            why = "none of its flat faces that mate with nothing has room for one"
+            why = "no free flat face is large enough"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
         words = [] if front is None else [(front, FRONT)]
         words += [] if label is None else [label]

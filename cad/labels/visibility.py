@@ -19,11 +19,11 @@ DECK_HALF = 2000.0
 DECK_BELOW = 0.2  # of its face in this scene: a foot that lies on it then touches it
 
 RoomBefore = Callable[[Flat, Array], Array]
-"""From points of a face, shape (n, 2), straight out to the next body: shape (n,), 0 if it touches, inf if none."""
+"""Distances from points of a face, shape (n, 2), to the next body: shape (n,), 0 if it touches, inf if none."""
 
 
 def room_before(assembly: Assembly) -> RoomBefore:
-    """Measure by rays against all bodies of the assembly and its deck."""
+    """Return a measurement by rays against all bodies of the assembly and its deck."""
     corners = [mesh.vertices[mesh.faces] for mesh in assembly.meshes().values()]
     bodies = ray_caster.build_scene(np.concatenate([_deck(assembly), *corners]) / 1000)
 
@@ -31,7 +31,7 @@ def room_before(assembly: Assembly) -> RoomBefore:
         normal = flat.frame[:, 2]
         starts = (flat.at(points) + OFF * normal) / 1000
         hits = ray_caster.cast(bodies, starts, np.broadcast_to(normal, starts.shape))
-        # A body that lies on the face holds the start of the ray, which then meets its surface from within
+        # a body on the face contains the start of the ray, which then meets its surface from within
         within = (hits.triangle >= 0) & (bodies.normals[hits.triangle] @ normal > 0)
         return np.asarray(1000 * np.where(within, 0.0, hits.range_m))
 

@@ -26,20 +26,20 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 FOOT_THICKNESS = 6.0
-TIES_HALF = 5.5  # half of the room between two slots of the foot: two leads lie side by side
+TIES_HALF = 5.5  # half of the distance of two slots of the foot: two leads fit side by side
 FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
 BACK_THICKNESS = 8.0
-UNDER_MOUNT_HEAD = 5.0  # of the mount, to what it holds
+UNDER_MOUNT_HEAD = 5.0  # of the mount, to its load
 BACK_MARGIN = 5.0  # of the back plate around the rear holes, at least
 RAIL_INSET = 0.8  # of the ends of a rail from those of the back plate
 RAIL_WALL = 1.3  # of a rail around the heads of its screws, at least
-USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount whose task names none
+USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount, unless the task states some
 PAD_HALF = 26.0  # of the strut on the foot
 STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 HOLE_MARGIN = 10.0  # of the foot around a hole
 FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
-FREE = 5.0  # above the foot, for everything that is not the mount
+FREE = 5.0  # above the foot, for everything except the mount
 SWEEP_MARGIN = 3.0  # around the turning lidar
 
 
@@ -47,22 +47,22 @@ SWEEP_MARGIN = 3.0  # around the turning lidar
 class Deck:
     """The deck in the rotation frame: `T_world_rot` at gamma = 0 is [R_world_rot | t_world_rot]."""
 
-    normal: tuple[float, float, float]  # from the deck into the room
+    normal: tuple[float, float, float]  # from the deck towards the scanner
     along: tuple[float, float, float]  # world x
     centre: tuple[float, float, float]  # of the holes, on the lower face of the mount: world origin but for a plate
-    flat: bool  # the axis points up from a flat deck that names no holes: no mount is needed
+    flat: bool  # the axis points up from a flat deck without stated holes: no mount is needed
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
     back_half: tuple[float, float]  # x, y
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     tripod: TripodFoot | None  # plate under the mount
-    foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
+    foot: tuple[float, float, float]  # half extents along world x and y, and cut of the corners
     ties: tuple[TieSeat, ...]  # slots at the sides of the foot, frame of the deck
-    joints: tuple[Joint, ...]  # of what is screwed to a flat deck without a mount
+    joints: tuple[Joint, ...]  # of a servo or frame on a flat deck without a mount
 
     def rotation(self) -> Array:
-        """Return axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
+        """Return axes of the deck as columns: world x, left of it, and from the deck towards the scanner."""
         along, normal = np.array(self.along), np.array(self.normal)
         return np.stack([along, np.cross(normal, along), normal], axis=1)
 
@@ -75,7 +75,7 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     R = np.where(np.abs(R) < 1e-12, 0.0, R)
     hangs = bool(R[2, 2] < -1e-6)
     normal = -R[2] if hangs else R[2]
-    deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # to the left of x, seen from the room
+    deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # left of x, seen from the scanner
     along = R[0]
     holes = mounted.holes
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
@@ -91,6 +91,8 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         rotor_radius = drive.envelope.radius(drive.stack.sub_plate)
         height = _height_of_back(rotor_radius, mounted, normal, back, half)
         centre = back - height * normal + _foot_shift(scanner, mounted, deck_holes, back, normal, R[0], height)
+    axes, depth = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0), mounted.thread_mm
+    joints = (Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=depth),)
     foot = _foot(pattern, screw)
     offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
@@ -107,13 +109,8 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         tripod=tripod,
         foot=foot,
         ties=() if flat else _foot_ties(foot, deck_holes),
-        joints=(_on_flat_deck(mounted),) if flat else (),
+        joints=joints if flat else (),
     )
-
-
-def _on_flat_deck(mounted: Mounted) -> Joint:
-    axes = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0)
-    return Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=mounted.thread_mm)
 
 
 def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:

@@ -114,8 +114,8 @@ def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], 
 
 def plate_half_x(servo: Servo) -> float:
     """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
-    head = SCREWS[servo.front.screw].head_room + HEAD_WALL
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + head)
+    head_room = SCREWS[servo.front.screw].head_room
+    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + head_room + HEAD_WALL)
 
 
 @dataclass(frozen=True, slots=True)

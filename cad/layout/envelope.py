@@ -22,8 +22,8 @@ from scanwright.design.task.equivalent_settings import BOUNDS, advice
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
 SUB_PLATE_THICKNESS = 4.0
-SLOT_TRAVEL = 2.0  # to either side of where a screw of the lidar is stated to be, unverified
-SLOT_WALL = 2.0  # that such a slot leaves at the edge of the plate, around a normal hole
+SLOT_TRAVEL = 2.0  # to either side of the unverified place of a screw of the lidar
+SLOT_WALL = 2.0  # of such a slot at the edge of the plate, around a normal hole
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
 EAR_HALF_WIDTH = 10.0
 EAR_SCREW = SCREWS["M3"]
@@ -36,12 +36,12 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What belongs to a lidar, gaps included, as boxes (low corner, high corner) in the laser frame.
+    """A lidar with gaps as boxes (low corner, high corner) in the laser frame.
 
     Attributes:
-        lidar: whose it is.
-        body: the lidar.
-        cables: where they leave, straight.
+        lidar: the product.
+        body: its body.
+        cables: their straight pieces.
     """
 
     lidar: Lidar
@@ -77,18 +77,13 @@ def lidar_pose(scanner: Scanner) -> Array:
     R = exact(scanner.angles.R_rot_laser())
     if R[2, 2] < -1e-9:
         tilt = math.degrees(math.acos(R[2, 2]))
+        setting = {name: (angle, angle) for name, angle in scanner.angles.angles_deg.model_dump().items()}
+        instead = next((text for name in BOUNDS if (text := advice(setting, name))), "")
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90"
-            f"{_instead(scanner)}"
+            f"{instead}"
         )
     return R
-
-
-def _instead(scanner: Scanner) -> str:
-    """Return advice for equivalent angles with the lidar upright."""
-    angles = scanner.angles.angles_deg.model_dump()
-    setting = {name: (angles[name], angles[name]) for name in BOUNDS}
-    return next((text for name in BOUNDS if (text := advice(setting, name))), "")
 
 
 def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:

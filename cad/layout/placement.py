@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scanwright.cad.layout.belt.drive import belt_drive
 from scanwright.cad.layout.deck import Deck, deck_of
@@ -65,7 +65,7 @@ def placement_of(scanner: Scanner) -> Placement:
         scanner=scanner,
         drive=drive,
         deck=deck,
-        linkage=AlignmentLinkage.on(body, ear, None if isinstance(hub, LeftOut) else hub, plate_ties),
+        linkage=replace(body, ear=ear, hub_tie=None if isinstance(hub, LeftOut) else hub, plate_ties=plate_ties),
         neck=neck,
         counterweight=bar,
         ties_left_out=tuple(tie for tie in (hub, plate) if isinstance(tie, LeftOut)),

@@ -11,7 +11,7 @@ from scanwright.design.arrays import Array
 
 SLOT_ALONG, SLOT_ACROSS = 3.2, 1.8  # for a tie 2.5 wide and 1.1 thick
 SLOT_WALL = 2.0  # outside a slot
-GROOVE = 1.6  # depth of the tie's way where something lies on the tongue
+GROOVE = 1.6  # depth of the tie's groove if something is on the tab
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +21,12 @@ class TieSeat:
     Attributes:
         azimuth: of the direction [rad].
         aside: distance of its middle line from the z axis, counter-clockwise from the direction.
-        inner: where it begins, inside of what carries it.
-        first: where the slots begin.
+        inner: its start, inside of the part that carries it.
+        first: start of the slots.
         low: its lower face.
         high: its upper face.
-        half: of the room between the slots.
-        grooved: whether a groove takes the tie: of its upper face, or of the lower one where `below`.
+        half: half distance of the slots.
+        grooved: whether the tie is in a groove of its upper face, or of the lower one if `below`.
         below: see `grooved`.
     """
 
@@ -52,7 +52,7 @@ class TieSeat:
 
     @property
     def half_width(self) -> float:
-        """Half the width of the whole tongue."""
+        """Half the width of the entire tab."""
         return self.half + SLOT_ACROSS + SLOT_WALL
 
     def direction(self) -> Array:

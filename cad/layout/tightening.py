@@ -16,20 +16,18 @@ PROOF_MPA = 450.0  # 0.2 % proof stress of A2-70, ISO 3506-1
 SHEARED = 0.577  # of a tension, von Mises
 PRELOAD = 0.5  # of the proof load, between metals
 NUT_FACTOR = 0.2  # torque over preload and diameter, dry: the usual estimate
-FLANKS = (
-    0.5  # of the cylinder at the nominal diameter that a thread shears off: cautious, makers' tables say 0.5 to 0.8
-)
+FLANKS = 0.5  # of the cylinder at the nominal diameter that a thread shears off: makers' tables state 0.5 to 0.8
 INSERT_N = 300.0  # pull-out of a heat-set insert: half of what its sellers measure for M3 in PLA, assumed
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What a screw bears on, or holds on to.
+    """Material below a head or around a thread.
 
     Attributes:
-        name: in words.
-        strength_mpa: in tension, and under a head or behind a shank, for the moment of a shock.
-        pressure_mpa: under a head, that it keeps up for years.
+        name: for messages.
+        strength_mpa: in tension, and under a head or behind a shank, during a shock.
+        pressure_mpa: under a head, continuous.
         plastic: whether it creeps.
         source: of both numbers.
     """
@@ -42,7 +40,7 @@ class Material:
 
 
 PRINTED = Material(
-    "printed plastic", 40.0, 20.0, True, "PLA and PETG, makers' 45 to 60 MPa; what creep leaves of it, warm; assumed"
+    "printed plastic", 40.0, 20.0, True, "PLA and PETG, makers' 45 to 60 MPa; after creep, warm; assumed"
 )
 ALUMINIUM = Material("aluminium 6082-T6", 290.0, 200.0, False, "EN 755-2; pressure under heads, VDI 2230")
 STEEL = Material("steel", 360.0, 235.0, False, "S235, EN 10025-2")
@@ -55,18 +53,18 @@ MOULDED = Material(
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """One screw of a joint: how it is tightened, and what it bears before anything yields.
+    """Tightening and strength of one screw of a joint.
 
     Attributes:
-        engaged_mm: thread that holds.
-        needed_mm: thread that carries its preload one and a half times over; 0 if a nut or an insert holds it.
-        preload_n: that it is tightened to.
-        torque_nm: that tightens it.
-        pull_n: along its axis.
-        pull_by: what yields first.
-        push_n: across its axis.
-        push_by: what yields first.
-        loosens: what loosens it, and what to do about that.
+        engaged_mm: engaged thread.
+        needed_mm: thread that carries 1.5 times its preload; 0 for a nut or an insert.
+        preload_n: of the tightened screw.
+        torque_nm: for this preload.
+        pull_n: strength along its axis.
+        pull_by: part that yields first.
+        push_n: strength across its axis.
+        push_by: part that yields first.
+        loosens: cause of loosening, and remedy.
     """
 
     engaged_mm: float
@@ -112,13 +110,14 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     lasting = min(head * under.pressure_mpa, nut * into.pressure_mpa if joint.fixing == "trap" else math.inf)
     preload = min(PRELOAD * proof, lasting, min(pulls.values()) / 1.5)
     needed = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
-    pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": _wall(joint, under)}
+    behind = screw.nominal * joint.grip_mm * under.strength_mpa
+    pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": behind}
     pull_by, push_by = min(pulls, key=pulls.__getitem__), min(pushes, key=pushes.__getitem__)
     return Hold(
         engaged_mm=engaged,
         needed_mm=needed,
         preload_n=preload,
-        torque_nm=_two_digits(NUT_FACTOR * preload * screw.nominal / 1000),
+        torque_nm=float(f"{NUT_FACTOR * preload * screw.nominal / 1000:.2g}"),
         pull_n=pulls[pull_by],
         pull_by=pull_by,
         push_n=pushes[push_by],
@@ -147,13 +146,9 @@ def _strips(screw: Screw, engaged: float, into: Material) -> float:
     return FLANKS * math.pi * screw.nominal * engaged * SHEARED * into.strength_mpa
 
 
-def _wall(joint: Joint, under: Material) -> float:
-    return joint.screw.nominal * joint.grip_mm * under.strength_mpa
-
-
 def _loosens(joint: Joint, under: Material, into: Material) -> str:
     if joint.protrudes_mm is not None:
-        return f"it is tightened by hand, and nothing but that holds it: look at the {joint.part} each time"
+        return f"it is only tightened by hand: check the {joint.part} before each use"
     creeps = "the plastic creeps: tighten once more after a day" if under.plastic or into.plastic else "vibration"
     if joint.inserts:
         return f"{creeps}; no threadlocker, it attacks plastics"
@@ -162,7 +157,3 @@ def _loosens(joint: Joint, under: Material, into: Material) -> str:
     if into.plastic:
         return f"{creeps}; no threadlocker, it attacks plastics"
     return f"{creeps}; a drop of medium threadlocker in the thread of the metal"
-
-
-def _two_digits(value: float) -> float:
-    return float(f"{value:.2g}")

@@ -13,10 +13,10 @@ from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
 from scanwright.design.scene.ray_caster import Scene, build_scene, cast
 
-CLOSED = 0.95  # share of the turn from which on a wall is a hole
-TIP = 0.6  # times the diameter: a surface as near beyond the wall is the hole's bottom (a drill's tip is 0.3)
-RIM_MM = 0.8  # beyond the wall, where the face about the mouth is looked for
-CHAMFER = 1.2  # times the diameter: as far a face can be from the end of the wall
+CLOSED = 0.95  # share of the full turn: least of the wall of a hole
+TIP = 0.6  # times the diameter: a surface so near beyond the wall is the hole's bottom (a drill's tip is 0.3)
+RIM_MM = 0.8  # beyond the wall, for detecting the face about the mouth
+CHAMFER = 1.2  # times the diameter: largest distance of that face from the end of the wall
 CORE_SHARE, CORE_MM = 0.02, 0.07  # of a modelled core from ISO 2306
 MODELLED_MM = 0.07  # of a thread that is modelled with its outer diameter
 PASSING = (0.07, 0.1, 0.2)  # a hole that a screw passes is wider by at least a, at most b + c times the screw
@@ -66,7 +66,7 @@ def _along_one_axis(scene: Scene, walls: list[Wall], preferred: Array) -> list[B
     walls = sorted(walls, key=lambda wall: wall.low + wall.high)
     axis = np.asarray(walls[0].axis)
     middles = np.array([wall.at((wall.low + wall.high) / 2) for wall in walls])
-    up, down = (cast(scene, middles, np.broadcast_to(way, middles.shape)).range_m for way in (axis, -axis))
+    up, down = (cast(scene, middles, np.broadcast_to(along, middles.shape)).range_m for along in (axis, -axis))
     runs: list[list[int]] = []
     for i, wall in enumerate(walls):
         below = walls[i - 1]

@@ -23,7 +23,7 @@ SECTORS = 72
 SAME_MM = 0.03  # between axes, radii and ends of one cylinder
 CORNER_MM = 1e-3  # between corners that are one
 LEAST_RADIUS_MM = 0.4  # of a screw's hole
-LEAST_PLANE = 0.005  # of the surface: directions of smaller planes are no axes
+LEAST_PLANE = 0.005  # of the surface: least plane whose normal is an axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +37,8 @@ class Wall:
         low: height of its lower end along `axis`.
         high: of its upper end.
         hole: whether the material is outside.
-        around: share of the full turn that the mesh has.
-        stretch: half the way between the middles of a slot's ends, as a vector; zero for a cylinder.
+        around: share of the full turn in the mesh.
+        stretch: half the vector between the middles of a slot's ends; zero for a cylinder.
     """
 
     axis: tuple[float, float, float]
@@ -133,7 +133,7 @@ def _walls_along(triangles: Array, normals: Array, corners: NDArray[np.int64], a
 
 
 def _neighbours(corners: NDArray[np.int64], normals: Array) -> NDArray[np.int64]:
-    """Return pairs of facets that share an edge and go on smoothly."""
+    """Return pairs of facets that share a smooth edge."""
     edges = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     owner = np.repeat(np.arange(len(corners)), 3)
     order = np.lexsort(edges.T)

@@ -29,21 +29,16 @@ HORN = (
     "servo.horn_first_hole_deg",
     "servo.horn_screw",
 )
-ON_CASE = (
-    "servo.case_max_mm",
-    "servo.holes",
-    "servo.horn_diameter_mm",
-    "servo.horn_thickness_mm",
-)
-SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
+ON_CASE = ("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm", "servo.horn_thickness_mm")
+SEATED = "the hub is on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 TURNED_FROM = "aluminium EN AW-6082-T6"
 
 
 def to_centre(servo: Servo) -> str:
     """Return the sentence of a step that turns the servo to the centre of its encoder."""
     counts = 2 ** round(math.log2(servo.position_feedback_deg / servo.position_step_deg))
-    where = f"position {counts // 2} of {counts}"
-    return f"Connect the servo and turn it to its centre ({where}) with `scanwright servo-setup PORT --centre`."
+    centre = f"position {counts // 2} of {counts}"
+    return f"Connect the servo and turn it to its centre ({centre}) with `scanwright servo-setup PORT --centre`."
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +65,9 @@ class Row:
     Attributes:
         kind: of the row.
         estimate: name of its price in `cad/files/prices.py`.
-        part: what it is, with its size.
+        part: name and size.
         source: of the row.
-        note: on it.
+        note: for the buyer.
     """
 
     kind: Literal["consumable", "wiring", "tool"]
@@ -91,25 +86,25 @@ class PartSpec:
 
     Attributes:
         name: of `cad/layout/names.py`.
-        turns: whether it turns about the rotation axis, or stands still.
+        turns: whether it turns about the rotation axis.
         make: its solid, rotation frame at gamma = 0, mm; raises BuildError.
-        step: that puts it in; None if that of what it sits on does.
+        step: that adds it; None if another part has its step.
         after: part or product whose step it follows, unless the drive lists it in `built`.
-        process: how it is made.
-        material: what it is made from, where that is not what the printer prints.
-        work: what else is done to it.
-        why_metal: why no printer makes it.
-        sheet: what its drawing says beyond its shape.
+        process: of making it.
+        material: if it is not printed.
+        work: further work.
+        why_metal: why it is not printed.
+        sheet: further data of its drawing.
         shaped_by: fields of products, as "kind.field", that shape it.
-        shapes: fields that shape something else, and what, in words: these go before any part.
-        angles: those that shape it and stand on its label.
-        seat: height in the laser frame of its face towards the lidar; None where it does not carry the lidar.
-        lifted: along what the exploded view moves it.
-        sweep: what it fills if it turns about another axis.
-        joints: what it is screwed to.
+        shapes: fields that shape something else, with its description; they precede `shaped_by` of any part.
+        angles: those that shape it and are on its label.
+        seat: height in the laser frame of its face towards the lidar; None if it does not carry the lidar.
+        lifted: direction of its motion in the exploded view.
+        sweep: its swept solid if it turns about another axis.
+        joints: its screws.
         avoid: convex shapes that cables must stay clear of.
-        rows: small things that it needs, for the parts list.
-        steps: of products that are put in with it, and of parts that sit on it: these go before their own.
+        rows: small parts and tools, for the parts list.
+        steps: of products inserted with it, and of parts on it: these precede their own.
     """
 
     name: str
@@ -140,16 +135,16 @@ class PartSpec:
 
     @property
     def frame(self) -> Literal["servo", "rot"]:
-        """That it moves with."""
+        """Frame that it moves with."""
         return "rot" if self.turns else "servo"
 
     @property
     def metal(self) -> bool:
-        """Whether no printer makes it."""
+        """Whether it is of metal, not printed."""
         return self.process != "printed"
 
     def values_of(self, product: Product) -> tuple[str, ...]:
-        """Return the fields of a product that shape this part, or something that comes with it."""
+        """Return the fields of a product that shape this part, or one that it states in `shapes`."""
         kind = f"{product.kind}."
         return tuple(field.removeprefix(kind) for field in (*self.shaped_by, *self.shapes) if field.startswith(kind))
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.hub import SPIGOT, Hub
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
@@ -63,7 +63,7 @@ def linkage_sag(
         density_g_cm3: of the material.
     """
     coarse, fine = (_on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3) for edge in EDGES)
-    # what is left of an error that falls with the edge: the elements gain more, corners and edges no less
+    # remaining error if it falls linearly with the edge: that of the elements falls faster, of corners as fast
     errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse[:2], fine[:2], strict=True)]
     return Sag(fine[0], fine[1], errors[0], errors[1], fine[2])
 
@@ -86,13 +86,7 @@ def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
 
 
 def _on_grid(
-    edge: float,
-    stack: Hub,
-    meshes: Sequence[TriMesh],
-    seat: Array,
-    lidar: Inertial,
-    modulus: float,
-    density: float,
+    edge: float, stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus: float, density: float
 ) -> tuple[Array, Array, Spring]:
     """Return rotation [rad] and shift [m] of one grid, and the spring, rotation frame."""
     R = stack.R()
@@ -127,7 +121,7 @@ def _grid(triangles: Array, edge: float, seat: float) -> Grid:
 
 def _spigot(stack: Hub) -> tuple[Array, float]:
     """Return points all around the shaft in the hub, rotation frame, and the area."""
-    radius, length = stack.shaft_diameter / 2, stack.spigot
+    radius, length = stack.shaft_diameter / 2, SPIGOT
     rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))
     z = stack.shoulder + (np.arange(rows) + 0.5) / rows * length
     angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, z)

@@ -25,8 +25,8 @@ class BeltPull:
     Attributes:
         working_n: largest pull beyond the pre-load.
         strand_n: pre-load of each strand.
-        shaft_n: what both strands pull shaft and horn together with.
-        horn_nm: moment that this puts on the horn.
+        shaft_n: force of both strands between shaft and horn.
+        horn_nm: its moment on the horn.
     """
 
     working_n: float
@@ -70,7 +70,9 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
 
     A tube on two supports, its hub beyond the upper one; the belt is two springs against turning.
     """
-    EI = ALUMINIUM_PA * _second_moment(stack)
+    second_moment = math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12  # m4
+    EI, shear_pa = ALUMINIUM_PA * second_moment, ALUMINIUM_PA / (2 + 2 * METAL_POISSON)
+    twist = (stack.hub_bottom - stack.belt_middle) / 1000 / (shear_pa * 2 * second_moment)
     span = (stack.upper_middle - stack.lower_middle) / 1000
     over = (stack.hub_bottom - stack.upper_middle) / 1000
     coupled = over * span / (3 * EI) + over**2 / (2 * EI)
@@ -84,19 +86,9 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
             ]
         )
         + seat_m_per_n * carried @ carried.T,
-        twist_rad_per_nm=1 / belt_nm_per_rad(stack) + _twist(stack),
+        twist_rad_per_nm=1 / belt_nm_per_rad(stack) + twist,
         stretch_m_per_n=over / (ALUMINIUM_PA * area),
     )
-
-
-def _second_moment(stack: BeltStack) -> float:
-    """Return the second moment of the tube [m4]."""
-    return math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12
-
-
-def _twist(stack: BeltStack) -> float:
-    shear = ALUMINIUM_PA / (2 + 2 * METAL_POISSON)
-    return (stack.hub_bottom - stack.belt_middle) / 1000 / (shear * 2 * _second_moment(stack))
 
 
 def run_out_rad(stack: BeltStack, fit_mm: float) -> float:

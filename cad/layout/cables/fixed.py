@@ -24,14 +24,14 @@ from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array
 
-LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # of its device, before the first bend
-ON_FOOT = 1.0  # between foot or deck and a cable that lies on it
-BEYOND = 8.0  # the edge of the foot, where a cable ends
-CLEAR = 1.0  # of what it leaves, beside its own radius
-LONGER = (2.0, 8.0, 12.0, 16.0)  # than a cable lies on the foot, before its last bend
-STEP = 9.0  # of the points that a cable may turn at
-AROUND = 20.0  # of these, beyond the ends
-FROM_CASE = 24.0  # where a cable ends on a flat deck
+LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # from its device to the first bend
+ON_FOOT = 1.0  # between foot or deck and a cable on it
+BEYOND = 8.0  # from the edge of the foot to the end of a cable
+CLEAR = 1.0  # of its device, in addition to its radius
+LONGER = (2.0, 8.0, 12.0, 16.0)  # from the foot to the last bend
+STEP = 9.0  # of the lattice of corners
+AROUND = 20.0  # of the lattice beyond the ends
+FROM_CASE = 24.0  # from the case to the end of a cable on a flat deck
 THROUGH_DECK = 15.0
 FROM_SLOT = 0.2
 
@@ -42,9 +42,9 @@ class FixedCable:
 
     Attributes:
         name: of its body.
-        device: that it leaves.
+        device: at its start.
         diameter: of it.
-        radius: least one that it may be bent to.
+        radius: least bend radius.
         path: its middle from its device to the edge of foot or deck; None if there is none.
     """
 

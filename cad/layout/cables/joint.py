@@ -18,13 +18,13 @@ from scanwright.cad.layout.cables.route import GAP, LeadRoom
 from scanwright.design.arrays import Array
 
 LENGTH = 12.0  # crimps beside each other, and a shrink tube over them
-WALL = 0.5  # of the shrink tube; of what a lead keeps to all others it leaves a tenth
-STEP = 3.0  # between two places that are tried, and two points of a joint that are looked at
+WALL = 0.5  # of the shrink tube; a tenth of the gap to other leads remains
+STEP = 3.0  # between two tested places, and two points of a joint
 
 
 @dataclass(frozen=True, slots=True)
 class LeadJoint:
-    """The piece of a path that its `LENGTH` sits on, and how far along that from its middle."""
+    """The piece of a path with the joint of `LENGTH`, and the offset from the middle of the piece."""
 
     piece: PathPiece
     off: float
@@ -58,7 +58,7 @@ def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Arr
         points = place.points()
         if room.free(points, half + WALL, GAP - WALL).all() and all(farther(points, *other).all() for other in others):
             return place
-    return places[0] if places else None  # the check of clearances tells what it is too near to
+    return places[0] if places else None  # the check of clearances then fails
 
 
 def straights(path: Path) -> list[PathPiece]:

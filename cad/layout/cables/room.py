@@ -18,7 +18,7 @@ from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.catalogue.lidar import Lidar
 
-BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens
+BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, and it widens
 
 
 @dataclass(frozen=True, slots=True)

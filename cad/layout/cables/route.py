@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 from scanwright.cad.layout.cables.path import Path
 from scanwright.design.arrays import Array, Mask
 
-SAMPLE = 3.0  # mm between two points that are looked at
+SAMPLE = 3.0  # mm between two tested points
 AZIMUTHS = 24
 FROM_HUB = 4.0  # first radius of the lattice
 STEP = 12.0  # of its radii and heights
-BEYOND = 12.0  # of the furthest end, where the lattice stops
+BEYOND = 12.0  # of the lattice beyond the furthest end
 REACH = 40.0  # of a piece between two points of the lattice
-GREED = 1.2  # how much the length that is left counts: a way a fifth longer at most, found in half the time
-ARRIVALS = 6  # at a point from which one goes on: no way of 28 was lost or longer than with all of them
+GREED = 1.2  # weight of the remaining length: a path at most a fifth longer, in half the time
+ARRIVALS = 6  # at a point that are continued: none of 28 paths was lost or longer than with all of them
 SHARPEST = math.radians(125.0)
-GAP = 0.6  # between a lead and what it passes
+GAP = 0.6  # between a lead and obstacles
 ROUNDING = 0.3  # more along the straight pieces
 
 
@@ -40,7 +40,7 @@ class LeadRoom(Protocol):
         ...
 
 
-Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and the length that an arc may take of it
+Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and its length available for an arc
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,10 @@ def short_path(
         radius: least bend radius.
         lattice: points of possible corners, shape (n, 3).
     """
-    first, last = ([pair for end in ends for pair in _tips(room, end, half)] for ends in (starts, goals))
+    first, last = (
+        [(end, tip) for end in ends for tip in range(len(end.lengths)) if _clear(room, end, tip, half)]
+        for ends in (starts, goals)
+    )
     if not first or not last:
         return None
     lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
@@ -94,10 +97,6 @@ def short_path(
     start, goal = first[chain[0]][0], last[chain[-1] - beyond][0]
     corners = np.concatenate([start.corners, points[chain], goal.corners[::-1]])
     return Path(tuple((float(x), float(y), float(z)) for x, y, z in corners), radius)
-
-
-def _tips(room: LeadRoom, end: Ending, half: float) -> list[tuple[Ending, int]]:
-    return [(end, tip) for tip in range(len(end.lengths)) if _clear(room, end, tip, half)]
 
 
 def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[Ending]) -> Array:

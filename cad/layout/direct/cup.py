@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from scanwright.cad.layout.direct.frame import heads_over_horn_mm, needs_frame
+from scanwright.cad.layout.direct.frame import GRIP, OVER_HEADS, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import Envelope, hub_height, rows_of
 from scanwright.cad.layout.hub import CUP_HUB_WALL
@@ -36,7 +36,9 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
     if needs_frame(servo):  # it must widen above the heads of the frame's screws
         foot = (servo.horn_circle_mm + passing_hole(SCREWS[servo.horn_screw], scanner.printer)) / 2
         foot += scanner.printer.min_wall_mm + ROUND_HOLE
-        foot_height, flange = heads_over_horn_mm(servo), diameter / 2
+        # over the horn's face: the heads of the frame's screws, with clearance
+        foot_height = servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
+        flange = diameter / 2
         wall = SCREWS[servo.horn_screw].head_room + scanner.printer.min_wall_mm  # around the heads in the cone
         grip = _grip(servo, max(floor, foot_height + max(FLOOR_ON_FOOT, wall)))
         floor = max(grip, foot_height + flange - foot)  # a cone of 45 deg needs no support

@@ -17,8 +17,8 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 GRIP = 2.5  # of the plate, under the heads of the servo's screws
-HORN_ROOM = 0.5  # around what turns in the plate's opening
-OVER_HEADS = 0.5  # between the heads and what turns above them
+HORN_ROOM = 0.5  # around the turning parts in the plate's opening
+OVER_HEADS = 0.5  # between the heads and the parts that turn above them
 GAP = 0.3  # around the case
 LEG = 5.0
 WINDOW = 8.0  # half width of the opening between two legs, about the servo's plug
@@ -39,7 +39,7 @@ class ServoFrame:
         low: lower face of the feet.
         plate: lower face of the plate, on the front of the case.
         opening: radius around the axis.
-        half_x: of the room for the case.
+        half_x: of the space for the case.
         ends_y: of legs and plate.
         window_y: between the legs of a side.
         hole: diameter, of the servo's screws.
@@ -101,11 +101,6 @@ def corner_holes(holes: tuple[tuple[float, float], ...]) -> tuple[tuple[float, f
 def needs_frame(servo: Servo) -> bool:
     """Return whether only the servo's front has holes that may carry it."""
     return not corner_holes(servo.rear.places) and len(servo.front.places) >= 2
-
-
-def heads_over_horn_mm(servo: Servo) -> float:
-    """Return the height over the horn's face of the heads of the frame's screws, with clearance."""
-    return servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
 
 
 def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:

@@ -39,10 +39,10 @@ SHEAR_SHARE = 0.9  # of a round section that carries shear
 
 @dataclass(frozen=True, slots=True)
 class ShaftMetal:
-    """What a shaft may be turned from.
+    """Metal of a turned shaft.
 
     Attributes:
-        name: as it is ordered.
+        name: order name.
         modulus_pa: of elasticity.
         waist: diameter of the waist in this metal, as a share of that in aluminium.
         yields_pa: shear stress at which it yields.
@@ -129,7 +129,7 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
     R = float((bend * reach * moment).sum()) / give
     over = (stack.hub_bottom - stack.bearing_middle) / 1000
     beyond = weight.across_n * (weight.lever_m - b - over / 2) + weight.along_n * weight.off_axis_m
-    shaft = metal.modulus_pa * _second_moment(stack.shaft_diameter)
+    shaft = metal.modulus_pa * math.pi / 64 * (stack.shaft_diameter / 1000) ** 4
     slope = float((bend * (moment - R * reach)).sum()) + over * beyond / shaft
     foot = weight.across_n * weight.lever_m + weight.along_n * weight.off_axis_m
     return Supported(abs(foot - R * b), R, abs(slope), b / give)
@@ -182,11 +182,6 @@ def shaft_bend(
 def shaft_modulus_pa(scanner: Scanner, stack: DirectStack) -> float:
     """Return the elastic modulus of the shaft: of the print for a cup, else of aluminium."""
     return 1e9 * scanner.printer.modulus_gpa if stack.cup_bore > 0 else ALUMINIUM_PA
-
-
-def _second_moment(diameter_mm: float) -> float:
-    """Return the second moment of area of a round bar [m4]."""
-    return math.pi / 64 * (diameter_mm / 1000) ** 4
 
 
 def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:

@@ -26,7 +26,7 @@ CAGE_SET_MM = 0.02  # that the cage springs off the sleeve's middle when its scr
 WARMER_K = 20.0  # than when it was set
 PLASTIC_GROWS_PER_K = 70e-6  # PLA and PETG; the case is taken not to grow
 SHARE = 0.5  # of the horn's rating that the worst case may use
-SURELY = 0.92  # of what is allowed, as long as the rotor is not weighed: balanced, it may lean a little more
+SURELY = 0.92  # of the allowed moment, while the mass of the rotor is an estimate
 # the shaft's waist, each in the order of preference
 WAIST_LENGTHS = (20.0, 24.0, 28.0, 32.0, 36.0, 40.0)
 WAIST_DIAMETERS = tuple(tenths / 10 for tenths in range(70, 44, -1))
@@ -92,19 +92,16 @@ def with_waist(scanner: Scanner, stack: DirectStack, ears: Ears) -> DirectStack:
     """
     rated = rated_moment_nm(scanner)
     bears = SURELY * (UNRATED_NM if rated is None else SHARE * rated)
-    strong = [one for one in WAIST_DIAMETERS if _outlasts(scanner, one)] or [WAIST_DIAMETERS[0]]
+    stall, metals = scanner.servo.stall_torque_nm, (ALUMINIUM, STEEL)
+    strong = [one for one in WAIST_DIAMETERS if all(stall <= metal.twisted_off_nm(one) for metal in metals)]
+    strong = strong or [WAIST_DIAMETERS[0]]
     off_m = sum(offsets_mm(ears).values()) / 1000
     for length in WAIST_LENGTHS:
         one = replace(stack, waist_length=length)
         weight, stiffness = heaviest(scanner, one), stiffness_n_per_m(one, ears)
         for diameter in strong:
             thick = replace(one, waist_diameter=diameter)
-            shared = [supported(weight, thick, stiffness, metal) for metal in (ALUMINIUM, STEEL)]
+            shared = [supported(weight, thick, stiffness, metal) for metal in metals]
             if max(each.horn_moment_nm + off_m * each.misaligned_nm_per_m for each in shared) <= bears:
                 return thick
     return replace(stack, waist_length=WAIST_LENGTHS[-1], waist_diameter=strong[-1])
-
-
-def _outlasts(scanner: Scanner, waist_diameter: float) -> bool:
-    weakest = min(metal.twisted_off_nm(waist_diameter) for metal in (ALUMINIUM, STEEL))
-    return scanner.servo.stall_torque_nm <= weakest

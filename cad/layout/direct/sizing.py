@@ -21,11 +21,12 @@ from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-SHAFT_PLAIN = 12.0  # without a ring, where the heads of the horn's screws leave room
-SHAFT_LOOSE = 1.0  # likewise at most, where the heads of the horn's screws leave no room for more
+SHAFT_PLAIN = 12.0  # without a ring, if it fits between the heads of the horn's screws
+SHAFT_LOOSE = 1.0  # most clearance in a ring, if no thicker shaft fits between these heads
 SHAFT_SLIDES = 0.05  # in the bore of a ring, whose set screws hold it, on the diameter
 SHAFT_MIN = 8.0
-COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less only where the heads beside it stand close
+LEAST_BORE = SHAFT_MIN + SHAFT_SLIDES
+COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less if the heads next to it are close
 
 
 def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ears | None]:
@@ -76,29 +77,26 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         sub_plate=None,
     )
     bearing = None
-    if _needs_bearing(scanner, alone):
+    # the horn is not rated for the rotor, or only the base of a cage has holes for the adapter of a ring
+    if not horn_bears(scanner, alone) or (ring is not None and not fork_holes(scanner.servo, alone)):
         try:
             bearing = bearing_for(scanner, alone)
         except BuildError:
-            ears_of(scanner, alone)  # first what no other ring can correct
+            ears_of(scanner, alone)  # its error comes first: no other ring corrects it
             raise
     return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
-
-
-def _needs_bearing(scanner: Scanner, stack: DirectStack) -> bool:
-    """Return whether the horn is not rated for the rotor, or only the base of a cage has holes for a ring's adapter."""
-    return not horn_bears(scanner, stack) or (scanner.slip_ring is not None and not fork_holes(scanner.servo, stack))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     """Return the shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
     ring = scanner.slip_ring
     if ring is None:
-        return _between_heads(scanner.servo), 0.0, 0.0, 0.0
+        shaft = min(SHAFT_PLAIN, math.floor(4 * _room_on_horn(scanner.servo)) / 2)  # between the heads of its screws
+        return max(SHAFT_MIN, shaft), 0.0, 0.0, 0.0
     if ring.bore_mm == 0:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = 0: direct drive needs a ring with a through bore: the shaft from horn "
-            f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {_least_bore():.1f}"
+            f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {LEAST_BORE:.1f}"
         )
     shaft = round(ring.bore_mm - SHAFT_SLIDES, 2)
     if shaft / 2 > _room_on_horn(scanner.servo) > (ring.bore_mm - SHAFT_LOOSE) / 2:
@@ -106,7 +104,7 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     if shaft < SHAFT_MIN:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: a shaft of {shaft:g} mm bends under the lidar; "
-            f"take a ring with bore_mm >= {_least_bore():.1f}"
+            f"take a ring with bore_mm >= {LEAST_BORE:.1f}"
         )
     if ring.bore_mm + 4.0 > ring.outer_diameter_mm:
         raise BuildError(
@@ -116,18 +114,9 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     return shaft, ring.length_mm, ring.outer_diameter_mm / 2, ring.bore_mm
 
 
-def _between_heads(servo: Servo) -> float:
-    """Return the diameter of a shaft without a ring, thinner if the heads of the horn's screws are close."""
-    return max(SHAFT_MIN, min(SHAFT_PLAIN, math.floor(4 * _room_on_horn(servo)) / 2))
-
-
 def _room_on_horn(servo: Servo) -> float:
     """Return the radius inside the heads of the horn's screws."""
     return (servo.horn_circle_mm - SCREWS[servo.horn_screw].head_diameter) / 2
-
-
-def _least_bore() -> float:
-    return SHAFT_MIN + SHAFT_SLIDES
 
 
 def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, float]:

@@ -7,7 +7,6 @@ foot.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from scanwright.cad.layout.joints import shank_mm
@@ -15,10 +14,10 @@ from scanwright.cad.screws import TRIPOD_SCREW, Screw, Thread, thread_in_part
 from scanwright.design.catalogue.products import Printer
 
 LEAST = 8.0  # thickness: the nut and a floor under it
-FLOOR = 2.0  # under the tripod's nut: its screw stands out little
+FLOOR = 2.0  # under the tripod's nut: its screw protrudes little
 OVER_NUTS = 2.8  # of the mount's screws
-PROTRUDES = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; a longer one finds room
-HEEL = 19.0  # half the width of the narrowest plate of a tripod's head that it stands on: assumed
+PROTRUDES = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; longer ones fit
+HEEL = 19.0  # half the width of the narrowest plate of a tripod's head: assumed
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +28,6 @@ class TripodFoot:
     mount: Thread
     tripod: Thread
 
-    @property
-    def nut_floor(self) -> float:
-        """Height of the floor that the tripod's nut lies on."""
-        return FLOOR - self.thickness
-
 
 def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
     """Return the plate below a thickness of the mount, so thick that no screw of the mount stands out."""
@@ -41,8 +35,3 @@ def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
     mount = thread_in_part(screw, printer, carries=True)
     thickness = max(LEAST, longest - above) if mount.trap is not None else LEAST
     return TripodFoot(thickness, mount, thread_in_part(TRIPOD_SCREW, printer, carries=True))
-
-
-def corner_turn(hole: tuple[float, float]) -> float:
-    """Return the turn [rad] of a nut's hexagon that puts a flat towards the middle of the plate."""
-    return math.atan2(hole[1], hole[0]) + math.pi / 6

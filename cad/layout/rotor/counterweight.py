@@ -21,14 +21,14 @@ from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
-from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, Ear, LinkageBody
+from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-# bright steel bar as it is sold (EN 10278), across and along the axis, lightest first
+# sections of bright steel bar on sale (EN 10278), across and along the axis, lightest first
 SECTIONS = (
     (8, 8),
     (10, 10),
@@ -59,7 +59,7 @@ SCREWS_AT = (9.0, 25.0)  # from the inner end of the bar
 LEAST_LENGTH = 32.0  # covers the screws
 LONGER = 2.0  # than estimated the bar may become (measured: 1.5)
 GAP = 1.0
-STEP = 2.0  # of the points that stand for a bar
+STEP = 2.0  # of the points in a bar
 SAW = 0.5  # lengths are cut to this
 
 
@@ -84,7 +84,7 @@ class Counterweight:
 
     @property
     def stock(self) -> str:
-        """What to saw it from."""
+        """Bar stock and length."""
         return f"bright steel bar {self.section[0]:g} x {self.section[1]:g}, sawn to {self.length:g}"
 
     @property
@@ -103,13 +103,13 @@ def counterweight_of(
     scanner: Scanner,
     drive: DriveLayout,
     deck: Deck,
-    linkage: LinkageBody,
+    linkage: AlignmentLinkage,
     plate_ties: tuple[TieSeat, ...],
     neck: Array,
 ) -> Counterweight | LeftOut:
     """Return the lightest bar that balances the rotor and fits, or why there is none; neck of shape (n, 3)."""
     if not backlash_matters(scanner):
-        return _without(f"the play of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
+        return _without(f"the backlash of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
     if tilt_sine(scanner) < UPRIGHT:
         return _without("gravity does not turn an upright axis")
     moment = estimated_moment(scanner, linkage, neck)
@@ -117,19 +117,22 @@ def counterweight_of(
     if torque_nm(scanner, float(np.linalg.norm(moment))) <= least:
         return _without(f"gravity turns the rotor with no more than the friction of bearing and ring, {least:g} N m")
     if keeps_flank(scanner, moment):
-        return _without("all over the sweep gravity keeps the gears on one flank")
+        return _without("gravity keeps the gears on one flank during the entire sweep")
     azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))
     free, fault = _FreeSpace(drive, deck, linkage, plate_ties, neck), ""
     for section in SECTIONS:
         bar = _bar(scanner, linkage, azimuth, section)
-        bar = bar.balancing(moment + _ear_moment(scanner, linkage, bar.ear))
+        ear, density = bar.ear, scanner.printer.density_g_cm3 / 1000
+        across = 2 * ear.half_width * (ear.high - ear.low) * density
+        of_ear = across * (ear.end**2 - linkage.stack.hub_radius**2) / 2 * _direction(ear.azimuth)
+        bar = bar.balancing(moment + of_ear)
         if bar.length < LEAST_LENGTH:
             fault = fault or "would be shorter than its screws need"
             break
         fault = free.fault(scanner, bar)
         if not fault:
             return bar
-    return _without(f"the rotor is out of balance, but the bar that would mend it {fault}")
+    return _without(f"the rotor is out of balance, but the bar that would balance it {fault}")
 
 
 def _without(why: str) -> LeftOut:
@@ -144,7 +147,7 @@ def _grams_per_mm(section: tuple[float, float]) -> float:
     return section[0] * section[1] * STEEL_G_CM3 / 1000
 
 
-def _bar(scanner: Scanner, linkage: LinkageBody, azimuth: float, section: tuple[float, float]) -> Counterweight:
+def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: tuple[float, float]) -> Counterweight:
     stack = linkage.stack
     start = stack.hub_radius + FROM_HUB + TRIM
     ear = Ear(
@@ -159,18 +162,13 @@ def _bar(scanner: Scanner, linkage: LinkageBody, azimuth: float, section: tuple[
     return Counterweight(ear=ear, section=section, start=start, length=LEAST_LENGTH)
 
 
-def _ear_moment(scanner: Scanner, linkage: LinkageBody, ear: Ear) -> Array:
-    across = 2 * ear.half_width * (ear.high - ear.low) * scanner.printer.density_g_cm3 / 1000
-    return across * (ear.end**2 - linkage.stack.hub_radius**2) / 2 * _direction(ear.azimuth)
-
-
 @dataclass(frozen=True, slots=True)
 class _FreeSpace:
-    """What a bar and its ear must leave alone."""
+    """Everything that a bar and its ear must stay clear of."""
 
     drive: DriveLayout
     deck: Deck
-    linkage: LinkageBody
+    linkage: AlignmentLinkage
     plate_ties: tuple[TieSeat, ...]
     neck: Array
 
@@ -180,26 +178,26 @@ class _FreeSpace:
         ear, half, stack = bar.ear, bar.section[0] / 2, linkage.stack
         inner, outer = bar.start - TRIM, bar.end + TRIM + LONGER
         if math.hypot(bar.end, half) > self.drive.envelope.radius(stack.sub_plate):
-            return "would reach further than the lidar"
+            return "would extend beyond the lidar"
         rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
         if _height_over(self.deck, rims) < FOOT_THICKNESS + FREE / 2:
-            return "would come too near to the deck"
+            return "would be too near to the deck"
         if not self.drive.bears(bar.mass_g, bar.ear.high + bar.section[1] / 2):
-            return f"would be more than the horn of {scanner.servo.name} bears alone"
+            return f"would be too heavy for the horn of {scanner.servo.name} alone"
         of_bar = _points((inner, -half, ear.high), (outer, half, ear.high + bar.section[1]), ear.azimuth)
         of_ear = _points((inner, -ear.half_width, ear.low), (ear.end, ear.half_width, ear.high), ear.azimuth)
         placed, put_in = of_bar @ stack.R(), of_ear @ stack.R()  # the bar comes last, when the lidar is in its place
         boxes = [linkage.body, *linkage.cables, *([] if linkage.ears is None else [linkage.ears])]
         if any(in_box(placed, box, GAP).any() or in_box(put_in, swept(box), GAP).any() for box in boxes):
             return "would meet the lidar or its cables"
-        tongues = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in self.plate_ties]
-        if any(in_box(points, (low, high), GAP).any() for low, high in tongues for points in (placed, put_in)):
-            return "would meet a tongue of the plate"
+        tabs = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in self.plate_ties]
+        if any(in_box(points, (low, high), GAP).any() for low, high in tabs for points in (placed, put_in)):
+            return "would meet a slotted tab of the plate"
         both = np.concatenate([placed, put_in])
         if in_fan(both, linkage, GAP).any():
-            return "would stand in the fan"
+            return "would be in the fan"
         if behind_screws(both, linkage).any():
-            return "would stand before the screws of the lidar"
+            return "would block the screws of the lidar"
         return "would meet the neck of the linkage" if in_hull(of_bar, self.neck, GAP).any() else ""
 
 

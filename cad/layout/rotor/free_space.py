@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from scanwright.cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
-from scanwright.cad.layout.rotor.linkage import LinkageBody
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.design.arrays import Array, Mask
 
 FAR_ABOVE = 1e3
@@ -28,7 +28,7 @@ def swept(box: Box) -> Box:
     return low, (x, y, FAR_ABOVE)
 
 
-def in_fan(points: Array, p: LinkageBody, gap: float, fan_z: tuple[float, float] | None = None) -> Mask:
+def in_fan(points: Array, p: AlignmentLinkage, gap: float, fan_z: tuple[float, float] | None = None) -> Mask:
     """Return points in the linkage's free sector for its beams, or between other heights of the laser frame."""
     low, high = fan_z or p.fan_z
     bearing = np.arctan2(points[:, 1], points[:, 0])
@@ -37,7 +37,7 @@ def in_fan(points: Array, p: LinkageBody, gap: float, fan_z: tuple[float, float]
     return np.asarray(in_slab & np.any([(bearing - first) % (2 * math.pi) < last - first for first, last in p.fan], 0))
 
 
-def behind_screws(points: Array, p: LinkageBody) -> Mask:
+def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
     """Return points on the paths of drivers of the lidar's screws; none with a sub-plate."""
     below = points[:, 2] < p.top - PLATE_THICKNESS
     if p.ears is not None:
@@ -45,7 +45,7 @@ def behind_screws(points: Array, p: LinkageBody) -> Mask:
     return below & at_screws(points, p)
 
 
-def at_screws(points: Array, p: LinkageBody) -> Mask:
+def at_screws(points: Array, p: AlignmentLinkage) -> Mask:
     """Return points over or under the heads of the lidar's screws, anywhere in their slots."""
     near = [_from_slot(points, *slot_ends(place, p.screw_travel)) < p.screw.head_room for place in p.holes]
     return np.asarray(np.any(near, axis=0))

@@ -9,7 +9,7 @@ import numpy as np
 from scanwright.cad.layout.envelope import PLATE_THICKNESS
 from scanwright.cad.layout.loads import noise_deg, tilt_sine
 from scanwright.cad.layout.rotor.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
-from scanwright.cad.layout.rotor.linkage import LinkageBody
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.motion import Sweep
@@ -18,7 +18,7 @@ from scanwright.design.scanner import Scanner
 CELL = 2.0
 
 
-def estimated_moment(scanner: Scanner, p: LinkageBody, neck: Array) -> Array:
+def estimated_moment(scanner: Scanner, p: AlignmentLinkage, neck: Array) -> Array:
     """Return the mass times distance from the axis of lidar, linkage and sub-plate, rotation frame, shape (2,) [g mm].
 
     The linkage is a sum of cells, within 3 % of its solid (`tests/cad/parts/test_balance.py`); `neck` has shape (n, 3).

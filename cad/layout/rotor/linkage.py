@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,22 +30,22 @@ from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has to hold
+CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft
 CROSS_WASHER_MM, CROSS_WASHER_THICK = 9.0, 0.8  # ISO 7093: a wide one, the pressure on plastic limits the friction
-CROSS_ROOM = CROSS_WASHER_MM / 2 + 0.2  # radius of the way of washer, head and driver
+CROSS_ROOM = CROSS_WASHER_MM / 2 + 0.2  # radius of the path of washer, head and driver
 CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
-HEEL = 8.0  # how far the neck reaches below a lying plate
-BACK = 6.0  # and behind its lower half: it carries the lidar like a bracket, thick at its foot
-RING_MARGIN = 0.03  # by how much [rad] the sector of a full fan ends before what the ring hides
-FIN_HALF = 0.06  # half of a sector [rad] in which the neck would stand as a fin
+HEEL = 8.0  # of the neck below a lying plate
+BACK = 6.0  # of the neck behind its lower half: a bracket, thick at its foot
+RING_MARGIN = 0.03  # rad, between the sector of a full fan and the sector that the ring hides
+FIN_HALF = 0.06  # rad, half of a sector in which the neck would be a fin
 
 
 @dataclass(frozen=True, slots=True)
 class Ear:
-    """Where a counterweight is screwed to the hub, on slots along the radius: lengths in mm, `azimuth` in rad."""
+    """Lug of the hub for a counterweight, with slots along the radius: lengths in mm, `azimuth` in rad."""
 
     azimuth: float
     half_width: float
@@ -57,8 +57,8 @@ class Ear:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinkageBody:
-    """Hub, neck and plate: lengths in mm, angles in rad, directions in the rotation frame."""
+class AlignmentLinkage:
+    """Hub, neck and plate with attachments: lengths in mm, angles in rad, directions in the rotation frame."""
 
     stack: Hub
     seat: float  # z of the lidar's base in the laser frame
@@ -80,27 +80,13 @@ class LinkageBody:
     fit: float  # diametral clearance of the spigot
     cross_hole: float  # diameter, in the hub
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
-    cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AlignmentLinkage(LinkageBody):
-    """The whole part: its body, and what is attached to that."""
-
+    cross_thread: Thread | None  # of a printed shaft; None in metal
     ear: Ear | None = None
     hub_tie: TieSeat | None = None  # rotation frame
     plate_ties: tuple[TieSeat, ...] = ()  # laser frame
 
-    @classmethod
-    def on(
-        cls, body: LinkageBody, ear: Ear | None = None, hub_tie: TieSeat | None = None, ties: tuple[TieSeat, ...] = ()
-    ) -> AlignmentLinkage:
-        """Attach ear and seats of ties to a body."""
-        own = {field.name: getattr(body, field.name) for field in fields(LinkageBody)}
-        return cls(**own, ear=ear, hub_tie=hub_tie, plate_ties=ties)
 
-
-def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> LinkageBody:
+def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> AlignmentLinkage:
     """Return the linkage of one scanner, before anything is attached.
 
     Raises:
@@ -127,7 +113,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
     corner = min(half_x + half_y - abs(x) - abs(y) for x, y in outermost)
     chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
     low, high = lidar.window_z_mm
-    return LinkageBody(
+    return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
         top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE_THICKNESS),
@@ -152,7 +138,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
     )
 
 
-def neck_corners(p: LinkageBody, attempt: int) -> Array:
+def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     """Return corners of the neck's hull, shape (n, 3): the hub's core, raised to just under the lidar, and the plate.
 
     For safe booleans no facet coincides with hub, plate or body.
@@ -231,7 +217,7 @@ def cross_seat_mm(stack: Hub) -> float:
     return stack.hub_radius - CROSS_SUNK
 
 
-def cross_floor_mm(p: LinkageBody, azimuth: float) -> float:
+def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
     """Return the distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
     bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.cross_hole / 2
     flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
@@ -239,7 +225,7 @@ def cross_floor_mm(p: LinkageBody, azimuth: float) -> float:
     return min(math.sqrt(bore**2 - half**2), on_flat)
 
 
-def cross_thread_mm(p: LinkageBody) -> float:
+def cross_thread_mm(p: AlignmentLinkage) -> float:
     """Return the thread length of a cross screw in the shaft up to the other one, or in a cup up to its nut."""
     outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
     if thread is None:

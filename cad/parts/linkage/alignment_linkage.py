@@ -23,12 +23,7 @@ from scanwright.cad import outlines, solids
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, around_axis, slot_ends
-from scanwright.cad.layout.joints import (
-    Joint,
-    fixing_in,
-    inward_axes,
-    screws,
-)
+from scanwright.cad.layout.joints import Joint, fixing_in, inward_axes, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, LIDAR_BODY
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.free_space import in_hull
@@ -52,8 +47,8 @@ from scanwright.design.errors import BuildError
 
 LIDAR_STEP = Step(
     "Lidar on its seat",
-    "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables to the other side. "
-    f"{screws(LIDAR_BODY)}",
+    "On the bench: put the lidar on its seat, its front towards the V in the edge (FRONT), its cables to the other "
+    f"side. {screws(LIDAR_BODY)}",
     "no light shows under the lidar: a gap of 0.1 mm tilts its plane by about a tenth of a degree",
 )
 OF_LIDAR = (
@@ -68,20 +63,31 @@ OF_LIDAR = (
     "lidar.cable_straight_mm",
 )
 RETRIES = 5
-WIDER = 0.03  # of the ways of drivers, each time: they may graze the rim of the hub
+WIDER = 0.03  # of the paths of drivers, in each attempt: they may graze the rim of the hub
 TRAP_LENGTH = 15.0  # below the plate: the neck may begin there
 MARK_LENGTH = 8.0  # of the mark beyond the plate: a neck that is thicker there keeps a wall
 DRIVER_LENGTH = 150.0
-DRIVER_DEEP = 8.0  # below the plate, where a wall beside a driver's way is measured: the neck tapers
-DRIVER_WALL = 3.0  # what would be less is open
+DRIVER_DEEP = 8.0  # below the plate: height at which the wall beside a driver is measured, since the neck tapers
+DRIVER_WALL = 3.0  # a thinner wall beside a driver is removed
 
 
 def linkage_spec(place: Placement) -> PartSpec:
     """Return the linkage of one scanner; its step is in the spec of its shaft."""
-    p = place.linkage
+    p, heads = place.linkage, cross_seat_mm(place.stack)
+    crossed = Joint(  # cap screws through the hub's wall into threads or nuts of the shaft
+        ALIGNMENT_LINKAGE,
+        place.drive.shaft,
+        "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
+        CROSS_SCREW,
+        inward_axes(p.cross_azimuths, heads, p.stack.cross),
+        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
+        thread_mm=cross_thread_mm(p),
+        thread=p.cross_thread,
+        washer_mm=CROSS_WASHER_MM,
+    )
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
-        slots = f"the slots of {ALIGNMENT_LINKAGE}, where a screw may sit {p.screw_travel:.2g} mm nearer or farther"
+        slots = f"the slots of {ALIGNMENT_LINKAGE}, in which a screw may be {p.screw_travel:.2g} mm nearer or farther"
         shapes["lidar.holes"] = slots
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
@@ -91,28 +97,9 @@ def linkage_spec(place: Placement) -> PartSpec:
         shapes=shapes,
         angles="laser",
         seat=p.top,
-        joints=(
-            _crossed(p, place.drive.shaft),
-            *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)]),
-        ),
+        joints=(crossed, *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)])),
         avoid=tuple(_around(place)),
         steps={LIDAR: LIDAR_STEP},
-    )
-
-
-def _crossed(p: AlignmentLinkage, shaft: str) -> Joint:
-    """Return the joint of hub and shaft: cap screws through its wall into threads or nuts of the shaft."""
-    heads = cross_seat_mm(p.stack)
-    return Joint(
-        ALIGNMENT_LINKAGE,
-        shaft,
-        "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
-        CROSS_SCREW,
-        inward_axes(p.cross_azimuths, heads, p.stack.cross),
-        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
-        thread_mm=cross_thread_mm(p),
-        thread=p.cross_thread,
-        washer_mm=CROSS_WASHER_MM,
     )
 
 
@@ -188,8 +175,8 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt)
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt) as checked:
         body: cq.Shape = checked(shapes.plate.fuse(shapes.neck))
-    with building(ALIGNMENT_LINKAGE, "free room of lidar, cables and fan", "tilt", tilt):
-        # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
+    with building(ALIGNMENT_LINKAGE, "free space of lidar, cables and fan", "tilt", tilt):
+        # small loose pieces beside the plate are dropped
         body = _largest(body.cut(*shapes.room, *shapes.fins))
     with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm") as checked:
         body = checked(body.fuse(shapes.hub).cut(*shapes.room))

@@ -32,42 +32,9 @@ def counterweight_spec(place: Placement) -> PartSpec | LeftOut:
 
 def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
     """Return the spec of a bar, whose length may differ from the layout's estimate."""
-    tie = place.linkage.hub_tie
-    first = (
-        ""
-        if tie is None or not tie.grooved
-        else "First lay a cable tie into the groove beside the hub: it waits for the leads. "
-    )
-    words = (
-        f"{first}Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
-        f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
-        "heads. A lidar's centre of mass is undocumented: when the scanner turns, slide the bar along its slots "
-        "to where `scanwright scan` prints the least ripple."
-    )
-    return PartSpec(
-        name=COUNTERWEIGHT,
-        turns=True,
-        make=partial(counterweight, bar),
-        step=Step(
-            "Counterweight on the linkage", words, "no screw stands out above the bar, which lies flat on the ear"
-        ),
-        after=SUB_PLATE,
-        process="sawn",
-        material=bar.stock,
-        work=f"{len(bar.screws)} threads {SCREW.name}",
-        shaped_by=("lidar.mass_g",),
-        shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
-        lifted="radius",
-        joints=(_joint(bar),),
-        avoid=tuple(_around(bar)),
-    )
-
-
-def _joint(bar: Counterweight) -> Joint:
-    """Return the joint of bar and ear, screwed from below."""
-    ear, slide = bar.ear, bar.ear.slots[0]
-    x, y = math.cos(ear.azimuth), math.sin(ear.azimuth)
-    return Joint(
+    tie, ear = place.linkage.hub_tie, bar.ear
+    x, y, slide = math.cos(ear.azimuth), math.sin(ear.azimuth), ear.slots[0]
+    joint = Joint(
         ALIGNMENT_LINKAGE,
         COUNTERWEIGHT,
         "thread",
@@ -76,6 +43,32 @@ def _joint(bar: Counterweight) -> Joint:
         grip_mm=ear.high - ear.low,
         thread_mm=bar.section[1],
         slot_mm=(ear.slot_width, slide[1] - slide[0] + ear.slot_width),
+    )
+    first = (
+        ""
+        if tie is None or not tie.grooved
+        else "First lay a cable tie into the groove next to the hub, for the leads. "
+    )
+    words = (
+        f"{first}Put the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
+        f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
+        "heads. A lidar's centre of mass is undocumented: when the scanner turns, slide the bar along its slots "
+        "until `scanwright scan` prints the least ripple."
+    )
+    return PartSpec(
+        name=COUNTERWEIGHT,
+        turns=True,
+        make=partial(counterweight, bar),
+        step=Step("Counterweight on the linkage", words, "no screw protrudes from the bar, which is flat on the ear"),
+        after=SUB_PLATE,
+        process="sawn",
+        material=bar.stock,
+        work=f"{len(bar.screws)} threads {SCREW.name}",
+        shaped_by=("lidar.mass_g",),
+        shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
+        lifted="radius",
+        joints=(joint,),
+        avoid=tuple(_around(bar)),
     )
 
 

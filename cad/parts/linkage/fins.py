@@ -17,9 +17,9 @@ from scanwright.cad.layout.envelope import Box
 from scanwright.design.arrays import Array
 
 FAR = 200.0  # beyond any linkage
-THIN = 3.0  # beside the lidar, what would stand thinner than this is cut off
+THIN = 3.0  # thinner walls next to the lidar are cut off
 PRONG = 7.0  # likewise outside of a cable
-INTO = 0.3  # below the rooms of lidar and cables: no ridge stays along their edges
+INTO = 0.3  # below the space of lidar and cables: no ridge remains along their edges
 
 
 def fins_of(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> list[cq.Shape]:

@@ -27,7 +27,6 @@ from scanwright.cad.layout.hub import Axis, Hub
 from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, lidar_thread_mm, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR_BODY, SUB_PLATE
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
@@ -42,8 +41,19 @@ def sub_plate_spec(place: Placement) -> PartSpec | None:
     scanner, axis = place.scanner, place.stack.sub_plate
     if axis is None:
         return None
+    p, thread = place.linkage, place.linkage.ear_thread
+    on_linkage = Joint(
+        SUB_PLATE,
+        ALIGNMENT_LINKAGE,
+        fixing_in(thread),
+        EAR_SCREW,
+        placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
+        grip_mm=SUB_PLATE_THICKNESS,
+        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
+        thread=thread,
+    )
     words = (
-        "The hub covers one of the lidar's screws, so the lidar came on a plate of its own: put this plate on the "
+        "The hub covers one of the lidar's screws, so the lidar is on a separate plate: put this plate on the "
         "linkage, FRONT over FRONT, and drive the screws of its ears from the lidar's side. "
         f"{screws(ALIGNMENT_LINKAGE)}"
     )
@@ -53,9 +63,9 @@ def sub_plate_spec(place: Placement) -> PartSpec | None:
         make=partial(sub_plate, scanner, place.stack, axis),
         step=Step("Lidar and sub-plate on the linkage", words, "the two plates meet without a gap"),
         angles="laser",
-        seat=place.linkage.seat,
+        seat=p.seat,
         lifted="lidar",
-        joints=(lidar_joint(place, SUB_PLATE, SUB_PLATE_THICKNESS), _ears_joint(place.linkage)),
+        joints=(lidar_joint(place, SUB_PLATE, SUB_PLATE_THICKNESS), on_linkage),
     )
 
 
@@ -75,20 +85,6 @@ def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
         thread_mm=lidar_thread_mm(lidar),
         slot_mm=slot,
         heel_mm=min(lidar.half_mm) if len(p.holes) == 2 else None,
-    )
-
-
-def _ears_joint(p: AlignmentLinkage) -> Joint:
-    thread = p.ear_thread
-    return Joint(
-        SUB_PLATE,
-        ALIGNMENT_LINKAGE,
-        fixing_in(thread),
-        EAR_SCREW,
-        placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
-        grip_mm=SUB_PLATE_THICKNESS,
-        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
-        thread=thread,
     )
 
 

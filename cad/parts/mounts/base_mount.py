@@ -43,8 +43,8 @@ from scanwright.design.left_out import LeftOut
 
 SERVO_STEP = Step(
     "Servo into the mount",
-    f"Put the case between the rails of the base mount, plugs to the channel behind it. {screws(SERVO_CASE)} "
-    "Connect the servo's cable now, and lay a cable tie into the slots of the foot where it leaves. "
+    f"Put the case between the rails of the base mount, plugs towards the channel behind it. {screws(SERVO_CASE)} "
+    "Connect the servo's cable now, and lay a cable tie into the slots of the foot at its exit. "
     f"{screws(DECK)}",
     check="the case does not rock on its four feet, nor the mount on the deck",
     brings=(SERVO,),
@@ -52,21 +52,17 @@ SERVO_STEP = Step(
 TOWER_STEP = Step(
     "Tower on the mount",
     "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
-    f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot where cables leave. {screws(DECK)}",
+    f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot at the exit of cables. {screws(DECK)}",
     check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
 )
 FRAME_STEP = Step(
     "Frame on the mount",
     f"Put the frame on the rails of the base mount. {screws(SERVO_FRAME)} Connect the servo's cable now, and lay a "
-    f"cable tie into the slots of the foot where it leaves. {screws(DECK)}",
+    f"cable tie into the slots of the foot at its exit. {screws(DECK)}",
     check="the frame does not rock on its four feet, nor the mount on the deck",
 )
 RAIL_HALF = 5.0  # of the mount's rails, at most
-OF_SERVO = (
-    "servo.case_min_mm",
-    "servo.case_max_mm",
-    "servo.holes",
-)
+OF_SERVO = ("servo.case_min_mm", "servo.case_max_mm", "servo.holes")
 RAIL_HALF_WIDTH = 4.0  # least
 FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
@@ -78,7 +74,7 @@ STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_S
 def mount_spec(place: Placement) -> PartSpec | LeftOut:
     """Return the mount of one scanner, or why the servo is screwed to the deck."""
     if place.deck.flat:
-        return LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts")
+        return LeftOut(BASE_MOUNT, "the axis is upright: the servo is screwed flat to the deck", 1, "parts")
     onto = place.drive.mounted.onto
     return PartSpec(
         name=BASE_MOUNT,

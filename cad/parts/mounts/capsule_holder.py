@@ -29,11 +29,11 @@ RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubi
 
 RING_STEP = Step(
     "Capsule into the tower",
-    "Lead the rotor's leads up the shaft and out by its windows, those of each cable by the one that the step "
+    "Pull the rotor's leads up the shaft and out of its windows, those of each cable through the one that the step "
     '"Leads between lidar and ring" names, if there is one, and slide the disc into the tower from below until the '
-    "soft tube sits in the shaft. "
+    "soft tube is in the shaft. "
     f"{screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
-    "turned by hand, the shaft takes the rotor along without slipping",
+    "turned by hand, the shaft turns the rotor without slipping",
 )
 
 
@@ -46,16 +46,14 @@ def holder_spec(place: Placement) -> PartSpec | None:
     screw, thickness = SCREWS[stack.flange.screw], stack.flange.thickness_mm
     words = (
         "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
-        f"{screws(RING_STATOR)} Leave them so loose that the flange still gives. Push 10 mm of soft tube, "
+        f"{screws(RING_STATOR)} Leave them so loose that the flange still moves. Push 10 mm of soft tube, "
         f"{stack.shaft_bore:g} x {stack.rotor.diameter_mm:g} mm, over the stub of the rotor."
     )
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
         make=partial(capsule_holder, stack, printer),
-        step=Step(
-            "Capsule on its disc", words, "the capsule can be shifted a little by hand, and its rotor turns freely"
-        ),
+        step=Step("Capsule on its disc", words, "the capsule moves a little by hand, and its rotor turns freely"),
         shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
         joints=(Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness),),
         rows=(Row("wiring", "soft tube", SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER), CRIMPS),

@@ -27,10 +27,10 @@ from scanwright.design.catalogue.products import Printer
 from scanwright.design.catalogue.servo import Servo
 
 AROUND_BOSS = 0.2  # of the horn
-SEATED_ON_RIM = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
+SEATED_ON_RIM = "the hub is on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
 LINKAGE_WORDS = (
-    "Lower the hub over the cup until it sits on its rim; the flat of the cup fits one way only, and the groove of the "
-    f"hub then stands above the groove of the cup. {screws(HORN_CUP)}"
+    "Lower the hub over the cup onto its rim; the flat of the cup fits in one position only, and the groove of the hub "
+    f"is then above the groove of the cup. {screws(HORN_CUP)}"
 )
 
 
@@ -47,7 +47,7 @@ def cup_spec(place: Placement) -> PartSpec | None:
         name=HORN_CUP,
         turns=True,
         make=partial(horn_cup, p, stack, scanner.servo, scanner.printer),
-        step=Step("Cup on the horn", words, "the index groove stands over the middle of the +Y face"),
+        step=Step("Cup on the horn", words, "the index groove is over the middle of the +Y face"),
         sheet=OnSheet((spigot_in_hub(stack.shaft_diameter, p.fit),)),
         shaped_by=HORN,
         joints=(on_horn(scanner.servo, stack, HORN_CUP),),

@@ -23,7 +23,7 @@ from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
 from scanwright.cad.solids import building
 
 SLIDES = 0.02  # in the inner ring: the lower end of g6
-BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills
+BOND = 0.03  # on the shaft, on the diameter: filled by retaining compound
 UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
 LEAST_HALF_WIDTH, BESIDE_LEADS = 5.0, 0.4  # of the channel, and on either side of the leads in it
 COMPOUND = "retaining compound for metal, medium strength"
@@ -37,8 +37,8 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         return None
     words = (
         f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
-        "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's way "
-        "out for the leads; lay the rotor's leads into the channel. Let it set."
+        "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's "
+        "channel for the leads; lay the rotor's leads into it. Let the compound set."
     )
     seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
     bore = ToleratedDiameter(stack.shaft_diameter + BOND, True, "±0.01", "bonded to the shaft")
@@ -49,17 +49,12 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         step=Step("Sleeve of the bearing", words, "the sleeve does not move by hand"),
         process="turned",
         material=TURNED_FROM,
-        why_metal=f"{stack.bearing.name} wants a round seat to g6",
+        why_metal=f"{stack.bearing.name} needs a round seat to g6",
         sheet=OnSheet((seat, bore), ("Bore and outside in one setting: runout 0.01.",)),
         shaped_by=("bearing.bore_mm", "bearing.width_mm", "slip_ring.bore_mm"),
         rows=(
             Row("consumable", "retaining ring", f"retaining ring DIN 471 - {stack.retaining_ring}", RETAINING),
-            Row(
-                "consumable",
-                "retaining compound",
-                COMPOUND,
-                "sleeve on the shaft",
-            ),
+            Row("consumable", "retaining compound", COMPOUND, "sleeve on the shaft"),
         ),
     )
 

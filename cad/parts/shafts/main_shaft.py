@@ -26,11 +26,11 @@ UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot
 WINDOW = 8.0  # diameter
 LINKAGE_WORDS = (
-    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
-    f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
-    "shaft in its loose pulley, until the groove of the hub stands over the groove in the edge of the tower's "
-    "top, and tighten the pulley's two grub screws. Both pulleys have the same number of teeth and turn the "
-    "same way, so from now on the servo's angle is that of the axis."
+    "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only. "
+    f"{screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the shaft in its "
+    "loose pulley, until the groove of the hub is over the groove in the edge of the tower's top, and tighten the "
+    "pulley's two grub screws. Both pulleys have the same number of teeth and turn in the same direction, so the "
+    "servo's angle is that of the axis."
 )
 
 
@@ -45,13 +45,17 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
         name=MAIN_SHAFT,
         turns=True,
         make=partial(main_shaft, stack),
-        step=Step("Shaft into the tower", words, "the shaft turns by a light finger and does not tilt"),
+        step=Step("Shaft into the tower", words, "the shaft turns with one finger and does not tilt"),
         process="turned",
         material=TURNED_FROM,
-        why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
+        why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm need its seats to f7 (-0.02 to -0.041)",
         sheet=OnSheet(
             (seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
-            (*cross_words(stack), _ring_words()),
+            (
+                *cross_words(stack),
+                f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads "
+                "pass.",
+            ),
         ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft, and the belt set", LINKAGE_WORDS, SEATED)},
@@ -76,8 +80,3 @@ def main_shaft(stack: BeltStack) -> cq.Solid:
         for azimuth in RING_SCREWS_DEG:
             cuts.append(solids.radial(RING_SCREW.core / 2, math.radians(azimuth), stack.ring_screws))
         return checked(body.cut(*cuts).clean())
-
-
-def _ring_words() -> str:
-    """Return the note of the sheet on the threads of `shaft_ring`."""
-    return f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads pass."

@@ -18,6 +18,7 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import solids
+from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
 from scanwright.cad.layout.belt.plate import pulley_foot_radius
 from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
@@ -30,15 +31,6 @@ from scanwright.cad.layout.joints import (
     round_wall_mm,
     screws,
 )
-from scanwright.cad.layout.names import (
-    BEARING_TOWER,
-    BELT,
-    DRIVE_PLATE,
-    DRIVE_PULLEY,
-    MAIN_SHAFT,
-    SERVO_OUTPUT,
-    SHAFT_PULLEY,
-)
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
 from scanwright.cad.parts.tolerances import OnSheet, no_wider
@@ -46,10 +38,10 @@ from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 
-CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
-MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
-GIVE_MM = 2.0  # of a strand, when the pre-load is felt
-OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
+CHORDS = 4  # of a groove's half circle: within 0.05 mm, below the resolution of a printer
+MOUTH = 0.25  # extra width of a groove at the tips, on each side
+GIVE_MM = 2.0  # movement of a strand in the test of its pre-load
+OFF_AXIS = "more clearance puts the pulley further off its axis than belt_angle of checks.json assumes"
 
 
 def shaft_pulley_spec(place: Placement) -> PartSpec | None:
@@ -58,23 +50,23 @@ def shaft_pulley_spec(place: Placement) -> PartSpec | None:
     if stack is None:
         return None
     words = (
-        "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and lay the belt "
+        "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and put the belt "
         f"around it: {stack.belt.name} of {stack.belt_teeth} teeth ({stack.belt_teeth * stack.belt.pitch_mm:g} mm). "
-        f"{screws(MAIN_SHAFT)} Leave these two loose."
+        f"{screws(names.MAIN_SHAFT)} Leave these two loose."
     )
     fit, grub = no_wider(stack.tube_diameter, printer.fit_clearance_mm, OFF_AXIS), _grub_thread(printer)
     azimuths = (math.radians(azimuth) for azimuth in GRUBS_DEG)
     return PartSpec(
-        name=SHAFT_PULLEY,
+        name=names.SHAFT_PULLEY,
         turns=True,
         make=partial(shaft_pulley, stack, printer),
-        step=Step("Pulley and belt on the shaft", words, "the belt lies between both rims", (BELT,)),
+        step=Step("Pulley and belt on the shaft", words, "the belt is between both rims", (names.BELT,)),
         sheet=OnSheet((fit,), (_teeth_words(stack),)),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
         joints=(
             Joint(
-                SHAFT_PULLEY,
-                MAIN_SHAFT,
+                names.SHAFT_PULLEY,
+                names.MAIN_SHAFT,
                 "grub",
                 GRUB,
                 inward_axes(azimuths, stack.boss_radius, stack.pulley_top - BOSS / 2),
@@ -100,19 +92,20 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
     scanner, stack = place.scanner, place.drive.of(BeltStack)
     if stack is None:
         return None
-    horn = horn_joint(scanner.servo, DRIVE_PULLEY, SERVO_OUTPUT, stack.pulley_seat, stack.pulley_seat - stack.horn)
+    seat, grip = stack.pulley_seat, stack.pulley_seat - stack.horn
+    horn = horn_joint(scanner.servo, names.DRIVE_PULLEY, names.SERVO_OUTPUT, seat, grip)
     push = press_newton(stack, PRELOAD_N, GIVE_MM)
     words = (
-        f"The boss of the horn centres the pulley. {screws(SERVO_OUTPUT)} Hang the servo between the arms of the "
-        "tower, lay the belt around both pulleys, and put in the screws of the slots: "
-        f"{screws(BEARING_TOWER, DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the middle of a "
+        f"The boss of the horn centres the pulley. {screws(names.SERVO_OUTPUT)} Hang the servo between the arms of the "
+        "tower, put the belt around both pulleys, and insert the screws of the slots: "
+        f"{screws(names.BEARING_TOWER, names.DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the middle of a "
         f"strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
-        f"{stack.centre:g} mm apart; the slots give {TRAVEL:g} mm to either side."
+        f"{stack.centre:g} mm apart; the slots allow {TRAVEL:g} mm to either side."
     )
     pocket = stack.servo.horn_boss_diameter_mm
     fits = (no_wider(pocket, scanner.printer.fit_clearance_mm, OFF_AXIS),) if pocket > 0 else ()
     return PartSpec(
-        name=DRIVE_PULLEY,
+        name=names.DRIVE_PULLEY,
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer),
         step=Step("Drive pulley, and the servo beside the shaft", words, "the belt runs a turn in its rims"),
@@ -126,10 +119,10 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
 def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the pulley on the shaft."""
     bore, grub = _bore(stack, printer), _grub_thread(printer)
-    with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
+    with building(names.SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
         boss = solids.upright(stack.boss_radius, stack.teeth_top - 0.5, stack.pulley_top)
         body = checked(_toothed(stack, None, boss))
-    with building(SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter) as checked:
+    with building(names.SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter) as checked:
         cuts = [solids.upright(bore, stack.teeth_low - 1.0, stack.pulley_top + 1.0)]
         for azimuth in GRUBS_DEG:
             cuts.append(solids.radial(grub.hole / 2, math.radians(azimuth), stack.pulley_top - BOSS / 2))
@@ -140,10 +133,10 @@ def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the pulley on the horn."""
     servo, horn, top = stack.servo, stack.horn, stack.teeth_top + 1.0
     screw, boss = SCREWS[servo.horn_screw], servo.horn_boss_diameter_mm / 2
-    with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
+    with building(names.DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
         foot = solids.upright(pulley_foot_radius(servo), horn, stack.teeth_low + 0.5)
         body = checked(_toothed(stack, foot, None))
-    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", servo.horn_circle_mm) as checked:
+    with building(names.DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", servo.horn_circle_mm) as checked:
         cuts = []
         for x, y in horn_centres(servo).tolist():
             cuts.append(solids.upright(passing_hole(screw, printer) / 2, horn - 1.0, top, x, y))
@@ -160,7 +153,7 @@ def drive_envelope(stack: BeltStack) -> cq.Solid:
     rim, tip = stack.rim_radius, stack.tip_radius
     low, high = stack.teeth_low, stack.teeth_top
     foot = solids.upright(pulley_foot_radius(stack.servo), stack.horn, low + 0.5)
-    with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
+    with building(names.DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
         envelope = foot.fuse(
             solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)
         )

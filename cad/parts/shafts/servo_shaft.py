@@ -32,8 +32,8 @@ OF_RING = tuple(
     f"slip_ring.{field}" for field in ("bore_mm", "length_mm", "rotor", "lead_diameter_mm", "lead_bend_radius_mm")
 )
 LINKAGE_ON_SHAFT = (
-    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way only, "
-    f"and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
+    "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only, and the groove of "
+    f"the hub is then above the groove of the flange. {screws(SERVO_SHAFT)}"
 )
 
 
@@ -50,7 +50,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
         f"{screws(SERVO_HORN)}"
     )
-    check = "the index groove stands over the middle of the +Y face"
+    check = "the index groove is over the middle of the +Y face"
     rows: tuple[Row, ...] = ()
     if stack.bearing is not None:
         words += (
@@ -142,8 +142,8 @@ def _waist_words(stack: DirectStack) -> tuple[str, ...]:
     bottom, width = GROOVES[stack.retaining_ring]
     in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_diameter:.2f}"
     return (
-        f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}, nothing else bends enough "
-        "and yields late enough. No other metal.",
+        f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}. No other metal is flexible "
+        "and strong enough.",
         f"Groove \u00d8{bottom:g} 0/-0.1, {width:g} +0.14/0 wide, for DIN 471 - {stack.retaining_ring}.",
         "Flange face square to the spigot and spigot true to it, one setting: 0.02.",
     )

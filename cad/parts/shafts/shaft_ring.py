@@ -32,8 +32,8 @@ def shaft_ring_spec(place: Placement) -> PartSpec | None:
     azimuths = (math.radians(azimuth) for azimuth in RING_SCREWS_DEG)
     words = (
         "From below push the ring up the shaft, its step against the lower bearing and its holes over the threads, so "
-        f"that the shaft has no play along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a driver "
-        "pass the round window in the tower: turn the shaft until the holes show."
+        f"that the shaft has no clearance along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a "
+        "driver pass the round window in the tower: turn the shaft until the holes are visible."
     )
     return PartSpec(
         name=SHAFT_RING,
