@@ -48,17 +48,11 @@ INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts 
 
 @dataclass(frozen=True, slots=True)
 class Trap:
-    """Pocket for a hexagon nut in a part, and the hole through it.
+    """Pocket for a hexagon nut in a part, and the hole through it."""
 
-    Attributes:
-        hole: diameter, with half of a screw's clearance.
-        across: across the flats of the pocket.
-        depth: of a pocket, thickness of a slot.
-    """
-
-    hole: float
-    across: float
-    depth: float
+    hole: float  # diameter, with half of a screw's clearance
+    across: float  # across the flats of the pocket
+    depth: float  # of a pocket, thickness of a slot
 
     @property
     def corner(self) -> float:
@@ -83,17 +77,11 @@ def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | 
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """Thread of a screw in a printed part: cut, an insert, or a nut in a pocket.
+    """Thread of a screw in a printed part: cut, an insert, or a nut in a pocket."""
 
-    Attributes:
-        hole: diameter.
-        trap: pocket of the nut, if there is one.
-        insert: whether it is an insert.
-    """
-
-    hole: float
-    trap: Trap | None
-    insert: bool
+    hole: float  # diameter
+    trap: Trap | None  # pocket of the nut, if there is one
+    insert: bool  # whether it is an insert
 
 
 def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True, carries: bool = False) -> Thread:

@@ -17,21 +17,13 @@ from scanwright.cad.parts.part_spec import Colour, PartSpec
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """Solids by name, rotation frame, mm.
+    """Solids by name, rotation frame, mm."""
 
-    Attributes:
-        layout: the numbers that they were made from.
-        parts: what is known of the made ones.
-        bodies: what is known of the bought ones.
-        made: parts of this project.
-        bought: bodies of bought products.
-    """
-
-    layout: Layout
-    parts: dict[str, PartSpec]
-    bodies: dict[str, BodySpec]
-    made: dict[str, cq.Solid]
-    bought: dict[str, cq.Solid]
+    layout: Layout  # the numbers that they were made from
+    parts: dict[str, PartSpec]  # what is known of the made ones
+    bodies: dict[str, BodySpec]  # what is known of the bought ones
+    made: dict[str, cq.Solid]  # parts of this project
+    bought: dict[str, cq.Solid]  # bodies of bought products
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
     _inertials: dict[str, Inertial] = field(default_factory=dict, init=False, repr=False, compare=False)

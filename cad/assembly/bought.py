@@ -37,28 +37,17 @@ Frame = Literal["servo", "rot", "laser"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodySpec:
-    """One body of a bought product.
+    """One body of a bought product."""
 
-    Attributes:
-        name: unique in the scanner.
-        product: that it belongs to, of `cad/layout/names.py`.
-        frame: that it moves with.
-        colour: sRGB.
-        make: its solid, rotation frame.
-        meets: moving body that it may touch: the other half of a ring, or a driven part.
-        clear: whether beams pass it.
-        from_below: whether it is inserted from below, if its product is used twice.
-        chords: tolerance of the mesh [mm], and angle between its facets [rad].
-    """
-
-    name: str
-    product: str
-    frame: Frame
-    colour: Colour
-    make: Callable[[], cq.Solid]
-    meets: str = ""
-    clear: bool = False
-    from_below: bool = False
+    name: str  # unique in the scanner
+    product: str  # that it belongs to, of `cad/layout/names.py`
+    frame: Frame  # that it moves with
+    colour: Colour  # sRGB
+    make: Callable[[], cq.Solid]  # its solid, rotation frame
+    meets: str = ""  # moving body that it may touch: the other half of a ring, or a driven part
+    clear: bool = False  # whether beams pass it
+    from_below: bool = False  # whether it is inserted from below, if its product is used twice
+    # tolerance of the mesh [mm], and angle between its facets [rad]
     chords: tuple[float, float] = (CHORD_ERROR, CHORD_ANGLE)
 
     @property

@@ -22,27 +22,17 @@ from scanwright.design.arrays import Rotation, Vector
 
 @dataclass(frozen=True, slots=True)
 class StepScene:
-    """One step.
+    """One step."""
 
-    Attributes:
-        thing: part or product that it adds.
-        step: its text.
-        joints: that it closes, each with its mark in the text; an empty mark if the text has none.
-        there: present bodies, in alphabetical order.
-        comes: new bodies.
-        against: those of them that come from the opposite side.
-        along: unit vector, rotation frame, from which they come; 0 for cables, which are shown in place.
-        R_rot_picture: the frame that is upright in the picture: the lidar's, or the rotation frame.
-    """
-
-    thing: str
-    step: Step
+    thing: str  # part or product that it adds
+    step: Step  # its text
+    # that it closes, each with its mark in the text; an empty mark if the text has none
     joints: tuple[tuple[Joint, str], ...]
-    there: tuple[str, ...]
-    comes: tuple[str, ...]
-    against: tuple[str, ...]
-    along: Vector
-    R_rot_picture: Rotation
+    there: tuple[str, ...]  # present bodies, in alphabetical order
+    comes: tuple[str, ...]  # new bodies
+    against: tuple[str, ...]  # those of them that come from the opposite side
+    along: Vector  # unit vector, rotation frame, from which they come; 0 for cables, which are shown in place
+    R_rot_picture: Rotation  # the frame that is upright in the picture: the lidar's, or the rotation frame
 
 
 def scenes_of(assembly: Assembly, joints: Sequence[Joint]) -> list[StepScene]:

@@ -52,19 +52,12 @@ def printing_checks(
 
 @dataclass(frozen=True, slots=True)
 class ThinWalls:
-    """Parallel walls thinner than a least thickness.
+    """Parallel walls thinner than a least thickness."""
 
-    Attributes:
-        area_mm2: of both of their sides.
-        surface_mm2: of the whole part.
-        thinnest_mm: least thickness; inf if no wall is thin.
-        at: middle of the wall there, shape (3,); NaN if no wall is thin.
-    """
-
-    area_mm2: float
-    surface_mm2: float
-    thinnest_mm: float
-    at: Array
+    area_mm2: float  # of both of their sides
+    surface_mm2: float  # of the whole part
+    thinnest_mm: float  # least thickness; inf if no wall is thin
+    at: Array  # middle of the wall there, shape (3,); NaN if no wall is thin
 
 
 def thin_walls(mesh: TriMesh, least_mm: float) -> ThinWalls:

@@ -17,21 +17,14 @@ IN_LINE_MM = 0.01  # between the axes of two holes, or of a hole and its screw
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Equal parallel holes, or slots.
+    """Equal parallel holes, or slots."""
 
-    Attributes:
-        holes: all of one diameter, direction and height along it; of slots their width, in their middles.
-        circle: diameter of the circle that they share at equal steps; 0 if none.
-        heads: diameter of the recesses of their screws' heads; 0 if none.
-        holds: text of their thread; empty if none.
-        slot: length of slots; 0 if none.
-    """
-
+    # all of one diameter, direction and height along it; of slots their width, in their middles
     holes: tuple[Round, ...]
-    circle: float
-    heads: float = 0.0
-    holds: str = ""
-    slot: float = 0.0
+    circle: float  # diameter of the circle that they share at equal steps; 0 if none
+    heads: float = 0.0  # diameter of the recesses of their screws' heads; 0 if none
+    holds: str = ""  # text of their thread; empty if none
+    slot: float = 0.0  # length of slots; 0 if none
 
     @property
     def direction(self) -> Array:

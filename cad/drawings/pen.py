@@ -49,19 +49,12 @@ def document_at(scale: float) -> Drawing:
 
 @dataclass(frozen=True, slots=True)
 class Pen:
-    """Draws about an origin and records the extent.
+    """Draws about an origin and records the extent."""
 
-    Attributes:
-        space: to draw on; None to measure only.
-        scale: paper over model.
-        origin: on the paper.
-        reached: corners of what was drawn, about the origin.
-    """
-
-    space: BaseLayout | None
-    scale: float
-    origin: Point = (0.0, 0.0)
-    reached: list[Point] = field(default_factory=list)
+    space: BaseLayout | None  # to draw on; None to measure only
+    scale: float  # paper over model
+    origin: Point = (0.0, 0.0)  # on the paper
+    reached: list[Point] = field(default_factory=list)  # corners of what was drawn, about the origin
 
     def box(self) -> tuple[float, float, float, float]:
         """Return left, bottom, right and top of what was drawn, about the origin."""

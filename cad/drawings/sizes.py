@@ -34,23 +34,14 @@ CENTRE_GAP_MM = 3.0  # between the optical centre and its name
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Sizes of a view, about its origin, model mm.
+    """Sizes of a view, about its origin, model mm."""
 
-    Attributes:
-        box: left, bottom, right and top of its lines.
-        below: horizontal positions, and the height of their features.
-        heights: vertical positions, and the place of their features across them.
-        callouts: diameters, holes and slots.
-        holes: middle and half of the size of each cross.
-        circles: middle and radius of circles through holes.
-    """
-
-    box: tuple[float, float, float, float]
-    below: dict[float, float]
-    heights: dict[float, float]
-    callouts: list[Callout]
-    holes: list[tuple[Point, float]]
-    circles: list[tuple[Point, float]]
+    box: tuple[float, float, float, float]  # left, bottom, right and top of its lines
+    below: dict[float, float]  # horizontal positions, and the height of their features
+    heights: dict[float, float]  # vertical positions, and the place of their features across them
+    callouts: list[Callout]  # diameters, holes and slots
+    holes: list[tuple[Point, float]]  # middle and half of the size of each cross
+    circles: list[tuple[Point, float]]  # middle and radius of circles through holes
 
 
 def sizes_of(view: View, part: Part) -> Sizes:

@@ -24,25 +24,15 @@ Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A view of a part.
+    """A view of a part."""
 
-    Attributes:
-        title: above the view.
-        right: unit vector to the right, in the rotation frame.
-        up: unit vector upwards.
-        origin: point whose projection is 0 of the ordinates.
-        curves: lines of the part, model mm.
-        kind: front and top have ordinates of planes too, angle, section and iso none.
-        hatching: lines over cut faces.
-    """
-
-    title: str
-    right: Array
-    up: Array
-    origin: Array
-    curves: list[Curve]
-    kind: str
-    hatching: tuple[Line, ...] = ()
+    title: str  # above the view
+    right: Array  # unit vector to the right, in the rotation frame
+    up: Array  # unit vector upwards
+    origin: Array  # point whose projection is 0 of the ordinates
+    curves: list[Curve]  # lines of the part, model mm
+    kind: str  # front and top have ordinates of planes too, angle, section and iso none
+    hatching: tuple[Line, ...] = ()  # lines over cut faces
 
     @property
     def towards(self) -> Array:

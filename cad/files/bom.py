@@ -39,43 +39,24 @@ WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports an
 
 @dataclass(frozen=True, slots=True)
 class BomItem:
-    """One row; all fields except `estimate` are columns. Empty texts and None are unknown.
+    """One row; all fields except `estimate` are columns. Empty texts and None are unknown."""
 
-    Attributes:
-        kind: printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total.
-        part: name, or type of product.
-        number: drawing number of a made part, designation of a standard part.
-        quantity: pieces.
-        supplier: maker.
-        supplier_number: order number.
-        unit_usd: price of one.
-        total_usd: price of all.
-        low_usd: least price of all: from the price, or an estimate.
-        high_usd: largest price of all.
-        priced: year of the price.
-        mass_g: of one.
-        source: of the price, or of the row.
-        verified: whether the price is verified; empty if there is none.
-        note: for the buyer.
-        estimate: name in `prices.EACH_USD`; empty if there is none.
-    """
-
-    kind: str
-    part: str
-    number: str = ""
-    quantity: int | None = 1
-    supplier: str = ""
-    supplier_number: str = ""
-    unit_usd: float | None = None
-    total_usd: float | None = None
-    low_usd: float | None = None
-    high_usd: float | None = None
-    priced: str = ""
-    mass_g: float | None = None
-    source: str = ""
-    verified: str = ""
-    note: str = ""
-    estimate: str = ""
+    kind: str  # printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total
+    part: str  # name, or type of product
+    number: str = ""  # drawing number of a made part, designation of a standard part
+    quantity: int | None = 1  # pieces
+    supplier: str = ""  # maker
+    supplier_number: str = ""  # order number
+    unit_usd: float | None = None  # price of one
+    total_usd: float | None = None  # price of all
+    low_usd: float | None = None  # least price of all: from the price, or an estimate
+    high_usd: float | None = None  # largest price of all
+    priced: str = ""  # year of the price
+    mass_g: float | None = None  # of one
+    source: str = ""  # of the price, or of the row
+    verified: str = ""  # whether the price is verified; empty if there is none
+    note: str = ""  # for the buyer
+    estimate: str = ""  # name in `prices.EACH_USD`; empty if there is none
 
 
 COLUMNS = [field.name for field in fields(BomItem)][:-1]

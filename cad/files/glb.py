@@ -30,23 +30,14 @@ Surface = tuple[Array, Array, NDArray[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One frame or body of the scene.
+    """One frame or body of the scene."""
 
-    Attributes:
-        name: unique.
-        parent: name of its parent node; empty for the root.
-        T_parent_node: its pose [m], shape (4, 4).
-        mesh: in the frame of the node [mm]; None for a bare frame.
-        colour: sRGB, 0 to 1.
-        metal: whether the surface is bare metal.
-    """
-
-    name: str
-    parent: str
-    T_parent_node: Array
-    mesh: TriMesh | None = None
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    metal: bool = False
+    name: str  # unique
+    parent: str  # name of its parent node; empty for the root
+    T_parent_node: Array  # its pose [m], shape (4, 4)
+    mesh: TriMesh | None = None  # in the frame of the node [mm]; None for a bare frame
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)  # sRGB, 0 to 1
+    metal: bool = False  # whether the surface is bare metal
 
 
 def glb_bytes(

@@ -35,23 +35,14 @@ class PartReport:
 
 @dataclass(frozen=True, slots=True)
 class PartsResult:
-    """Results of `build_parts`.
+    """Results of `build_parts`."""
 
-    Attributes:
-        assembly: the solids.
-        meshes: canonical mesh of each made part, with its label.
-        parts: properties of each made part.
-        findings: remarks for a person.
-        left_out: parts that this scanner does not need.
-        files: relative to the build folder.
-    """
-
-    assembly: Assembly
-    meshes: dict[str, TriMesh]
-    parts: tuple[PartReport, ...]
-    findings: tuple[Finding, ...]
-    left_out: tuple[LeftOut, ...]
-    files: tuple[str, ...]
+    assembly: Assembly  # the solids
+    meshes: dict[str, TriMesh]  # canonical mesh of each made part, with its label
+    parts: tuple[PartReport, ...]  # properties of each made part
+    findings: tuple[Finding, ...]  # remarks for a person
+    left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    files: tuple[str, ...]  # relative to the build folder
 
     def masses_g(self) -> dict[str, float]:
         """Return the masses of the made parts by name."""

@@ -20,23 +20,14 @@ SAME = 1e-3  # mm, and for directions
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """A hole, or a boss, of one diameter.
+    """A hole, or a boss, of one diameter."""
 
-    Attributes:
-        diameter: of the cylinder.
-        direction: unit vector along the axis; its largest component is positive.
-        low: end of the axis where `direction` starts.
-        high: the other end.
-        hole: whether the material is outside.
-        through: whether both ends of a hole are open.
-    """
-
-    diameter: float
-    direction: tuple[float, float, float]
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
-    hole: bool
-    through: bool
+    diameter: float  # of the cylinder
+    direction: tuple[float, float, float]  # unit vector along the axis; its largest component is positive
+    low: tuple[float, float, float]  # end of the axis where `direction` starts
+    high: tuple[float, float, float]  # the other end
+    hole: bool  # whether the material is outside
+    through: bool  # whether both ends of a hole are open
 
     @property
     def length(self) -> float:

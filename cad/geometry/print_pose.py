@@ -25,23 +25,14 @@ SUPPORT_STEP_MM3 = 1000.0  # poses closer than this print alike
 
 @dataclass(frozen=True, slots=True)
 class PrintPose:
-    """One part on the bed.
+    """One part on the bed."""
 
-    Attributes:
-        T_bed_part: maps the part's frame to the bed's: origin in a corner of the bed, z up, shape (4, 4).
-        size_mm: box of the part on the bed.
-        contact_mm2: area that lies on the bed.
-        overhang_mm2: area of the faces that need support.
-        support_mm3: volume of the columns under them.
-        fits: whether the box fits the bed.
-    """
-
-    T_bed_part: Array
-    size_mm: tuple[float, float, float]
-    contact_mm2: float
-    overhang_mm2: float
-    support_mm3: float
-    fits: bool
+    T_bed_part: Array  # maps the part's frame to the bed's: origin in a corner of the bed, z up, shape (4, 4)
+    size_mm: tuple[float, float, float]  # box of the part on the bed
+    contact_mm2: float  # area that lies on the bed
+    overhang_mm2: float  # area of the faces that need support
+    support_mm3: float  # volume of the columns under them
+    fits: bool  # whether the box fits the bed
 
 
 def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:

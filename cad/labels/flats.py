@@ -15,19 +15,12 @@ HAIRLINE = 2e-3  # between the triangles of a face
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """A planar face.
+    """A planar face."""
 
-    Attributes:
-        face: of the kernel.
-        frame: its axes as columns, the outward normal the last, the first along its longest straight edge.
-        origin: a point in its plane.
-        outline: of the face along the first two axes, about the origin.
-    """
-
-    face: cq.Face
-    frame: Array
-    origin: Array
-    outline: shapely.Polygon
+    face: cq.Face  # of the kernel
+    frame: Array  # its axes as columns, the outward normal the last, the first along its longest straight edge
+    origin: Array  # a point in its plane
+    outline: shapely.Polygon  # of the face along the first two axes, about the origin
 
     def at(self, points: Array) -> Array:
         """Return points of the plane, shape (n, 2), in the rotation frame, shape (n, 3)."""

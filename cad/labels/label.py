@@ -47,17 +47,11 @@ TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (0, 
 
 @dataclass(slots=True)
 class Labelled:
-    """The labels of one scanner.
+    """The labels of one scanner."""
 
-    Attributes:
-        parts: with their labels, by name.
-        meshes: of these.
-        left_out: labels that did not fit.
-    """
-
-    parts: dict[str, cq.Solid] = field(default_factory=dict)
-    meshes: dict[str, TriMesh] = field(default_factory=dict)
-    left_out: list[LeftOut] = field(default_factory=list)
+    parts: dict[str, cq.Solid] = field(default_factory=dict)  # with their labels, by name
+    meshes: dict[str, TriMesh] = field(default_factory=dict)  # of these
+    left_out: list[LeftOut] = field(default_factory=list)  # labels that did not fit
 
 
 FRONT = Lettering(("FRONT",), HEIGHTS[0])
@@ -65,21 +59,13 @@ FRONT = Lettering(("FRONT",), HEIGHTS[0])
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A part to label.
+    """A part to label."""
 
-    Attributes:
-        flats: possible faces, the largest first.
-        piercing: of the part.
-        groove: of the lettering.
-        wall: least wall behind it.
-        front: place of the word FRONT, if the part has it.
-    """
-
-    flats: Sequence[Flat]
-    piercing: Piercing
-    groove: Groove
-    wall: float
-    front: Place | None
+    flats: Sequence[Flat]  # possible faces, the largest first
+    piercing: Piercing  # of the part
+    groove: Groove  # of the lettering
+    wall: float  # least wall behind it
+    front: Place | None  # place of the word FRONT, if the part has it
 
     def room(self, flat: Flat) -> shapely.Polygon:
         """Return the part of a face that the middle lines of strokes may use."""

@@ -58,31 +58,19 @@ class Rod:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
-    """A part or a bought product, and its place in the stack from the deck to the linkage.
+    """A part or a bought product, and its place in the stack from the deck to the linkage."""
 
-    Attributes:
-        name: of the part, or of the product.
-        body: that it moves with; for a ring or a bearing that of the outer half.
-        z_mm: heights of its lower and upper end.
-        radius_mm: of the cylinder or the box around it, from its own axis.
-        product: if it is bought.
-        box: homogeneous box with the product's mass.
-        turning: share of that mass that turns about the axis.
-        shape: simple body of a fixed product, for the URDF.
-        place: which one it is, if there are two; the lower one is inserted from below.
-        order: order name, if that is not the name of the product.
-    """
-
-    name: str
-    body: Body
-    z_mm: tuple[float, float]
-    radius_mm: float
-    product: Servo | SlipRing | Bearing | Belt | None = None
-    box: Cuboid | None = None
-    turning: float = 0.0
-    shape: Cuboid | Rod | None = None
+    name: str  # of the part, or of the product
+    body: Body  # that it moves with; for a ring or a bearing that of the outer half
+    z_mm: tuple[float, float]  # heights of its lower and upper end
+    radius_mm: float  # of the cylinder or the box around it, from its own axis
+    product: Servo | SlipRing | Bearing | Belt | None = None  # if it is bought
+    box: Cuboid | None = None  # homogeneous box with the product's mass
+    turning: float = 0.0  # share of that mass that turns about the axis
+    shape: Cuboid | Rod | None = None  # simple body of a fixed product, for the URDF
+    # which one it is, if there are two; the lower one is inserted from below
     place: Literal["", "_upper", "_lower"] = ""
-    order: str = ""
+    order: str = ""  # order name, if that is not the name of the product
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,33 +108,20 @@ def plate_half_x(servo: Servo) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Mounted:
-    """Load of a base mount: the servo's case or frame, or a tower, above the mount's rails.
+    """Load of a base mount: the servo's case or frame, or a tower, above the mount's rails."""
 
-    Attributes:
-        onto: body that its screws end in.
-        rear: height of its face towards the mount.
-        ears: height of the faces around its holes.
-        screw: through the mount into them.
-        holes: x and y of the four.
-        fixing: of the screws: a nut behind the holes, or their thread.
-        corners: of boxes around all that does not turn, shape (n, 3).
-        discs: radius and height of other circles about the axis that must stay clear of the deck.
-        on_flat_deck: whether it may be screwed to a flat deck without a mount if the axis is upright.
-        thread_mm: of thread, or of material before the nut, behind its holes.
-        thread: of a printed one.
-    """
-
-    onto: str
-    rear: float
-    ears: float
-    screw: Screw
-    holes: tuple[tuple[float, float], ...]
-    fixing: Fixing
-    corners: Array
+    onto: str  # body that its screws end in
+    rear: float  # height of its face towards the mount
+    ears: float  # height of the faces around its holes
+    screw: Screw  # through the mount into them
+    holes: tuple[tuple[float, float], ...]  # x and y of the four
+    fixing: Fixing  # of the screws: a nut behind the holes, or their thread
+    corners: Array  # of boxes around all that does not turn, shape (n, 3)
+    # radius and height of other circles about the axis that must stay clear of the deck
     discs: tuple[tuple[float, float], ...]
-    on_flat_deck: bool
-    thread_mm: float
-    thread: Thread | None = None
+    on_flat_deck: bool  # whether it may be screwed to a flat deck without a mount if the axis is upright
+    thread_mm: float  # of thread, or of material before the nut, behind its holes
+    thread: Thread | None = None  # of a printed one
 
 
 LeadExit = tuple[TieSeat | None, tuple[tuple[Array, Array], ...]]
@@ -155,83 +130,51 @@ LeadExit = tuple[TieSeat | None, tuple[tuple[Array, Array], ...]]
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Leads of the ring's rotor, one for each cable of the lidar.
+    """Leads of the ring's rotor, one for each cable of the lidar."""
 
-    Attributes:
-        number: of this one.
-        count: of all.
-        half: radius of one.
-        radius: least bend radius.
-    """
-
-    number: int
-    count: int
-    half: float
-    radius: float
+    number: int  # of this one
+    count: int  # of all
+    half: float  # radius of one
+    radius: float  # least bend radius
 
 
 @dataclass(frozen=True, slots=True)
 class StatorExit:
-    """Exit of the leads of the ring's stator at its end, along -z.
+    """Exit of the leads of the ring's stator at its end, along -z."""
 
-    Attributes:
-        start: shape (3,).
-        inside: their length inside of the parts around the ring.
-        stiff: whether they are straight there.
-    """
-
-    start: Array
-    inside: float
-    stiff: bool
+    start: Array  # shape (3,)
+    inside: float  # their length inside of the parts around the ring
+    stiff: bool  # whether they are straight there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLayout:
-    """One layout of one scanner below its hub.
+    """One layout of one scanner below its hub."""
 
-    Attributes:
-        envelope: of the lidar.
-        stack: every number along the axis.
-        stations: from the deck to the linkage, the order of the exploded view.
-        records: numbers of its parts, a record for each kind of part.
-        shaft: the part that carries the linkage.
-        bend: of the shaft at the hub.
-        gives: the same with the compliance of the servo's horn or the bearings' seats.
-        mounted: load of the base mount.
-        servo_pose: of the servo's frame in the rotation frame: rotation (3, 3) and origin (3,), on the horn's face.
-        floor: height of all below the rotor that does not turn, or is as wide.
-        ceiling: height below all that turns.
-        lead_exits: exits for the leads of the ring's rotor, the best first, by the tie of the hub and the azimuth
-            between the cross screws.
-        leads_leave: the exit as text.
-        tied_to: part that they are tied to without a tie of the hub.
-        no_hub_tie: why the hub has no seat for a tie; empty if it may have one.
-        stator_exit: of the leads of the ring's stator, if the catalogue states it.
-        bears: whether the servo bears a counterweight of a mass [g] at a height in addition to the rotor.
-        built: parts and products in assembly order; other parts state which one they follow.
-        left_out: parts that this scanner does not need.
-        borne: parts that another one fixes along the axis without a screw, by a bearing or a retaining ring.
-    """
-
-    envelope: Envelope
-    stack: Hub
-    stations: tuple[Station, ...]
-    records: tuple[object, ...]
-    shaft: str
-    bend: ShaftBend
-    gives: ShaftBend
-    mounted: Mounted
+    envelope: Envelope  # of the lidar
+    stack: Hub  # every number along the axis
+    stations: tuple[Station, ...]  # from the deck to the linkage, the order of the exploded view
+    records: tuple[object, ...]  # numbers of its parts, a record for each kind of part
+    shaft: str  # the part that carries the linkage
+    bend: ShaftBend  # of the shaft at the hub
+    gives: ShaftBend  # the same with the compliance of the servo's horn or the bearings' seats
+    mounted: Mounted  # load of the base mount
+    # of the servo's frame in the rotation frame: rotation (3, 3) and origin (3,), on the horn's face
     servo_pose: tuple[Array, Array]
-    floor: float
-    ceiling: float
+    floor: float  # height of all below the rotor that does not turn, or is as wide
+    ceiling: float  # height below all that turns
+    # exits for the leads of the ring's rotor, the best first, by the tie of the hub and the azimuth between the cross
+    # screws
     lead_exits: Callable[[Bundle, TieSeat | None, float], Iterator[LeadExit]]
-    leads_leave: str
-    tied_to: Literal["shaft", "neck"]
-    no_hub_tie: str
-    stator_exit: StatorExit | None
+    leads_leave: str  # the exit as text
+    tied_to: Literal["shaft", "neck"]  # part that they are tied to without a tie of the hub
+    no_hub_tie: str  # why the hub has no seat for a tie; empty if it may have one
+    stator_exit: StatorExit | None  # of the leads of the ring's stator, if the catalogue states it
+    # whether the servo bears a counterweight of a mass [g] at a height in addition to the rotor
     bears: Callable[[float, float], bool]
-    built: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
+    built: tuple[str, ...]  # parts and products in assembly order; other parts state which one they follow
+    left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    # parts that another one fixes along the axis without a screw, by a bearing or a retaining ring
     borne: tuple[tuple[str, str], ...] = ()
 
     def of(self, kind: type[Record]) -> Record | None:

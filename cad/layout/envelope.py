@@ -36,17 +36,11 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """A lidar with gaps as boxes (low corner, high corner) in the laser frame.
+    """A lidar with gaps as boxes (low corner, high corner) in the laser frame."""
 
-    Attributes:
-        lidar: the product.
-        body: its body.
-        cables: their straight pieces.
-    """
-
-    lidar: Lidar
-    body: Box
-    cables: tuple[Box, ...]
+    lidar: Lidar  # the product
+    body: Box  # its body
+    cables: tuple[Box, ...]  # their straight pieces
 
     def plate(self, sub_plate: Axis | None) -> Box:
         """Return the plate of the linkage, with a sub-plate if there is one."""

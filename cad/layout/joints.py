@@ -49,35 +49,23 @@ class ScrewAxis:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """Equal screws between two bodies.
+    """Equal screws between two bodies."""
 
-    Attributes:
-        part: that the screws go through, or are in if they are grub screws.
-        onto: the body that they fix it to; a deck is that of the robot.
-        fixing: kind of thread: in the body itself, a nut in a pocket of the body, a nut, a nut under the deck, or in
-            the part (grub screws).
-        screw: the size.
-        axes: of each screw.
-        grip_mm: length of the shank before its thread engages.
-        thread_mm: of thread, or of material before the nut.
-        thread: in a printed part; None for another body, or a nut.
-        slot_mm: width and length of slots; None for holes.
-        protrudes_mm: length outside of `part` of screws that belong to it; None if they are bought by length.
-        washer_mm: diameter of the washers under their heads; None without washers.
-        heel_mm: from a single screw, or the line of a pair, to the edge over which the part tips; None for others.
-    """
-
-    part: str
-    onto: str
+    part: str  # that the screws go through, or are in if they are grub screws
+    onto: str  # the body that they fix it to; a deck is that of the robot
+    # kind of thread: in the body itself, a nut in a pocket of the body, a nut, a nut under the deck, or in the part
+    # (grub screws)
     fixing: Fixing
-    screw: Screw
-    axes: tuple[ScrewAxis, ...]
-    grip_mm: float
-    thread_mm: float
-    thread: Thread | None = None
-    slot_mm: tuple[float, float] | None = None
+    screw: Screw  # the size
+    axes: tuple[ScrewAxis, ...]  # of each screw
+    grip_mm: float  # length of the shank before its thread engages
+    thread_mm: float  # of thread, or of material before the nut
+    thread: Thread | None = None  # in a printed part; None for another body, or a nut
+    slot_mm: tuple[float, float] | None = None  # width and length of slots; None for holes
+    # length outside of `part` of screws that belong to it; None if they are bought by length
     protrudes_mm: float | None = None
-    washer_mm: float | None = None
+    washer_mm: float | None = None  # diameter of the washers under their heads; None without washers
+    # from a single screw, or the line of a pair, to the edge over which the part tips; None for others
     heel_mm: float | None = None
 
     @property

@@ -45,20 +45,13 @@ Parts = Callable[[Placement], Sequence[PlacedPart | LeftOut]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout(Placement):
-    """One scanner before its parts are made.
+    """One scanner before its parts are made."""
 
-    Attributes:
-        joints: all joints, in the order of the parts; those with slots last.
-        leads: on the rotor, between ring and lidar.
-        cables: that do not turn.
-        left_out: parts that this scanner does not need.
-        digest: twelve hex digits of everything that shapes the parts: angles, products, the name on the labels; not J.
-    """
-
-    joints: tuple[Joint, ...]
-    leads: tuple[RotorLead, ...]
-    cables: tuple[FixedCable, ...]
-    left_out: tuple[LeftOut, ...]
+    joints: tuple[Joint, ...]  # all joints, in the order of the parts; those with slots last
+    leads: tuple[RotorLead, ...]  # on the rotor, between ring and lidar
+    cables: tuple[FixedCable, ...]  # that do not turn
+    left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    # twelve hex digits of everything that shapes the parts: angles, products, the name on the labels; not J
     digest: str
 
 

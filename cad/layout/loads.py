@@ -25,19 +25,12 @@ METAL_POISSON = 0.33
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """Weight of what turns, split along and across the axis.
+    """Weight of what turns, split along and across the axis."""
 
-    Attributes:
-        across_n: component of the weight across the axis.
-        along_n: component along the axis.
-        lever_m: height of the centre of mass above the horn.
-        off_axis_m: distance of the centre of mass from the axis.
-    """
-
-    across_n: float
-    along_n: float
-    lever_m: float
-    off_axis_m: float
+    across_n: float  # component of the weight across the axis
+    along_n: float  # component along the axis
+    lever_m: float  # height of the centre of mass above the horn
+    off_axis_m: float  # distance of the centre of mass from the axis
 
     def at_g(self, g: float) -> Weight:
         """Return the same rotor under a multiple of gravity."""
@@ -51,17 +44,11 @@ class Weight:
 
 @dataclass(frozen=True, slots=True)
 class ShaftBend:
-    """Compliance of the shaft at the hub's lower end, equal in all directions across the axis.
+    """Compliance of the shaft at the hub's lower end, equal in all directions across the axis."""
 
-    Attributes:
-        compliance: (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m].
-        twist_rad_per_nm: about the axis.
-        stretch_m_per_n: along the axis.
-    """
-
-    compliance: Array
-    twist_rad_per_nm: float
-    stretch_m_per_n: float
+    compliance: Array  # (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m]
+    twist_rad_per_nm: float  # about the axis
+    stretch_m_per_n: float  # along the axis
 
     def rotation_of(self, force_n: Array, moment_nm: Array) -> Array:
         """Return the rotation of the hub [rad] by force and moment at its lower end, rotation frame."""

@@ -20,25 +20,15 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """Where everything is: the input for the descriptions of parts.
+    """Where everything is: the input for the descriptions of parts."""
 
-    Attributes:
-        scanner: angles and products.
-        drive: all below the hub.
-        deck: that the scanner is screwed to.
-        linkage: between hub and lidar.
-        neck: corners of its neck, shape (n, 3).
-        counterweight: the bar with its estimated length, or why there is none.
-        ties_left_out: seats of cable ties that have no place.
-    """
-
-    scanner: Scanner
-    drive: DriveLayout
-    deck: Deck
-    linkage: AlignmentLinkage
-    neck: Array
-    counterweight: Counterweight | LeftOut
-    ties_left_out: tuple[LeftOut, ...]
+    scanner: Scanner  # angles and products
+    drive: DriveLayout  # all below the hub
+    deck: Deck  # that the scanner is screwed to
+    linkage: AlignmentLinkage  # between hub and lidar
+    neck: Array  # corners of its neck, shape (n, 3)
+    counterweight: Counterweight | LeftOut  # the bar with its estimated length, or why there is none
+    ties_left_out: tuple[LeftOut, ...]  # seats of cable ties that have no place
 
     @property
     def stack(self) -> Hub:

@@ -16,29 +16,17 @@ GROOVE = 1.6  # depth of the tie's groove if something is on the tab
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TieSeat:
-    """A tab with a slot on either side of the cable, along a direction across z.
+    """A tab with a slot on either side of the cable, along a direction across z."""
 
-    Attributes:
-        azimuth: of the direction [rad].
-        aside: distance of its middle line from the z axis, counter-clockwise from the direction.
-        inner: its start, inside of the part that carries it.
-        first: start of the slots.
-        low: its lower face.
-        high: its upper face.
-        half: half distance of the slots.
-        grooved: whether the tie is in a groove of its upper face, or of the lower one if `below`.
-        below: see `grooved`.
-    """
-
-    azimuth: float
-    aside: float = 0.0
-    inner: float
-    first: float
-    low: float
-    high: float
-    half: float
-    grooved: bool = False
-    below: bool = False
+    azimuth: float  # of the direction [rad]
+    aside: float = 0.0  # distance of its middle line from the z axis, counter-clockwise from the direction
+    inner: float  # its start, inside of the part that carries it
+    first: float  # start of the slots
+    low: float  # its lower face
+    high: float  # its upper face
+    half: float  # half distance of the slots
+    grooved: bool = False  # whether the tie is in a groove of its upper face, or of the lower one if `below`
+    below: bool = False  # see `grooved`
 
     @property
     def last(self) -> float:

@@ -22,21 +22,13 @@ INSERT_N = 300.0  # pull-out of a heat-set insert: half of what its sellers meas
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """Material below a head or around a thread.
+    """Material below a head or around a thread."""
 
-    Attributes:
-        name: for messages.
-        strength_mpa: in tension, and under a head or behind a shank, during a shock.
-        pressure_mpa: under a head, continuous.
-        plastic: whether it creeps.
-        source: of both numbers.
-    """
-
-    name: str
-    strength_mpa: float
-    pressure_mpa: float
-    plastic: bool
-    source: str
+    name: str  # for messages
+    strength_mpa: float  # in tension, and under a head or behind a shank, during a shock
+    pressure_mpa: float  # under a head, continuous
+    plastic: bool  # whether it creeps
+    source: str  # of both numbers
 
 
 PRINTED = Material(
@@ -53,29 +45,17 @@ MOULDED = Material(
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Tightening and strength of one screw of a joint.
+    """Tightening and strength of one screw of a joint."""
 
-    Attributes:
-        engaged_mm: engaged thread.
-        needed_mm: thread that carries 1.5 times its preload; 0 for a nut or an insert.
-        preload_n: of the tightened screw.
-        torque_nm: for this preload.
-        pull_n: strength along its axis.
-        pull_by: part that yields first.
-        push_n: strength across its axis.
-        push_by: part that yields first.
-        loosens: cause of loosening, and remedy.
-    """
-
-    engaged_mm: float
-    needed_mm: float
-    preload_n: float
-    torque_nm: float
-    pull_n: float
-    pull_by: str
-    push_n: float
-    push_by: str
-    loosens: str
+    engaged_mm: float  # engaged thread
+    needed_mm: float  # thread that carries 1.5 times its preload; 0 for a nut or an insert
+    preload_n: float  # of the tightened screw
+    torque_nm: float  # for this preload
+    pull_n: float  # strength along its axis
+    pull_by: str  # part that yields first
+    push_n: float  # strength across its axis
+    push_by: str  # part that yields first
+    loosens: str  # cause of loosening, and remedy
 
 
 def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:

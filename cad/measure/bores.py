@@ -24,23 +24,15 @@ PASSING = (0.07, 0.1, 0.2)  # a hole that a screw passes is wider by at least a,
 
 @dataclass(frozen=True, slots=True)
 class Bore:
-    """A hole that opens to the outside.
+    """A hole that opens to the outside."""
 
-    Attributes:
-        mouth: middle of its mouth, in the face about it.
-        out: unit vector out of the device.
-        diameter: of its narrowest wall.
-        depth: from the face to the end of that wall.
-        free: height beyond the other end of a hole that goes through, inf if it opens to the outside; 0 if it is blind.
-        slot: length of a slot, 0 for a round hole.
-    """
-
-    mouth: tuple[float, float, float]
-    out: tuple[float, float, float]
-    diameter: float
-    depth: float
+    mouth: tuple[float, float, float]  # middle of its mouth, in the face about it
+    out: tuple[float, float, float]  # unit vector out of the device
+    diameter: float  # of its narrowest wall
+    depth: float  # from the face to the end of that wall
+    # height beyond the other end of a hole that goes through, inf if it opens to the outside; 0 if it is blind
     free: float
-    slot: float
+    slot: float  # length of a slot, 0 for a round hole
 
 
 def bores_of(triangles: Array, walls: Iterable[Wall], preferred: Sequence[float] = (0.0, 0.0, -1.0)) -> list[Bore]:

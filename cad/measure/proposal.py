@@ -26,19 +26,12 @@ SAME_MM = 0.1  # between holes of one pattern
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Values for a product file.
+    """Values for a product file."""
 
-    Attributes:
-        kind: of product.
-        values: by field.
-        notes: remarks for a person: alternative screws of a hole, dropped holes.
-        triangles: of the model in the frame of the device, corners [mm], shape (t, 3, 3).
-    """
-
-    kind: Literal["lidar", "servo"]
-    values: dict[str, Any]
-    notes: tuple[str, ...]
-    triangles: Array
+    kind: Literal["lidar", "servo"]  # of product
+    values: dict[str, Any]  # by field
+    notes: tuple[str, ...]  # remarks for a person: alternative screws of a hole, dropped holes
+    triangles: Array  # of the model in the frame of the device, corners [mm], shape (t, 3, 3)
 
     @property
     def holes(self) -> list[Hole]:

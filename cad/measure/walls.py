@@ -28,26 +28,16 @@ LEAST_PLANE = 0.005  # of the surface: least plane whose normal is an axis
 
 @dataclass(frozen=True, slots=True)
 class Wall:
-    """A cylinder, or a slot with straight sides and two round ends.
+    """A cylinder, or a slot with straight sides and two round ends."""
 
-    Attributes:
-        axis: unit vector along it.
-        middle: point of its axis at height 0 along `axis`.
-        radius: of the cylinder, or of a slot's ends.
-        low: height of its lower end along `axis`.
-        high: of its upper end.
-        hole: whether the material is outside.
-        around: share of the full turn in the mesh.
-        stretch: half the vector between the middles of a slot's ends; zero for a cylinder.
-    """
-
-    axis: tuple[float, float, float]
-    middle: tuple[float, float, float]
-    radius: float
-    low: float
-    high: float
-    hole: bool
-    around: float
+    axis: tuple[float, float, float]  # unit vector along it
+    middle: tuple[float, float, float]  # point of its axis at height 0 along `axis`
+    radius: float  # of the cylinder, or of a slot's ends
+    low: float  # height of its lower end along `axis`
+    high: float  # of its upper end
+    hole: bool  # whether the material is outside
+    around: float  # share of the full turn in the mesh
+    # half the vector between the middles of a slot's ends; zero for a cylinder
     stretch: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def at(self, height: float) -> Array:

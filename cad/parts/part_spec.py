@@ -43,38 +43,23 @@ def to_centre(servo: Servo) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One assembly step.
+    """One assembly step."""
 
-    Attributes:
-        title: of it.
-        words: with marks of `cad/layout/joints.py` for screws.
-        check: condition to check before the next step.
-        brings: bought products without a step of their own that come with it.
-    """
-
-    title: str
-    words: str
-    check: str = ""
-    brings: tuple[str, ...] = ()
+    title: str  # of it
+    words: str  # with marks of `cad/layout/joints.py` for screws
+    check: str = ""  # condition to check before the next step
+    brings: tuple[str, ...] = ()  # bought products without a step of their own that come with it
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of the parts list.
+    """One row of the parts list."""
 
-    Attributes:
-        kind: of the row.
-        estimate: name of its price in `cad/files/prices.py`.
-        part: name and size.
-        source: of the row.
-        note: for the buyer.
-    """
-
-    kind: Literal["consumable", "wiring", "tool"]
-    estimate: str
-    part: str
-    source: str
-    note: str = ""
+    kind: Literal["consumable", "wiring", "tool"]  # of the row
+    estimate: str  # name of its price in `cad/files/prices.py`
+    part: str  # name and size
+    source: str  # of the row
+    note: str = ""  # for the buyer
 
 
 CRIMPS = Row("tool", "crimping pliers", "crimping pliers", "assembly.md", "for the leads")
@@ -82,50 +67,30 @@ CRIMPS = Row("tool", "crimping pliers", "crimping pliers", "assembly.md", "for t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartSpec:
-    """One part of one scanner, described before it is made: `make` alone needs the kernel.
+    """One part of one scanner, described before it is made: `make` alone needs the kernel."""
 
-    Attributes:
-        name: of `cad/layout/names.py`.
-        turns: whether it turns about the rotation axis.
-        make: its solid, rotation frame at gamma = 0, mm; raises BuildError.
-        step: that adds it; None if another part has its step.
-        after: part or product whose step it follows, unless the drive lists it in `built`.
-        process: of making it.
-        material: if it is not printed.
-        work: further work.
-        why_metal: why it is not printed.
-        sheet: further data of its drawing.
-        shaped_by: fields of products, as "kind.field", that shape it.
-        shapes: fields that shape something else, with its description; they precede `shaped_by` of any part.
-        angles: those that shape it and are on its label.
-        seat: height in the laser frame of its face towards the lidar; None if it does not carry the lidar.
-        lifted: direction of its motion in the exploded view.
-        sweep: its swept solid if it turns about another axis.
-        joints: its screws.
-        avoid: convex shapes that cables must stay clear of.
-        rows: small parts and tools, for the parts list.
-        steps: of products inserted with it, and of parts on it: these precede their own.
-    """
-
-    name: str
-    turns: bool
-    make: Callable[[], cq.Solid]
-    step: Step | None = None
-    after: str = ""
-    process: Process = "printed"
-    material: str = ""
-    work: str = ""
-    why_metal: str = ""
-    sheet: OnSheet = field(default_factory=OnSheet)
-    shaped_by: tuple[str, ...] = ()
+    name: str  # of `cad/layout/names.py`
+    turns: bool  # whether it turns about the rotation axis
+    make: Callable[[], cq.Solid]  # its solid, rotation frame at gamma = 0, mm; raises BuildError
+    step: Step | None = None  # that adds it; None if another part has its step
+    after: str = ""  # part or product whose step it follows, unless the drive lists it in `built`
+    process: Process = "printed"  # of making it
+    material: str = ""  # if it is not printed
+    work: str = ""  # further work
+    why_metal: str = ""  # why it is not printed
+    sheet: OnSheet = field(default_factory=OnSheet)  # further data of its drawing
+    shaped_by: tuple[str, ...] = ()  # fields of products, as "kind.field", that shape it
+    # fields that shape something else, with its description; they precede `shaped_by` of any part
     shapes: Mapping[str, str] = field(default_factory=dict)
-    angles: Literal["none", "rot", "laser"] = "none"
+    angles: Literal["none", "rot", "laser"] = "none"  # those that shape it and are on its label
+    # height in the laser frame of its face towards the lidar; None if it does not carry the lidar
     seat: float | None = None
-    lifted: Literal["axis", "radius", "lidar", "deck"] = "axis"
-    sweep: Callable[[], cq.Solid] | None = None
-    joints: tuple[Joint, ...] = ()
-    avoid: tuple[Shape, ...] = ()
-    rows: tuple[Row, ...] = ()
+    lifted: Literal["axis", "radius", "lidar", "deck"] = "axis"  # direction of its motion in the exploded view
+    sweep: Callable[[], cq.Solid] | None = None  # its swept solid if it turns about another axis
+    joints: tuple[Joint, ...] = ()  # its screws
+    avoid: tuple[Shape, ...] = ()  # convex shapes that cables must stay clear of
+    rows: tuple[Row, ...] = ()  # small parts and tools, for the parts list
+    # of products inserted with it, and of parts on it: these precede their own
     steps: Mapping[str, Step] = field(default_factory=dict)
 
     @property

@@ -9,34 +9,21 @@ from scanwright.design.catalogue.products import Bearing
 
 @dataclass(frozen=True, slots=True)
 class ToleratedDiameter:
-    """Diameter of the cylinders of one diameter about the axis of a part's ordinates.
+    """Diameter of the cylinders of one diameter about the axis of a part's ordinates."""
 
-    Attributes:
-        diameter: as drawn.
-        hole: whether the material is outside.
-        tolerance: text behind the diameter.
-        why: its purpose.
-    """
-
-    diameter: float
-    hole: bool
-    tolerance: str
-    why: str
+    diameter: float  # as drawn
+    hole: bool  # whether the material is outside
+    tolerance: str  # text behind the diameter
+    why: str  # its purpose
 
 
 @dataclass(frozen=True, slots=True)
 class OnSheet:
-    """Data of one part's sheet beyond its shape.
+    """Data of one part's sheet beyond its shape."""
 
-    Attributes:
-        fits: of its cylinders.
-        notes: lines of text.
-        axis: of its ordinates, in the plane z = 0 of the rotation frame.
-    """
-
-    fits: tuple[ToleratedDiameter, ...] = ()
-    notes: tuple[str, ...] = ()
-    axis: tuple[float, float] = (0.0, 0.0)
+    fits: tuple[ToleratedDiameter, ...] = ()  # of its cylinders
+    notes: tuple[str, ...] = ()  # lines of text
+    axis: tuple[float, float] = (0.0, 0.0)  # of its ordinates, in the plane z = 0 of the rotation frame
 
 
 def printed_seat(bearing: Bearing, fit: float) -> ToleratedDiameter:

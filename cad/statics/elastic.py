@@ -27,21 +27,13 @@ NODES = LATTICE[(LATTICE == 1).sum(axis=1) < 2]  # corners and middles of edges,
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A body on a grid.
+    """A body on a grid."""
 
-    Attributes:
-        grid: the cells.
-        cells: index of every cell that holds some of the body, shape (m, 3).
-        share: of each of their cubes that the body fills, shape (m, parts^3).
-        nodes: node number of each node of each cell, shape (m, 20).
-        count: number of nodes n.
-    """
-
-    grid: Grid
-    cells: NDArray[np.intp]
-    share: Array
-    nodes: NDArray[np.intp]
-    count: int
+    grid: Grid  # the cells
+    cells: NDArray[np.intp]  # index of every cell that holds some of the body, shape (m, 3)
+    share: Array  # of each of their cubes that the body fills, shape (m, parts^3)
+    nodes: NDArray[np.intp]  # node number of each node of each cell, shape (m, 20)
+    count: int  # number of nodes n
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,21 +29,13 @@ INSIDE = 0.05  # mm below a face: points on it are in cells of the part
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What a mount carries, and where.
+    """What a mount carries, and where."""
 
-    Attributes:
-        mass_kg: of all of it.
-        centre_m: of all of it, rotation frame.
-        down: unit vector of gravity, rotation frame.
-        seat_mm: radius of the faces around the holes that it lies on.
-        washer_mm: radius of the washers under the heads of the deck's screws.
-    """
-
-    mass_kg: float
-    centre_m: Array
-    down: Array
-    seat_mm: float
-    washer_mm: float
+    mass_kg: float  # of all of it
+    centre_m: Array  # of all of it, rotation frame
+    down: Array  # unit vector of gravity, rotation frame
+    seat_mm: float  # radius of the faces around the holes that it lies on
+    washer_mm: float  # radius of the washers under the heads of the deck's screws
 
 
 def mount_sag(

@@ -32,21 +32,13 @@ STEP = 1.0  # mm, between points of seat and spigot
 
 @dataclass(frozen=True, slots=True)
 class Sag:
-    """Columns belong to gravity along x, y and z of the rotation frame, shape (3, 3) each.
+    """Columns belong to gravity along x, y and z of the rotation frame, shape (3, 3) each."""
 
-    Attributes:
-        rotation_rad: of the lidar, rotation vectors.
-        shift_m: of the optical centre.
-        rotation_error_rad: of the finite elements, with its sign.
-        shift_error_m: likewise.
-        spring: the same parts as a spring between hub and lidar.
-    """
-
-    rotation_rad: Array
-    shift_m: Array
-    rotation_error_rad: Array
-    shift_error_m: Array
-    spring: Spring
+    rotation_rad: Array  # of the lidar, rotation vectors
+    shift_m: Array  # of the optical centre
+    rotation_error_rad: Array  # of the finite elements, with its sign
+    shift_error_m: Array  # likewise
+    spring: Spring  # the same parts as a spring between hub and lidar
 
 
 def linkage_sag(

@@ -24,18 +24,12 @@ class Spring:
 
     With q the displacement of the first body and e that of the second one against it, the kinetic energy of the spring
     is that of the mass matrix ((rigid, coupled), (coupled.T, own)) for the speeds of (q, e): Guyan's reduction.
-
-    Attributes:
-        compliance: displacement of the second body against the first one by a load on it, shape (6, 6).
-        rigid: mass matrix if it moves as a rigid body, shape (6, 6).
-        coupled: of rigid movement and deformation, shape (6, 6).
-        own: of its deformation, shape (6, 6).
     """
 
-    compliance: Array
-    rigid: Array
-    coupled: Array
-    own: Array
+    compliance: Array  # displacement of the second body against the first one by a load on it, shape (6, 6)
+    rigid: Array  # mass matrix if it moves as a rigid body, shape (6, 6)
+    coupled: Array  # of rigid movement and deformation, shape (6, 6)
+    own: Array  # of its deformation, shape (6, 6)
 
 
 def of_shaft(bend: ShaftBend, end_mm: float) -> Spring:

@@ -16,19 +16,12 @@ PAST_M = 1e-7  # beyond a surface that was hit
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Cubic cells, each of `parts` cubes along an edge.
+    """Cubic cells, each of `parts` cubes along an edge."""
 
-    Attributes:
-        low: corner of the first cell [mm], shape (3,).
-        edge: of a cell [mm].
-        shape: cells along x, y, z.
-        parts: cubes along the edge of a cell.
-    """
-
-    low: Array
-    edge: float
-    shape: tuple[int, int, int]
-    parts: int
+    low: Array  # corner of the first cell [mm], shape (3,)
+    edge: float  # of a cell [mm]
+    shape: tuple[int, int, int]  # cells along x, y, z
+    parts: int  # cubes along the edge of a cell
 
     def middles(self, axis: int) -> Array:
         """Return middles of the cubes along one axis [mm]."""

@@ -36,19 +36,12 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class DeviceOutline:
-    """A device to draw.
+    """A device to draw."""
 
-    Attributes:
-        solids: its bodies.
-        spots: its holes.
-        heights: other heights that get a dimension, such as that of the optical centre.
-        unverified: fields of the sketch that are not verified.
-    """
-
-    solids: tuple[Cuboid | Rod, ...]
-    spots: tuple[Spot, ...] = ()
-    heights: tuple[float, ...] = ()
-    unverified: tuple[str, ...] = ()
+    solids: tuple[Cuboid | Rod, ...]  # its bodies
+    spots: tuple[Spot, ...] = ()  # its holes
+    heights: tuple[float, ...] = ()  # other heights that get a dimension, such as that of the optical centre
+    unverified: tuple[str, ...] = ()  # fields of the sketch that are not verified
 
 
 def spots_of(holes: Iterable[Hole], mark: str = "") -> tuple[Spot, ...]:

@@ -20,19 +20,12 @@ PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack s
 
 @dataclass(frozen=True, slots=True)
 class BeltPull:
-    """Forces of the belt.
+    """Forces of the belt."""
 
-    Attributes:
-        working_n: largest pull beyond the pre-load.
-        strand_n: pre-load of each strand.
-        shaft_n: force of both strands between shaft and horn.
-        horn_nm: its moment on the horn.
-    """
-
-    working_n: float
-    strand_n: float
-    shaft_n: float
-    horn_nm: float
+    working_n: float  # largest pull beyond the pre-load
+    strand_n: float  # pre-load of each strand
+    shaft_n: float  # force of both strands between shaft and horn
+    horn_nm: float  # its moment on the horn
 
 
 def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:

@@ -38,21 +38,13 @@ FROM_SLOT = 0.2
 
 @dataclass(frozen=True, slots=True)
 class FixedCable:
-    """One cable that does not turn.
+    """One cable that does not turn."""
 
-    Attributes:
-        name: of its body.
-        device: at its start.
-        diameter: of it.
-        radius: least bend radius.
-        path: its middle from its device to the edge of foot or deck; None if there is none.
-    """
-
-    name: str
-    device: str
-    diameter: float
-    radius: float
-    path: Path | None
+    name: str  # of its body
+    device: str  # at its start
+    diameter: float  # of it
+    radius: float  # least bend radius
+    path: Path | None  # its middle from its device to the edge of foot or deck; None if there is none
 
     @property
     def mass_g(self) -> float:

@@ -20,19 +20,12 @@ from scanwright.design.arrays import Array, Mask
 
 @dataclass(frozen=True, slots=True)
 class FixedRoom:
-    """Space for a cable that does not turn.
+    """Space for a cable that does not turn."""
 
-    Attributes:
-        shapes: convex shapes to avoid.
-        ceiling: height below all that turns.
-        deck: that it lies on.
-        others: middles of earlier cables, shape (n, 3), and the largest radius of one.
-    """
-
-    shapes: tuple[Shape, ...]
-    ceiling: float
-    deck: Deck
-    others: tuple[Array, float]
+    shapes: tuple[Shape, ...]  # convex shapes to avoid
+    ceiling: float  # height below all that turns
+    deck: Deck  # that it lies on
+    others: tuple[Array, float]  # middles of earlier cables, shape (n, 3), and the largest radius of one
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
         """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""

@@ -34,21 +34,13 @@ LEAD_G_CM3 = 1.5  # calculated: five wires of 1.3 mm over 0.14 mm2 of copper, 2.
 
 @dataclass(frozen=True, slots=True)
 class RotorLead:
-    """The lead to one outlet of the lidar.
+    """The lead to one outlet of the lidar."""
 
-    Attributes:
-        y: of the outlet in the lidar's frame.
-        diameter: of the bundle.
-        radius: least bend radius.
-        path: its middle from the ring to the lidar, rotation frame at gamma = 0; None if there is none.
-        joint: of its wires with the ring's; None if no straight piece is long enough.
-    """
-
-    y: float
-    diameter: float
-    radius: float
-    path: Path | None
-    joint: LeadJoint | None = None
+    y: float  # of the outlet in the lidar's frame
+    diameter: float  # of the bundle
+    radius: float  # least bend radius
+    path: Path | None  # its middle from the ring to the lidar, rotation frame at gamma = 0; None if there is none
+    joint: LeadJoint | None = None  # of its wires with the ring's; None if no straight piece is long enough
 
     @property
     def mass_g(self) -> float:

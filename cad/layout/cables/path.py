@@ -17,21 +17,13 @@ STRAIGHT = 1e-6  # rad: less is no corner
 
 @dataclass(frozen=True, slots=True)
 class PathPiece:
-    """One straight piece or arc.
+    """One straight piece or arc."""
 
-    Attributes:
-        start: shape (3,).
-        middle: on the arc, or halfway along the straight, shape (3,).
-        end: shape (3,).
-        length: along it.
-        straight: whether it is no arc.
-    """
-
-    start: Array
-    middle: Array
-    end: Array
-    length: float
-    straight: bool
+    start: Array  # shape (3,)
+    middle: Array  # on the arc, or halfway along the straight, shape (3,)
+    end: Array  # shape (3,)
+    length: float  # along it
+    straight: bool  # whether it is no arc
 
 
 @dataclass(frozen=True, slots=True)

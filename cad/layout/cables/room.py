@@ -23,27 +23,16 @@ BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, 
 
 @dataclass(frozen=True, slots=True)
 class RotorRoom:
-    """Space for a lead on the rotor.
+    """Space for a lead on the rotor."""
 
-    Attributes:
-        shapes: convex shapes that turn.
-        channels: cut from the neck, from their lower ends upwards, in the laser frame.
-        R_rot_laser: shape (3, 3).
-        bearings_rad: first and last beam; None if a lead may be in the fan.
-        hidden_half_angle: of the cone about -z in which all beams are hidden [rad].
-        floor: height of all that does not turn under the rotor.
-        deck: that the rotor turns over.
-        others: middles of earlier leads, shape (n, 3), and the distance from them.
-    """
-
-    shapes: tuple[Shape, ...]
-    channels: tuple[Box, ...]
-    R_rot_laser: Array
-    bearings_rad: tuple[float, float] | None
-    hidden_half_angle: float
-    floor: float
-    deck: Deck
-    others: tuple[Array, float]
+    shapes: tuple[Shape, ...]  # convex shapes that turn
+    channels: tuple[Box, ...]  # cut from the neck, from their lower ends upwards, in the laser frame
+    R_rot_laser: Array  # shape (3, 3)
+    bearings_rad: tuple[float, float] | None  # first and last beam; None if a lead may be in the fan
+    hidden_half_angle: float  # of the cone about -z in which all beams are hidden [rad]
+    floor: float  # height of all that does not turn under the rotor
+    deck: Deck  # that the rotor turns over
+    others: tuple[Array, float]  # middles of earlier leads, shape (n, 3), and the distance from them
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
         """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""

@@ -45,21 +45,13 @@ Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and its leng
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """A stiff end of a cable: points that it must pass, the last of them with a free length behind.
+    """A stiff end of a cable: points that it must pass, the last of them with a free length behind."""
 
-    Attributes:
-        corners: from the very end on, shape (k, 3); the cable continues along `direction`.
-        direction: unit vector, shape (3,).
-        lengths: to try, of the piece behind the last corner.
-        used: tangent length of the arc at the last corner.
-        clamped: length of that piece that may be near its device.
-    """
-
-    corners: Array
-    direction: Array
-    lengths: tuple[float, ...]
-    used: float
-    clamped: float
+    corners: Array  # from the very end on, shape (k, 3); the cable continues along `direction`
+    direction: Array  # unit vector, shape (3,)
+    lengths: tuple[float, ...]  # to try, of the piece behind the last corner
+    used: float  # tangent length of the arc at the last corner
+    clamped: float  # length of that piece that may be near its device
 
     def tips(self) -> Array:
         """Return the possible starts of the free part of the lead, shape (m, 3)."""
@@ -127,19 +119,12 @@ class _Ends:
 
 @dataclass(frozen=True, slots=True)
 class PathGraph:
-    """Points (n, 3) where a cable may turn, and the straight pieces between them, computed when needed.
+    """Points (n, 3) where a cable may turn, and the straight pieces between them, computed when needed."""
 
-    Attributes:
-        room: space for the cable.
-        half: radius of the cable.
-        radius: of the arcs between two pieces.
-        points: first those at the ring, last those at the lidar.
-    """
-
-    room: LeadRoom
-    half: float
-    radius: float
-    points: Array
+    room: LeadRoom  # space for the cable
+    half: float  # radius of the cable
+    radius: float  # of the arcs between two pieces
+    points: Array  # first those at the ring, last those at the lidar
     _joined: dict[int, tuple[NDArray[np.int64], Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def chain(self, starts: dict[int, Stiff], goals: dict[int, Stiff]) -> list[int]:

@@ -33,31 +33,18 @@ SEAT_GAP = 0.3  # the feet carry, not the case
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoFrame:
-    """Lengths in mm; x and y are those of the servo, z of the rotation frame.
+    """Lengths in mm; x and y are those of the servo, z of the rotation frame."""
 
-    Attributes:
-        low: lower face of the feet.
-        plate: lower face of the plate, on the front of the case.
-        opening: radius around the axis.
-        half_x: of the space for the case.
-        ends_y: of legs and plate.
-        window_y: between the legs of a side.
-        hole: diameter, of the servo's screws.
-        holes: places of these screws.
-        feet: places of the screws in the feet.
-        foot_hole: diameter.
-    """
-
-    low: float
-    plate: float
-    opening: float
-    half_x: float
-    ends_y: tuple[float, float]
-    window_y: tuple[float, float]
-    hole: float
-    holes: tuple[tuple[float, float], ...]
-    feet: tuple[tuple[float, float], ...]
-    foot_hole: float
+    low: float  # lower face of the feet
+    plate: float  # lower face of the plate, on the front of the case
+    opening: float  # radius around the axis
+    half_x: float  # of the space for the case
+    ends_y: tuple[float, float]  # of legs and plate
+    window_y: tuple[float, float]  # between the legs of a side
+    hole: float  # diameter, of the servo's screws
+    holes: tuple[tuple[float, float], ...]  # places of these screws
+    feet: tuple[tuple[float, float], ...]  # places of the screws in the feet
+    foot_hole: float  # diameter
 
     @property
     def high(self) -> float:

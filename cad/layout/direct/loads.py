@@ -39,19 +39,12 @@ SHEAR_SHARE = 0.9  # of a round section that carries shear
 
 @dataclass(frozen=True, slots=True)
 class ShaftMetal:
-    """Metal of a turned shaft.
+    """Metal of a turned shaft."""
 
-    Attributes:
-        name: order name.
-        modulus_pa: of elasticity.
-        waist: diameter of the waist in this metal, as a share of that in aluminium.
-        yields_pa: shear stress at which it yields.
-    """
-
-    name: str
-    modulus_pa: float
-    waist: float
-    yields_pa: float
+    name: str  # order name
+    modulus_pa: float  # of elasticity
+    waist: float  # diameter of the waist in this metal, as a share of that in aluminium
+    yields_pa: float  # shear stress at which it yields
 
     def twisted_off_nm(self, waist_diameter: float) -> float:
         """Return the torque at which a waist yields; its diameter is stated for aluminium."""

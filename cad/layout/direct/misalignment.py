@@ -34,17 +34,11 @@ WAIST_DIAMETERS = tuple(tenths / 10 for tenths in range(70, 44, -1))
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """One cause of a moment on the horn, at its worst.
+    """One cause of a moment on the horn, at its worst."""
 
-    Attributes:
-        what: its name.
-        off_mm: distance between sleeve and bearing; None for the weight.
-        moment_nm: on the horn.
-    """
-
-    what: str
-    off_mm: float | None
-    moment_nm: float
+    what: str  # its name
+    off_mm: float | None  # distance between sleeve and bearing; None for the weight
+    moment_nm: float  # on the horn
 
 
 def offsets_mm(ears: Ears) -> dict[str, float]:

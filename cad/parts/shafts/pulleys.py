@@ -98,8 +98,8 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
     words = (
         f"The boss of the horn centres the pulley. {screws(names.SERVO_OUTPUT)} Hang the servo between the arms of the "
         "tower, put the belt around both pulleys, and insert the screws of the slots: "
-        f"{screws(names.BEARING_TOWER, names.DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the middle of a "
-        f"strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
+        f"{screws(names.BEARING_TOWER, names.DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the "
+        f"middle of a strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
         f"{stack.centre:g} mm apart; the slots allow {TRAVEL:g} mm to either side."
     )
     pocket = stack.servo.horn_boss_diameter_mm
