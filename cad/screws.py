@@ -23,7 +23,7 @@ class Screw:
     nut_standard: str = "ISO 4032"
 
     @property
-    def head_room(self) -> float:
+    def driver_radius(self) -> float:
         """Radius that the head and a driver or socket around it need."""
         return self.head_diameter / 2 + 0.4
 
@@ -84,17 +84,17 @@ class Thread:
     insert: bool  # whether it is an insert
 
 
-def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True, carries: bool = False) -> Thread:
+def thread_in_part(screw: Screw, printer: Printer, *, nut_fits: bool = True, carries: bool = False) -> Thread:
     """Return the thread that a printer's profile gives a screw.
 
     Args:
         screw: the size.
         printer: the profile.
-        room_for_nut: whether a nut fits; if not and the lidar hangs on the screw, an insert is used.
+        nut_fits: whether a nut fits; if not and the lidar hangs on the screw, an insert is used.
         carries: whether the lidar hangs on it.
     """
     trap = trap_of(screw, printer, carries=carries)
-    if trap is not None and not room_for_nut:
+    if trap is not None and not nut_fits:
         if carries and screw.insert is not None:
             return Thread(screw.insert, None, True)
         trap = None

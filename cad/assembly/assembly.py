@@ -1,4 +1,4 @@
-"""The whole scanner in the rotation frame at gamma = 0: made parts and bought bodies with their descriptions. mm."""
+"""The entire scanner in the rotation frame at gamma = 0: made parts and bought bodies with their descriptions. mm."""
 
 from __future__ import annotations
 

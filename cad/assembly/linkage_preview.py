@@ -25,10 +25,10 @@ def draft_linkage(p: AlignmentLinkage) -> TriMesh:
         BuildError: the kernel fails at one of its shapes.
     """
     shapes = shapes_of(p)
-    room = _together(shapes.room)
-    body = (_solid(shapes.plate) + _solid(shapes.neck)) - room - _together(shapes.fins)
+    free_space = _together(shapes.free_space)
+    body = (_solid(shapes.plate) + _solid(shapes.neck)) - free_space - _together(shapes.fins)
     carrying = max(body.decompose(), key=lambda piece: float(piece.volume()))  # the piece that holds the plate
-    mesh = ((carrying + _solid(shapes.hub)) - room - _together(shapes.holes)).to_mesh64()
+    mesh = ((carrying + _solid(shapes.hub)) - free_space - _together(shapes.holes)).to_mesh64()
     return TriMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
 
 

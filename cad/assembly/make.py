@@ -43,7 +43,7 @@ def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
     assembly = Assembly(layout, parts, bodies, made, bought)
     if last is not None and wanted(last):
         assembly = _balanced(assembly)
-    require_room_on_bed(assembly)  # it makes meshes, which the balanced assembly would not keep
+    require_bed(assembly)  # it makes meshes, which the balanced assembly would not keep
     return assembly
 
 
@@ -59,7 +59,7 @@ def _balanced(assembly: Assembly) -> Assembly:
     return replace(assembly, parts=parts, made=made)
 
 
-def require_room_on_bed(assembly: Assembly) -> None:
+def require_bed(assembly: Assembly) -> None:
     """Require a bed for every made part that is printed.
 
     Raises:

@@ -69,7 +69,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Blocked:
-    """A screw that no driver reaches: its number in the joint, the body in the way, and how far that is off [mm]."""
+    """A screw that no driver reaches: its number in the joint, the blocking body, and its distance [mm]."""
 
     screw: int
     body: str
@@ -145,6 +145,6 @@ def _error(number: int, scene: StepScene, joint: Joint, blocked: Sequence[Blocke
     first = min(blocked, key=lambda each: each.after_mm)
     message = (
         f"{joint.part} on {joint.onto}: step {number} ({scene.step.title}): no straight line for the key of "
-        f"{len(blocked)} of {joint.count} {joint.screw.name}: {first.body} is in the way, {first.after_mm:.0f} mm away"
+        f"{len(blocked)} of {joint.count} {joint.screw.name}: {first.body} blocks it {first.after_mm:.0f} mm away"
     )
     return Finding("driver_access", "error", joint.part, message, float(len(blocked)), 0.0)

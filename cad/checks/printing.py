@@ -55,7 +55,7 @@ class ThinWalls:
     """Parallel walls thinner than a least thickness."""
 
     area_mm2: float  # of both of their sides
-    surface_mm2: float  # of the whole part
+    surface_mm2: float  # of the entire part
     thinnest_mm: float  # least thickness; inf if no wall is thin
     at: Array  # middle of the wall there, shape (3,); NaN if no wall is thin
 

@@ -166,7 +166,7 @@ def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
 
 
 def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
-    """Join arcs of one circle in the same way."""
+    """Join arcs of one circle likewise."""
     groups: list[tuple[Array, float, tuple[list[Span], list[Span]]]] = []
     for centre, radius, (low, high), hidden in sorted(pieces, key=lambda piece: (*np.round(piece[0], 2), piece[1])):
         i = 0

@@ -22,7 +22,7 @@ from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
 from scanwright.cad.labels.engrave import Groove, engrave, groove_of
 from scanwright.cad.labels.flats import Flat, flat_at, flats_of
 from scanwright.cad.labels.lettering import Lettering, Place
-from scanwright.cad.labels.visibility import RoomBefore, room_before
+from scanwright.cad.labels.visibility import FreeDistance, free_distance
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
@@ -67,7 +67,7 @@ class Ground:
     wall: float  # least wall behind it
     front: Place | None  # place of the word FRONT, if the part has it
 
-    def room(self, flat: Flat) -> shapely.Polygon:
+    def area(self, flat: Flat) -> shapely.Polygon:
         """Return the part of a face that the middle lines of strokes may use."""
         half = self.groove.width / 2
         occupied = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
@@ -88,7 +88,7 @@ class Ground:
 
 def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
     """Engrave every printed part that has enough area."""
-    before, done, groove = room_before(assembly), Labelled(), groove_of(scanner.printer)
+    before, done, groove = free_distance(assembly), Labelled(), groove_of(scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
         if part.metal:
@@ -125,14 +125,14 @@ def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]
     return [scanner.angles.task[: max(LONGEST)], *shaped, config_hash[:DIGITS]]
 
 
-def label_on(ground: Ground, texts: list[str], before: RoomBefore) -> tuple[Place, Lettering] | None:
+def label_on(ground: Ground, texts: list[str], before: FreeDistance) -> tuple[Place, Lettering] | None:
     """Return place and lines of a label, of the last text alone if all do not fit; None if no face has enough area."""
     for least in (READING, TOUCH):
-        rooms = [(flat, _open(flat, ground.room(flat), before, least)) for flat in ground.flats]
+        areas = [(flat, _open(flat, ground.area(flat), before, least)) for flat in ground.flats]
         for some, longest, height in product((texts, texts[-1:]), LONGEST, HEIGHTS):
             split = tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest))
             lines = Lettering(split, height)
-            for place in _places(rooms, lines.size):
+            for place in _places(areas, lines.size):
                 if ground.is_thick(place.flat, place.put(_grid(lines.size))):
                     return place, lines
     return None
@@ -165,7 +165,7 @@ def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -
     return place if flat.outline.contains(word) else None
 
 
-def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -> shapely.Polygon:
+def _open(flat: Flat, area: shapely.Polygon, before: FreeDistance, least: float) -> shapely.Polygon:
     """Return the part of an area, in squares of STEP, in front of which no body is nearer than `least`."""
     x0, y0, x1, y1 = flat.outline.bounds
     xs, ys = np.arange(x0 + STEP / 2, x1 + STEP / 2, STEP), np.arange(y0 + STEP / 2, y1 + STEP / 2, STEP)
@@ -173,31 +173,31 @@ def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -
     points = points[shapely.contains_xy(flat.outline, points[:, 0], points[:, 1])]
     points = points[before(flat, points) > least]
     low, high = points - STEP / 2 - OVERLAP, points + STEP / 2 + OVERLAP
-    return room.intersection(shapely.union_all(shapely.box(*low.T, *high.T)))
+    return area.intersection(shapely.union_all(shapely.box(*low.T, *high.T)))
 
 
-def _places(rooms: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
+def _places(areas: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
     """Return places of lettering of a size: in the first area first, there nearest to its middle."""
-    for flat, room in rooms:
+    for flat, area in areas:
         for turn in TURNS:
-            for x, y in _corners(room, size, turn):
+            for x, y in _corners(area, size, turn):
                 yield Place(flat, x, y, turn)
 
 
-def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:
+def _corners(area: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:
     """Return the lower left corners of boxes inside a polygon, the nearest to its middle first."""
-    if room.is_empty:
+    if area.is_empty:
         return []
-    x0, y0, x1, y1 = room.bounds
+    x0, y0, x1, y1 = area.bounds
     box = np.array([[0, 0], [size[0], 0], size, [0, size[1]]]) @ turn.T
     low, high = box.min(axis=0), box.max(axis=0)
     xs, ys = np.arange(x0 - low[0], x1 - high[0] + 1e-9, STEP), np.arange(y0 - low[1], y1 - high[1] + 1e-9, STEP)
     corners = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
     if len(corners) == 0:
         return []
-    shapely.prepare(room)
-    fits = shapely.contains(room, shapely.polygons(corners[:, None] + box))
-    middle = np.array(room.centroid.coords[0])
+    shapely.prepare(area)
+    fits = shapely.contains(area, shapely.polygons(corners[:, None] + box))
+    middle = np.array(area.centroid.coords[0])
     away = np.round(np.linalg.norm(corners + box.mean(axis=0) - middle, axis=1), 3)
     order = np.lexsort((*corners.T, away))
     return [(float(x), float(y)) for x, y in corners[order][fits[order]][:PLACES]]

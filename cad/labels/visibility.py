@@ -18,11 +18,11 @@ OFF = 0.05  # from the face to the start of the rays
 DECK_HALF = 2000.0
 DECK_BELOW = 0.2  # of its face in this scene: a foot that lies on it then touches it
 
-RoomBefore = Callable[[Flat, Array], Array]
+FreeDistance = Callable[[Flat, Array], Array]
 """Distances from points of a face, shape (n, 2), to the next body: shape (n,), 0 if it touches, inf if none."""
 
 
-def room_before(assembly: Assembly) -> RoomBefore:
+def free_distance(assembly: Assembly) -> FreeDistance:
     """Return a measurement by rays against all bodies of the assembly and its deck."""
     corners = [mesh.vertices[mesh.faces] for mesh in assembly.meshes().values()]
     bodies = ray_caster.build_scene(np.concatenate([_deck(assembly), *corners]) / 1000)

@@ -2,7 +2,7 @@
 
 World frame: origin on the face of the deck, in the centre of the mount's deck holes; z up. The deck is below the
 scanner (face at z = 0, scanner at z > 0), or above it if the axis points down (scanner at z < 0). Everything is in the
-rotation frame at gamma = 0, mm, unless its name says world.
+rotation frame at gamma = 0, mm, unless its name contains world.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     along = R[0]
     holes = mounted.holes
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
-    margin = max(BACK_MARGIN, mounted.screw.head_room + rail_wall(scanner.printer) + RAIL_INSET)
+    margin = max(BACK_MARGIN, mounted.screw.driver_radius + rail_wall(scanner.printer) + RAIL_INSET)
     half = (max(xs) + margin, (max(ys) - min(ys)) / 2 + margin)
     back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
     tripod = tripod_foot_of(screw, scanner.printer, FOOT_THICKNESS) if scanner.modules.tripod_foot else None
@@ -189,7 +189,7 @@ def _foot_shift(
     The drivers come from behind along z, through the strut and sometimes the foot.
     """
     screw = SCREWS[(scanner.deck or USUAL).screw]
-    room = mounted.screw.head_room + screw.head_room
+    apart = mounted.screw.driver_radius + screw.driver_radius
     left = np.cross(normal, along)
     shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
     depths = np.linspace(0.0, FOOT_THICKNESS + screw.head_height, 11)
@@ -198,12 +198,12 @@ def _foot_shift(
         centre = back - height * normal + shift[0] * along + shift[1] * left
         screws = [centre + u * along + v * left + depth * normal for u, v in deck_holes for depth in depths]
         return min(
-            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else room
+            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else apart
             for point in screws
             for x, y in mounted.holes
         )
 
-    a, b = next((shift for shift in shifts if clearance(shift) >= room), (0.0, 0.0))
+    a, b = next((shift for shift in shifts if clearance(shift) >= apart), (0.0, 0.0))
     return a * along + b * left
 
 
@@ -213,7 +213,7 @@ def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, floa
     Raises:
         BuildError: a hole lies under the strut, where no driver reaches its screw.
     """
-    least = PAD_HALF + screw.head_room + 1.0
+    least = PAD_HALF + screw.driver_radius + 1.0
     near = [hole for hole in pattern.holes() if max(abs(hole[0]), abs(hole[1])) < least]
     if near:
         raise BuildError(

@@ -28,7 +28,7 @@ from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-HEAD_WALL = 2.0  # of a plate on the servo, beside the recess of a head
+HEAD_WALL = 2.0  # of a plate on the servo, next to the recess of a head
 Body = Literal["base", "rotor", "horn"]
 Point = tuple[float, float, float]
 Record = TypeVar("Record")
@@ -102,8 +102,8 @@ def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], 
 
 def plate_half_x(servo: Servo) -> float:
     """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
-    head_room = SCREWS[servo.front.screw].head_room
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + head_room + HEAD_WALL)
+    driver_radius = SCREWS[servo.front.screw].driver_radius
+    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + driver_radius + HEAD_WALL)
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,12 +128,12 @@ def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
 
 def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     """Return whether a driver misses hub and journal, or passes through the hub's rim only."""
-    R, room = stack.R(), SCREWS[lidar.base.screw].head_room
+    R, driver = stack.R(), SCREWS[lidar.base.screw].driver_radius
     depth = np.linspace(0.0, 150.0, 601)
     line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
-    reach = np.hypot(line[:, 0], line[:, 1]) - room
-    hub = (line[:, 2] > stack.shoulder - room) & (line[:, 2] < room - stack.h)
-    journal = (line[:, 2] > stack.hub_bottom - room) & (line[:, 2] < stack.hub_bottom + stack.journal)
+    reach = np.hypot(line[:, 0], line[:, 1]) - driver
+    hub = (line[:, 2] > stack.shoulder - driver) & (line[:, 2] < driver - stack.h)
+    journal = (line[:, 2] > stack.hub_bottom - driver) & (line[:, 2] < stack.hub_bottom + stack.journal)
     radius = 0.0 if stack.bearing is None else stack.bearing.bore_mm / 2
     return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
 
@@ -142,12 +142,12 @@ def envelope_of(lidar: Lidar) -> Envelope:
     """Return the boxes of one lidar (origin at the optical centre)."""
     half_x, half_y = lidar.half_mm
     seat = -lidar.optical_height_mm
-    room = lidar.cable_diameter_mm / 2 + 2.0
+    half = lidar.cable_diameter_mm / 2 + 2.0
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
     cables = tuple(
         (
-            (back, y - room, seat + max(lidar.cable_z_mm - room, 0.5)),
-            (1.0 - half_x, y + room, seat + lidar.cable_z_mm + room),
+            (back, y - half, seat + max(lidar.cable_z_mm - half, 0.5)),
+            (1.0 - half_x, y + half, seat + lidar.cable_z_mm + half),
         )
         for y in lidar.cable_y_mm
     )
@@ -164,9 +164,9 @@ def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
 
 
 def ear_screws(lidar: Lidar, axis: Axis) -> tuple[tuple[float, float], ...]:
-    """Return centres of the ears' screws: their heads stand clear of the lidar's body."""
+    """Return centres of the ears' screws: their heads are clear of the lidar's body."""
     half = lidar.half_mm[0 if axis == "x" else 1]
-    away = half + BODY_GAP + EAR_SCREW.head_room + 0.5
+    away = half + BODY_GAP + EAR_SCREW.driver_radius + 0.5
     along = [(sign * away, side * EAR_SCREW_OFFSET) for sign in (1, -1) for side in (1, -1)]
     return tuple(along if axis == "x" else [(y, x) for x, y in along])
 

@@ -115,7 +115,7 @@ def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
     known = LENGTHS[screw.name]
     if fixing == "grub":
         return next((n for n in known if n >= grip - 0.1), known[-1])
-    if fixing == "trap":  # the hole ends at the nut, and behind it there is room
+    if fixing == "trap":  # the hole ends at the nut, and there is space behind it
         return next((n for n in known if n >= grip + depth + screw.nut_height - 0.1), known[-1])
     if fixing == "thread":
         most = [n for n in known if n <= grip + depth - THREAD_FREE + 1e-6]

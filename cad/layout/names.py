@@ -48,5 +48,5 @@ ROTOR_LEAD = "rotor_lead"
 SERVO_CABLE = "servo_cable"
 SERVO_CASE = "servo_case"
 SERVO_HORN = "servo_horn"
-SERVO_OUTPUT = "servo_output"  # the horn beside the axis
+SERVO_OUTPUT = "servo_output"  # the horn next to the axis
 STATOR_LEADS = "stator_leads"

@@ -68,8 +68,8 @@ def row_of_scanner(
     springs = [of_shaft(assembly.layout.drive.gives, assembly.layout.stack.hub_bottom), linkage]
     masses = [shaft, mass_matrix(bodies["laser"].moved(scanner.angles.T_rot_laser()))]
     if mount is not None:
-        stands = mass_matrix(bodies["servo"]) - mass_matrix(assembly.inertial(BASE_MOUNT))
-        springs, masses = [mount, *springs], [stands + shaft, *masses]
+        fixed = mass_matrix(bodies["servo"]) - mass_matrix(assembly.inertial(BASE_MOUNT))
+        springs, masses = [mount, *springs], [fixed + shaft, *masses]
     return row_of(springs, masses)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, Weight
 
-PRELOAD_N = 10.0  # least, of each strand: what a small belt needs to sit in its grooves; assumed
+PRELOAD_N = 10.0  # least, of each strand: assumed for the seat of a small belt in its grooves
 SEAT_N_PER_M = 10e6  # sideways stiffness of a bearing in a printed seat: assumed
 PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack strand tight
 
@@ -37,7 +37,7 @@ def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
 
 
 def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: float) -> tuple[float, float]:
-    """Return the force across the upper and the lower bearing [N] if weight and belt pull the same way.
+    """Return the force across the upper and the lower bearing [N] if weight and belt pull in the same direction.
 
     Args:
         stack: its layout.

@@ -12,7 +12,7 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 UNDER_HEAD = 2.5  # of the plate
-HORN_ROOM = 1.5  # around the foot of the pulley
+HORN_GAP = 1.5  # around the foot of the pulley
 
 
 def plate_of(scanner: Scanner) -> Ears:
@@ -22,7 +22,7 @@ def plate_of(scanner: Scanner) -> Ears:
         BuildError: the case has no four front holes next to the horn.
     """
     servo, printer = scanner.servo, scanner.printer
-    opening = max(pulley_foot_radius(servo), servo.horn_diameter_mm / 2) + HORN_ROOM
+    opening = max(pulley_foot_radius(servo), servo.horn_diameter_mm / 2) + HORN_GAP
     least = opening + passing_hole(SCREWS[servo.front.screw], printer) / 2 + printer.min_wall_mm
     free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
@@ -31,7 +31,7 @@ def plate_of(scanner: Scanner) -> Ears:
         caution = servo.caution("holes")
         raise BuildError(
             f"{DRIVE_PLATE}: ears: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
-            f"pairs of front holes at least {least:.2f} mm from its axis, beside the pulley"
+            f"pairs of front holes at least {least:.2f} mm from its axis, outside of the pulley"
         )
     return ears_on(scanner, opening, tuple((side * widest, y) for y in (ys[0], ys[-1]) for side in (1.0, -1.0)))
 

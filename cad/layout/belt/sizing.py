@@ -6,12 +6,12 @@ import math
 from dataclasses import replace
 
 from scanwright.cad.layout.belt.stack import (
-    CASE_ROOM,
+    CASE_GAP,
+    CHAMBER_GAP,
     FOOT_HOLE,
     FOOT_SCREW,
-    HORN_BOSS_ROOM,
+    HORN_BOSS_GAP,
     PULLEY_GAP,
-    RING_ROOM,
     TRAVEL,
     BeltStack,
     drive_corners,
@@ -39,7 +39,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
     """Lay out the scanner of a capsule ring.
 
     Raises:
-        BuildError: no bearing or belt of the catalogue fits the capsule, the horn stands above the belt, the heads of
+        BuildError: no bearing or belt of the catalogue fits the capsule, the horn is above the belt, the heads of
             its screws leave no wall, or the lidar would hang upside down.
     """
     ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
@@ -109,7 +109,7 @@ def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
 def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
     if not scanner.belts:
         raise BuildError(
-            f"{DRIVE_PULLEY}: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
+            f"{DRIVE_PULLEY}: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt next to the axis, and the "
             "catalogue has none; add a product of kind = 'belt'"
         )
     return scanner.belts[0]
@@ -119,7 +119,7 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
     """Check that the screws of the tower's foot are outside the capsule's chamber."""
     corner = math.sqrt(2) * FOOT_HOLE - FOOT_SCREW.nominal / 2 - scanner.printer.min_wall_mm
     if stack.chamber_radius > corner:
-        most = 2 * (corner - RING_ROOM)
+        most = 2 * (corner - CHAMBER_GAP)
         raise BuildError(
             f"{BEARING_TOWER}: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
             f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
@@ -133,7 +133,7 @@ def _check_horn(stack: BeltStack) -> None:
         servo = stack.servo
         raise BuildError(
             f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.caution('case_max_mm')}: the horn of "
-            f"{servo.name} stands {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
+            f"{servo.name} is {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
             "servo whose horn lies lower"
         )
 
@@ -144,21 +144,21 @@ def _check_heads(stack: BeltStack, printer: Printer) -> None:
     screw = SCREWS[servo.horn_screw]
     place = f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}"
     heads = f"the heads of the {screw.name} screws of {servo.name}"
-    middle, around = servo.horn_circle_mm / 2, screw.head_room + printer.min_wall_mm
+    middle, around = servo.horn_circle_mm / 2, screw.driver_radius + printer.min_wall_mm
     if middle + around > stack.tip_radius - stack.belt.tooth_height_mm:
         raise BuildError(
             f"{place}: {heads} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
         )
     boss = servo.horn_boss_diameter_mm
-    over_boss = stack.pulley_seat - stack.horn - servo.horn_boss_height_mm - HORN_BOSS_ROOM
+    over_boss = stack.pulley_seat - stack.horn - servo.horn_boss_height_mm - HORN_BOSS_GAP
     if over_boss < printer.min_wall_mm and middle - around < boss / 2:
         raise BuildError(f"{place}: {heads} leave no wall around its boss of {boss:g} mm")
 
 
 def _least_centre(stack: BeltStack, servo: Servo) -> float:
     """Return the shortest centre distance with the case next to the tower and the belt mounted."""
-    case = stack.wide_radius - servo.case_min_mm[0] + CASE_ROOM
-    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
+    case = stack.wide_radius - servo.case_min_mm[0] + CASE_GAP
+    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_GAP)
 
 
 def _quarter(scanner: Scanner, stack: BeltStack, rotor_radius: float) -> int:

@@ -22,7 +22,7 @@ def tower_foot_of(printer: Printer, stack: BeltStack) -> Thread:
     foot = thread_in_part(FOOT_SCREW, printer, carries=True)
     free = math.sqrt(2) * FOOT_HOLE - printer.min_wall_mm - stack.chamber_radius
     fits = foot.trap is None or foot.trap.corner <= free
-    return foot if fits else thread_in_part(FOOT_SCREW, printer, room_for_nut=False, carries=True)
+    return foot if fits else thread_in_part(FOOT_SCREW, printer, nut_fits=False, carries=True)
 
 
 def disc_azimuths(stack: BeltStack) -> list[float]:

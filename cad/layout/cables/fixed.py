@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.cables.fixed_room import FixedRoom, fixed_room_of
+from scanwright.cad.layout.cables.fixed_space import FixedSpace, fixed_space_of
 from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
 from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.cables.path import Path
@@ -68,12 +68,12 @@ class Leaving:
 
 def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
     """Return the cables that the catalogue describes, clear of the shapes to avoid."""
-    room, cables = fixed_room_of(place, avoid), []
+    space, cables = fixed_space_of(place, avoid), []
     for lane, leaving in enumerate(_leaving(place)):
-        path = _path(place, room, leaving, lane)
+        path = _path(place, space, leaving, lane)
         cables.append(FixedCable(leaving.name, leaving.device, leaving.diameter, leaving.radius, path))
         if path is not None:
-            room = room.with_cable(path.points(SAMPLE), leaving.diameter / 2)
+            space = space.with_cable(path.points(SAMPLE), leaving.diameter / 2)
     return tuple(cables)
 
 
@@ -89,7 +89,7 @@ def _leaving(place: Placement) -> Iterator[Leaving]:
     yield Leaving(STATOR_LEADS, ring.name, wide, radius, stator.start, down, stator.inside, stator.stiff)
 
 
-def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Path | None:
+def _path(place: Placement, space: FixedSpace, leaving: Leaving, lane: int) -> Path | None:
     deck, half = place.deck, leaving.diameter / 2
     start, out, normal = leaving.start, leaving.out, np.array(deck.normal)
     on_deck = deck.flat and (start - np.array(deck.centre)) @ normal < half
@@ -109,7 +109,7 @@ def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Pat
             through + STEP * np.arange(-math.ceil((through - low) / STEP), math.ceil((high - through) / STEP) + 1)
         )
     lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return short_path(room, starts, goals, half, leaving.radius, lattice)
+    return short_path(space, starts, goals, half, leaving.radius, lattice)
 
 
 def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:

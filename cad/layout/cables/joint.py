@@ -14,10 +14,10 @@ import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import farther
 from scanwright.cad.layout.cables.path import Path, PathPiece
-from scanwright.cad.layout.cables.route import GAP, LeadRoom
+from scanwright.cad.layout.cables.route import GAP, CableSpace
 from scanwright.design.arrays import Array
 
-LENGTH = 12.0  # crimps beside each other, and a shrink tube over them
+LENGTH = 12.0  # crimps side by side, and a shrink tube over them
 WALL = 0.5  # of the shrink tube; a tenth of the gap to other leads remains
 STEP = 3.0  # between two tested places, and two points of a joint
 
@@ -44,19 +44,19 @@ class LeadJoint:
         return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along)
 
 
-def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
+def joint_of(path: Path, half: float, space: CableSpace, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
     """Return the joint of a lead; None if no straight piece is long enough.
 
     Args:
         path: of the lead.
         half: its radius.
-        room: space for the lead.
+        space: space for the lead.
         others: middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
     """
     places = [place for piece in straights(path) for place in _places(piece)]
     for place in places:
         points = place.points()
-        if room.free(points, half + WALL, GAP - WALL).all() and all(farther(points, *other).all() for other in others):
+        if space.free(points, half + WALL, GAP - WALL).all() and all(farther(points, *other).all() for other in others):
             return place
     return places[0] if places else None  # the check of clearances then fails
 

@@ -17,7 +17,7 @@ from scanwright.cad.layout.cables import joint as joints
 from scanwright.cad.layout.cables.joint import LeadJoint, joint_of
 from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.room import RotorRoom, room_of
+from scanwright.cad.layout.cables.rotor_space import RotorSpace, rotor_space_of
 from scanwright.cad.layout.cables.route import Ending, lattice_about_axis, short_path
 from scanwright.cad.layout.drive import Bundle
 from scanwright.cad.layout.hub import BUNDLE_GAP
@@ -62,21 +62,21 @@ def leads_of(place: Placement, avoid: Iterable[Shape]) -> tuple[RotorLead, ...]:
     ring, lidar = scanner.slip_ring, scanner.lidar
     if ring is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
         return ()
-    numbers, radius, room = range(len(lidar.cable_y_mm)), ring.lead_bend_radius_mm, room_of(place, avoid)
+    numbers, radius, space = range(len(lidar.cable_y_mm)), ring.lead_bend_radius_mm, rotor_space_of(place, avoid)
     half = ring.leads_mm(len(numbers)) / 2
     best: tuple[RotorLead, ...] = ()
     # the first lead takes the short path, and may block it for the others: then other orders and places are tried
     for places, order in product((numbers, numbers[::-1]), repeat=2):
         bundles = [Bundle(number, len(numbers), half, radius) for number in places]
-        leads = _laid(place, room, bundles, order)
+        leads = _laid(place, space, bundles, order)
         if not best or _laid_count(leads) > _laid_count(best):
             best = leads
         if _laid_count(best) == len(numbers) or leads[order[0]].path is None:
             break  # the first has all the space: without a path then, there is none
-    return _jointed(replace(room, bearings_rad=None), best)  # a path may be in the fan, and then its joint
+    return _jointed(replace(space, bearings_rad=None), best)  # a path may be in the fan, and then its joint
 
 
-def _jointed(room: RotorRoom, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
+def _jointed(space: RotorSpace, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
     """Return the leads with joints, each clear of the other leads and of earlier joints."""
     points = [np.zeros((0, 3)) if lead.path is None else lead.path.points(SAMPLE) for lead in leads]
     jointed: list[RotorLead] = []
@@ -84,7 +84,7 @@ def _jointed(room: RotorRoom, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, 
         apart = lead.diameter + joints.WALL + BUNDLE_GAP / 2
         others = [(middles, apart) for k, middles in enumerate(points) if k != i]
         others += [(other.joint.points(), apart + joints.WALL) for other in jointed if other.joint is not None]
-        joint = None if lead.path is None else joint_of(lead.path, lead.diameter / 2, room, others)
+        joint = None if lead.path is None else joint_of(lead.path, lead.diameter / 2, space, others)
         jointed.append(replace(lead, joint=joint))
     return tuple(jointed)
 
@@ -104,7 +104,9 @@ def _laid_count(leads: Sequence[RotorLead]) -> int:
     return sum(lead.path is not None for lead in leads)
 
 
-def _laid(place: Placement, room: RotorRoom, bundles: Sequence[Bundle], order: Sequence[int]) -> tuple[RotorLead, ...]:
+def _laid(
+    place: Placement, space: RotorSpace, bundles: Sequence[Bundle], order: Sequence[int]
+) -> tuple[RotorLead, ...]:
     """Return the leads by outlet, laid in `order`, each from its bundle at the ring."""
     linkage, outlets, hub = place.linkage, place.scanner.lidar.cable_y_mm, place.stack.hub_radius
     leads: dict[int, RotorLead] = {}
@@ -114,17 +116,18 @@ def _laid(place: Placement, room: RotorRoom, bundles: Sequence[Bundle], order: S
         outlet = Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
         exits = place.drive.lead_exits(bundle, linkage.hub_tie, sum(linkage.cross_azimuths) / 2)
         # tied if possible; a path in the fan, where its shadow counts, is better than none
-        for within, (tie, ends) in product((room, replace(room, bearings_rad=None)), exits):
+        for within, (tie, ends) in product((space, replace(space, bearings_rad=None)), exits):
             starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in ends]
-            starts = [_from_hub(start, hub, half, tie) for start in starts if room.clear_of_others(start.corners).all()]
-            lattice = lattice_about_axis(room.floor, half, hub, [*starts, outlet])
+            clear = [start for start in starts if space.clear_of_others(start.corners).all()]
+            starts = [_from_hub(start, hub, half, tie) for start in clear]
+            lattice = lattice_about_axis(space.floor, half, hub, [*starts, outlet])
             path = short_path(within, starts, [outlet], half, bundle.radius, lattice)
             if path is not None:
                 break
         leads[i] = RotorLead(outlets[i], 2 * half, bundle.radius, path)
         if path is not None:
-            middles = np.concatenate([path.points(SAMPLE), room.others[0]])
-            room = replace(room, others=(middles, 2 * half + BUNDLE_GAP / 2))
+            middles = np.concatenate([path.points(SAMPLE), space.others[0]])
+            space = replace(space, others=(middles, 2 * half + BUNDLE_GAP / 2))
     return tuple(leads[i] for i in sorted(leads))
 
 

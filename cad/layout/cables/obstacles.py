@@ -32,17 +32,17 @@ def shape_of(corners: Array, carved: bool = False) -> Shape:
     return Shape(ConvexHull(corners).equations, middle, float(np.linalg.norm(corners - middle, axis=1).max()), carved)
 
 
-def clear_of(shapes: Sequence[Shape], points: Array, room: float, through: Inside | None = None) -> Mask:
-    """Return whether points (n, 3) are farther than `room` from every shape; `through` accepts points in carved ones.
+def clear_of(shapes: Sequence[Shape], points: Array, apart: float, through: Inside | None = None) -> Mask:
+    """Return whether points (n, 3) are farther than `apart` from every shape; `through` accepts points in carved ones.
 
     Spheres around the shapes are tested first, then their planes.
     """
     clear = np.ones(len(points), dtype=bool)
     middles = np.array([shape.middle for shape in shapes])
-    near = _square(middles, points) < np.array([[(shape.reach + room) ** 2] for shape in shapes])
+    near = _square(middles, points) < np.array([[(shape.reach + apart) ** 2] for shape in shapes])
     for k in np.flatnonzero(near.any(axis=1)).tolist():
         shape, left = shapes[k], np.flatnonzero(near[k] & clear)
-        outside = (shape.planes[:, :3] @ points[left].T + shape.planes[:, 3:]).max(axis=0) > room
+        outside = (shape.planes[:, :3] @ points[left].T + shape.planes[:, 3:]).max(axis=0) > apart
         clear[left] = outside | through(points[left]) if shape.carved and through else outside
     return clear
 

@@ -32,7 +32,7 @@ GAP = 0.6  # between a lead and obstacles
 ROUNDING = 0.3  # more along the straight pieces
 
 
-class LeadRoom(Protocol):
+class CableSpace(Protocol):
     """Space for a cable."""
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
@@ -59,12 +59,12 @@ class Ending:
 
 
 def short_path(
-    room: LeadRoom, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
+    space: CableSpace, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
 ) -> Path | None:
     """Return a short path between two ends, within GREED of the shortest; None if there is none.
 
     Args:
-        room: space for the cable.
+        space: space for the cable.
         starts: alternative ends at the one device.
         goals: alternative ends at the other one.
         half: radius of the cable.
@@ -72,15 +72,15 @@ def short_path(
         lattice: points of possible corners, shape (n, 3).
     """
     first, last = (
-        [(end, tip) for end in ends for tip in range(len(end.lengths)) if _clear(room, end, tip, half)]
+        [(end, tip) for end in ends for tip in range(len(end.lengths)) if _clear(space, end, tip, half)]
         for ends in (starts, goals)
     )
     if not first or not last:
         return None
-    lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
+    lattice = lattice[space.free(lattice, half, GAP + ROUNDING)]
     points = np.concatenate([[end.tips()[tip] for end, tip in first], lattice, [end.tips()[tip] for end, tip in last]])
     beyond = len(first) + len(lattice)
-    chain = PathGraph(room, half, radius, points).chain(
+    chain = PathGraph(space, half, radius, points).chain(
         {i: (end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(first)},
         {i: (-end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(last, start=beyond)},
     )
@@ -101,11 +101,11 @@ def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[End
     return np.column_stack([r * np.cos(t), r * np.sin(t), z])
 
 
-def _clear(room: LeadRoom, end: Ending, tip: int, half: float) -> bool:
+def _clear(space: CableSpace, end: Ending, tip: int, half: float) -> bool:
     """Return whether the straight piece of a stiff end is free outside its device."""
     first, last = min(end.clamped, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
-    return bool(room.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
+    return bool(space.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class _Ends:
 class PathGraph:
     """Points (n, 3) where a cable may turn, and the straight pieces between them, computed when needed."""
 
-    room: LeadRoom  # space for the cable
+    space: CableSpace  # space for the cable
     half: float  # radius of the cable
     radius: float  # of the arcs between two pieces
     points: Array  # first those at the ring, last those at the lidar
@@ -136,7 +136,7 @@ class PathGraph:
         """
         left = GREED * np.linalg.norm(self.points[:, None] - self.points[list(goals)], axis=2).min(axis=1)
         ends = _Ends(min(goals), *(np.array(each) for each in zip(*goals.values(), strict=True)))
-        # a piece is known by its two points; before the first one stands the stiff end
+        # a piece is known by its two points; before the first one is the stiff end
         shortest: dict[int, Array] = {}  # of all chains so far that end with each piece from a point
         came: dict[tuple[int, int], tuple[int, int]] = {}
         arrived: dict[int, int] = {}
@@ -177,7 +177,7 @@ class PathGraph:
             fits[last] &= _arc(self.radius, turn) <= np.minimum(ends.left[end], lengths[last] / 2)
         chosen = np.flatnonzero(fits)
         inside = self.points[here] + _on_arcs(self.radius, direction, along[chosen])
-        free = self.room.free(inside.reshape(-1, 3), self.half, GAP).reshape(len(inside), -1).all(axis=0)
+        free = self.space.free(inside.reshape(-1, 3), self.half, GAP).reshape(len(inside), -1).all(axis=0)
         return chosen[free]
 
     def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
@@ -188,8 +188,8 @@ class PathGraph:
             others = np.flatnonzero((lengths > self.radius) & (lengths < REACH))
             share = np.linspace(0.0, 1.0, math.ceil(REACH / SAMPLE) + 1)[1:, None, None]
             samples = self.points[here] + share * along[others]
-            free = self.room.free(samples.reshape(-1, 3), self.half, GAP + ROUNDING).reshape(len(share), -1).all(axis=0)
-            others = others[free]
+            free = self.space.free(samples.reshape(-1, 3), self.half, GAP + ROUNDING)
+            others = others[free.reshape(len(share), -1).all(axis=0)]
             self._joined[here] = others, along[others] / lengths[others, None], lengths[others]
         return self._joined[here]
 

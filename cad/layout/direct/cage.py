@@ -27,7 +27,7 @@ SCREW_DEPTH = 10.0  # of a radial screw in the boss
 UNDER_CAGE_HEAD = 3.5  # of a leg
 TRAP_WALL = 3.0  # of the boss outside a nut
 WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
-TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator beside it
+TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator next to it
 PLUG_PLAY = 1.0  # clearance around a plug in a hole
 PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
 POISSON = 0.35
@@ -53,12 +53,12 @@ class BearingCage:
 
     @property
     def high(self) -> float:
-        """Height of the boss, and of the whole base."""
+        """Height of the boss, and of the entire base."""
         return _boss_top(self.stack, self.low)
 
     @property
     def foot(self) -> float:
-        """Height of the flange that the bell stands on."""
+        """Height of the flange below the bell."""
         return (self.low + self.high) / 2
 
 
@@ -66,7 +66,7 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
     """Return the holes for the base of a cage.
 
     Raises:
-        BuildError: the case has no four holes beside the turning flange.
+        BuildError: the case has no four holes next to the turning flange.
     """
     servo, printer = scanner.servo, scanner.printer
     opening = stack.flange_radius + 1.0
@@ -89,8 +89,8 @@ def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | N
         return None
     printer = scanner.printer
     thread = thread_in_part(CAGE_SCREW, printer, carries=True)
-    if thread.trap is not None and not has_room(thread.trap, stack, _base_low(stack, ears), printer.min_wall_mm):
-        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False, carries=True)
+    if thread.trap is not None and not nut_fits(thread.trap, stack, _base_low(stack, ears), printer.min_wall_mm):
+        thread = thread_in_part(CAGE_SCREW, printer, nut_fits=False, carries=True)
     hole = lead_hole(scanner, stack)
     avoid = (*ears.holes, *((x, hole[1]) for x in (-hole[0], hole[0]) if hole[0]))
     return BearingCage(
@@ -130,7 +130,7 @@ def _boss_top(stack: DirectStack, low: float) -> float:
     return min(low + BASE_HEIGHT, stack.ring_bottom - RING_ABOVE_BASE)
 
 
-def has_room(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
+def nut_fits(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
     """Return whether a nut in the boss has a floor below it and does not reach the ring above."""
     quarter = (_boss_top(stack, low) - low) / 4
     return 3 * quarter - trap.corner >= wall and trap.corner <= quarter + RING_ABOVE_BASE / 2

@@ -29,7 +29,7 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
     """Lay out the stack of one scanner without a ring and a bearing; R is the laser in the rotation frame, (3, 3)."""
     servo = scanner.servo
     floor = max(FLOOR, servo.horn_boss_height_mm + OVER_BOSS)
-    bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].head_room
+    bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].driver_radius
     diameter = float(math.ceil(bore + 2 * CUP_WALL))
     hub_radius = flange = diameter / 2 + CUP_HUB_WALL
     foot, foot_height, grip = 0.0, 0.0, 0.0
@@ -39,7 +39,7 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
         # over the horn's face: the heads of the frame's screws, with clearance
         foot_height = servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
         flange = diameter / 2
-        wall = SCREWS[servo.horn_screw].head_room + scanner.printer.min_wall_mm  # around the heads in the cone
+        wall = SCREWS[servo.horn_screw].driver_radius + scanner.printer.min_wall_mm  # around the heads in the cone
         grip = _grip(servo, max(floor, foot_height + max(FLOOR_ON_FOOT, wall)))
         floor = max(grip, foot_height + flange - foot)  # a cone of 45 deg needs no support
     return DirectStack(

@@ -17,7 +17,7 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 GRIP = 2.5  # of the plate, under the heads of the servo's screws
-HORN_ROOM = 0.5  # around the turning parts in the plate's opening
+HORN_GAP = 0.5  # around the turning parts in the plate's opening
 OVER_HEADS = 0.5  # between the heads and the parts that turn above them
 GAP = 0.3  # around the case
 LEG = 5.0
@@ -98,12 +98,12 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
     """
     servo, printer = scanner.servo, scanner.printer
     hole = passing_hole(SCREWS[servo.front.screw], printer)
-    opening = max(servo.horn_diameter_mm / 2, stack.foot_radius) + HORN_ROOM
+    opening = max(servo.horn_diameter_mm / 2, stack.foot_radius) + HORN_GAP
     wall = min(math.hypot(x, y) for x, y in servo.front.places) - hole / 2 - opening
     if wall < printer.min_wall_mm:
         raise BuildError(
             f"{SERVO_FRAME}: plate: holes = {list(servo.front.places)} in front{servo.caution('holes')}: leave a "
-            f"wall of {wall:.2f} mm beside the horn of {servo.name}, {printer.name} needs min_wall_mm = "
+            f"wall of {wall:.2f} mm next to the horn of {servo.name}, {printer.name} needs min_wall_mm = "
             f"{printer.min_wall_mm:g}"
         )
     (x0, y0, z0), (x1, y1, _) = servo.case_min_mm, servo.case_max_mm

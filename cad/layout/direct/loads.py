@@ -71,7 +71,7 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
     """Return the smallest bearing around shaft and leads and under the hub; None without a ring if there is none.
 
     Raises:
-        BuildError: the leads of the ring need more room than any bearing leaves.
+        BuildError: the leads of the ring need more space than any bearing leaves.
     """
     depth = max(LEADS_DEPTH, stack.lead_diameter + 2 * BUNDLE_GAP)
     least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * depth)
@@ -90,7 +90,7 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
 def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
     """Return whether the horn bears the heaviest linkage of any angles without a bearing.
 
-    A horn that its maker does not rate is trusted with little.
+    A horn without a rating is assumed to bear little.
     """
     return heaviest(scanner, stack).moment_nm <= trusted_moment_nm(scanner)
 

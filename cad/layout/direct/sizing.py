@@ -91,7 +91,7 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     """Return the shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
     ring = scanner.slip_ring
     if ring is None:
-        shaft = min(SHAFT_PLAIN, math.floor(4 * _room_on_horn(scanner.servo)) / 2)  # between the heads of its screws
+        shaft = min(SHAFT_PLAIN, math.floor(4 * _radius_on_horn(scanner.servo)) / 2)  # between the heads of its screws
         return max(SHAFT_MIN, shaft), 0.0, 0.0, 0.0
     if ring.bore_mm == 0:
         raise BuildError(
@@ -99,8 +99,8 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
             f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {LEAST_BORE:.1f}"
         )
     shaft = round(ring.bore_mm - SHAFT_SLIDES, 2)
-    if shaft / 2 > _room_on_horn(scanner.servo) > (ring.bore_mm - SHAFT_LOOSE) / 2:
-        shaft = math.floor(4 * _room_on_horn(scanner.servo)) / 2  # the ring's set screws centre it
+    if shaft / 2 > _radius_on_horn(scanner.servo) > (ring.bore_mm - SHAFT_LOOSE) / 2:
+        shaft = math.floor(4 * _radius_on_horn(scanner.servo)) / 2  # the ring's set screws centre it
     if shaft < SHAFT_MIN:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: a shaft of {shaft:g} mm bends under the lidar; "
@@ -114,7 +114,7 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     return shaft, ring.length_mm, ring.outer_diameter_mm / 2, ring.bore_mm
 
 
-def _room_on_horn(servo: Servo) -> float:
+def _radius_on_horn(servo: Servo) -> float:
     """Return the radius inside the heads of the horn's screws."""
     return (servo.horn_circle_mm - SCREWS[servo.horn_screw].head_diameter) / 2
 
@@ -124,13 +124,13 @@ def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, f
     screw = SCREWS[servo.horn_screw]
     circle = servo.horn_circle_mm / 2
     radius = max(servo.horn_diameter_mm / 2, circle + screw.head_diameter / 2 + 0.5)
-    room, boss = _room_on_horn(servo), servo.horn_boss_diameter_mm / 2
-    collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(room, boss + COLLAR_WALL_MIN)))
-    if collar > room:
+    inside, boss = _radius_on_horn(servo), servo.horn_boss_diameter_mm / 2
+    collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(inside, boss + COLLAR_WALL_MIN)))
+    if collar > inside:
         mark = servo.caution("horn_circle_mm")
         raise BuildError(
             f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
-            f"{servo.horn_circle_mm:g} mm{mark} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"
+            f"{servo.horn_circle_mm:g} mm{mark} leave {inside:g} mm; use a ring with a smaller bore, a capsule, or none"
         )
     thickness = 4.0
     return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)

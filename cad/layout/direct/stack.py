@@ -2,12 +2,12 @@
 
 Rotation frame at gamma = 0, mm: origin at the optical centre, z the rotation axis out of the servo horn, +y
 towards the servo's +Y face, where the index marks meet. Everything that turns stays above the plane of the
-ring's top, everything that stands still beside the shaft stays below it: clearance of a whole turn needs no stepping.
+ring's top, all fixed parts around the shaft stay below it: clearance over a turn needs no stepping.
 
     z = 0             optical centre
     -h                top of the linkage's hub
     shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
-    hub_bottom        the shoulder, or below it the lower end of the sleeve that sits in a bearing
+    hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
     leads_low         HUB_GAP, or what the bend of its leads needs, below: the end of the ring's rotor collar
     ring_top          the collar's length below
     ring_bottom       the length of the ring's stator below
@@ -56,7 +56,7 @@ GROOVES = {
 CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
 CAGE_WALL = 5.0
 CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
-BEARING_SLACK = 0.3  # along the axis: room for what bonds the bearing
+BEARING_SLACK = 0.3  # along the axis: space for the bond of the bearing
 CAGE_GAP = 1.0  # between hub and cage
 WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
@@ -77,13 +77,13 @@ class DirectStack(Hub):
     collar_height: float
     waist_length: float  # of the thin piece that bends where horn and bearing are not quite in line
     waist_diameter: float  # in aluminium
-    foot_radius: float = 0.0  # of a cup that stands over the screws of a servo frame; 0 of every other one
+    foot_radius: float = 0.0  # of a cup over the screws of a servo frame; else 0
     foot_height: float = 0.0
     grip: float = 0.0  # of such a cup under the heads of the horn's screws; else its flange
 
     @property
     def shaft(self) -> str:
-        """Name of the part that stands on the horn."""
+        """Name of the part on the horn."""
         return SERVO_SHAFT if self.cup_bore == 0 else HORN_CUP
 
     @property

@@ -30,7 +30,7 @@ class TripodFoot:
 
 
 def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
-    """Return the plate below a thickness of the mount, so thick that no screw of the mount stands out."""
+    """Return the plate below a thickness of the mount, so thick that no screw of the mount protrudes."""
     longest = shank_mm(screw, above, "trap", OVER_NUTS)
     mount = thread_in_part(screw, printer, carries=True)
     thickness = max(LEAST, longest - above) if mount.trap is not None else LEAST

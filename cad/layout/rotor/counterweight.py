@@ -21,7 +21,7 @@ from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
-from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, AlignmentLinkage, Ear
+from scanwright.cad.layout.rotor.linkage import CROSS_RADIUS, AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
@@ -51,10 +51,10 @@ SECTIONS = (
 )
 SCREW = SCREWS["M4"]
 UPRIGHT = 1e-6  # sine of the tilt
-EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_ROOM + 0.5  # clear of the cross screws
+EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_RADIUS + 0.5  # clear of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
 FROM_HUB = 1.0
-TRIM = 5.0  # that the bar can slide either way: a lidar's centre of mass is undocumented
+TRIM = 5.0  # travel of the bar in either direction: a lidar's centre of mass is undocumented
 SCREWS_AT = (9.0, 25.0)  # from the inner end of the bar
 LEAST_LENGTH = 32.0  # covers the screws
 LONGER = 2.0  # than estimated the bar may become (measured: 1.5)
@@ -152,8 +152,8 @@ def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: t
     start = stack.hub_radius + FROM_HUB + TRIM
     ear = Ear(
         azimuth=azimuth,
-        half_width=max(section[0] / 2, SCREW.head_room + TRIM / 2),
-        end=start + SCREWS_AT[-1] + TRIM + SCREW.head_room,
+        half_width=max(section[0] / 2, SCREW.driver_radius + TRIM / 2),
+        end=start + SCREWS_AT[-1] + TRIM + SCREW.driver_radius,
         low=stack.shoulder + EAR_ABOVE_SHOULDER,
         high=-stack.h - EAR_BELOW_TOP,
         slots=tuple((start + at - TRIM, start + at + TRIM) for at in SCREWS_AT),

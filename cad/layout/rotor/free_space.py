@@ -47,7 +47,7 @@ def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
 
 def at_screws(points: Array, p: AlignmentLinkage) -> Mask:
     """Return points over or under the heads of the lidar's screws, anywhere in their slots."""
-    near = [_from_slot(points, *slot_ends(place, p.screw_travel)) < p.screw.head_room for place in p.holes]
+    near = [_from_slot(points, *slot_ends(place, p.screw_travel)) < p.screw.driver_radius for place in p.holes]
     return np.asarray(np.any(near, axis=0))
 
 

@@ -32,7 +32,7 @@ from scanwright.design.scanner import Scanner
 
 CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft
 CROSS_WASHER_MM, CROSS_WASHER_THICK = 9.0, 0.8  # ISO 7093: a wide one, the pressure on plastic limits the friction
-CROSS_ROOM = CROSS_WASHER_MM / 2 + 0.2  # radius of the path of washer, head and driver
+CROSS_RADIUS = CROSS_WASHER_MM / 2 + 0.2  # radius of the path of washer, head and driver
 CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
@@ -67,7 +67,7 @@ class AlignmentLinkage:
     half_y: float
     chamfer: float
     body: Box
-    ears: Box | None  # room of a sub-plate's ears
+    ears: Box | None  # space of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: Thread
     cables: tuple[Box, ...]
@@ -107,7 +107,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
     if edge < printer.min_wall_mm:
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: seat: holes at {list(lidar.base.places)}: leaves a wall of {edge:.2f} mm "
-            f"at the edge of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
+            f"at the edge of the plate, {lidar.name} with {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
     corner = min(half_x + half_y - abs(x) - abs(y) for x, y in outermost)
@@ -164,9 +164,9 @@ def _foot(plate: Array, stack: Hub) -> Array:
         return plate
     normal = stack.R()[:, 2]
     lying = math.hypot(normal[0], normal[1]) ** 2
-    room = max(0.0, float(lower[:, 2].min()) - stack.shoulder - 2.0)
-    heel = lower - [0.0, 0.0, min(HEEL * lying, room)]
-    return np.concatenate([heel, lower - min(BACK * lying, room / max(normal[2], 1e-6)) * normal])
+    free = max(0.0, float(lower[:, 2].min()) - stack.shoulder - 2.0)
+    heel = lower - [0.0, 0.0, min(HEEL * lying, free)]
+    return np.concatenate([heel, lower - min(BACK * lying, free / max(normal[2], 1e-6)) * normal])
 
 
 def _grown(box: Box) -> Box:
@@ -191,7 +191,7 @@ def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ..
     half = math.acos(min(1.0, cosine / max(tilt_sine, 1e-12)))
     if half < FIN_HALF:
         return tuple(pieces)
-    if len(pieces) > 1:  # a full fan has beams on both sides of the sector, and those beside the ring are to be free
+    if len(pieces) > 1:  # a full fan has beams on both sides of the sector, and those next to the ring must be free
         half = max(FIN_HALF, half - RING_MARGIN)
     centre = math.atan2(-q[1], -q[0])
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):

@@ -71,7 +71,7 @@ def hub_tie_of(
         return _without(HUB_TIE, "no leads leave a ring below the hub")
     if drive.no_hub_tie:
         return _without(HUB_TIE, drive.no_hub_tie)
-    free = next((seat for seat in _candidates(p, ear) if _has_room(seat, p, neck)), None)
+    free = next((seat for seat in _candidates(p, ear) if _fits(seat, p, neck)), None)
     return free or _without(HUB_TIE, "plate, fan or the path of an inserted part is in its place")
 
 
@@ -100,7 +100,7 @@ def _candidates(p: AlignmentLinkage, ear: Ear | None) -> Iterator[TieSeat]:
         )
 
 
-def _has_room(seat: TieSeat, p: AlignmentLinkage, neck: Array) -> bool:
+def _fits(seat: TieSeat, p: AlignmentLinkage, neck: Array) -> bool:
     """Return whether a tab of the hub is clear of all else, with space for a tie around it."""
     body = _filled(seat, seat.first - FROM_SIDE, seat.end, seat.half_width, (seat.low, seat.high))
     over = (seat.high + 0.1, seat.high + TIE_OVER)

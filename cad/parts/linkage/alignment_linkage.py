@@ -67,8 +67,8 @@ WIDER = 0.03  # of the paths of drivers, in each attempt: they may graze the rim
 TRAP_LENGTH = 15.0  # below the plate: the neck may begin there
 MARK_LENGTH = 8.0  # of the mark beyond the plate: a neck that is thicker there keeps a wall
 DRIVER_LENGTH = 150.0
-DRIVER_DEEP = 8.0  # below the plate: height at which the wall beside a driver is measured, since the neck tapers
-DRIVER_WALL = 3.0  # a thinner wall beside a driver is removed
+DRIVER_DEEP = 8.0  # below the plate: height at which the wall next to a driver is measured, since the neck tapers
+DRIVER_WALL = 3.0  # a thinner wall next to a driver is removed
 
 
 def linkage_spec(place: Placement) -> PartSpec:
@@ -136,13 +136,13 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
 class Shapes:
     """The shapes of the linkage, in place: `alignment_linkage` and the preview join them in the same order.
 
-    Plate and neck, without room and fins, of which the body of the plate is kept; with the hub, without the room;
-    without the holes.
+    Plate and neck, without free space and fins, of which the body of the plate is kept; with the hub, without the free
+    space; without the holes.
     """
 
     plate: cq.Shape
     neck: cq.Shape
-    room: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
+    free_space: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
     fins: list[cq.Shape]  # the fan, and what would be a fin of the neck
     hub: cq.Shape
     holes: list[cq.Shape]  # and marks
@@ -164,7 +164,7 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         return Shapes(
             plate=_plate(p).moved(laser),
             neck=solids.hull(corners),
-            room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p, attempt))],
+            free_space=[shape.moved(laser) for shape in (*_lidar_space(p), *_drivers(p, attempt))],
             fins=[shape.moved(laser) for shape in fins],
             hub=hub(p),
             holes=[*(shape.moved(laser) for shape in marked), *hub_cuts(p)],
@@ -176,10 +176,10 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt) as checked:
         body: cq.Shape = checked(shapes.plate.fuse(shapes.neck))
     with building(ALIGNMENT_LINKAGE, "free space of lidar, cables and fan", "tilt", tilt):
-        # small loose pieces beside the plate are dropped
-        body = _largest(body.cut(*shapes.room, *shapes.fins))
+        # small loose pieces next to the plate are dropped
+        body = _largest(body.cut(*shapes.free_space, *shapes.fins))
     with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm") as checked:
-        body = checked(body.fuse(shapes.hub).cut(*shapes.room))
+        body = checked(body.fuse(shapes.hub).cut(*shapes.free_space))
     with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm") as checked:
         linkage = checked(body.cut(*shapes.holes).clean())
     bottom = linkage.BoundingBox().zmin
@@ -195,7 +195,7 @@ def _tilt(p: AlignmentLinkage) -> str:
     return f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
 
 
-def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
+def _lidar_space(p: AlignmentLinkage) -> list[cq.Solid]:
     """Return the space for inserting the lidar along its z: body and cables, swept upwards."""
     over = [box for box in (p.body, p.ears) if box is not None]
     boxes = [*(((x, y, p.top), high) for (x, y, _), high in over), *p.cables]
@@ -219,7 +219,7 @@ def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
     if p.ears is not None:
         return []
     low = p.top - PLATE_THICKNESS
-    return _for_screws(p, p.screw.head_room + WIDER * attempt, low - DRIVER_LENGTH, low)
+    return _for_screws(p, p.screw.driver_radius + WIDER * attempt, low - DRIVER_LENGTH, low)
 
 
 def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
@@ -232,10 +232,10 @@ def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
     opened = []
     for place in p.holes:
         out = np.array(place) / math.hypot(*place)
-        fins = np.array([[*(place + (p.screw.head_room + DRIVER_WALL) * out), below]])
+        fins = np.array([[*(place + (p.screw.driver_radius + DRIVER_WALL) * out), below]])
         if not in_hull(fins, neck, 0.0).any():
             end = place + 2 * max(p.half_x, p.half_y) * out
-            opened.append(solids.slot(p.screw.head_room, place, end.tolist(), low, high))
+            opened.append(solids.slot(p.screw.driver_radius, place, end.tolist(), low, high))
     return opened
 
 
@@ -253,7 +253,7 @@ def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
     """Return holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
         return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
-    pockets = _for_screws(p, p.screw.head_room, *_pockets(p))
+    pockets = _for_screws(p, p.screw.driver_radius, *_pockets(p))
     low = p.top - PLATE_THICKNESS - 1.0
     traps = [] if p.ear_thread.trap is None else [_ear_trap(p, p.ear_thread.trap, hole) for hole in p.ear_screws]
     return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]

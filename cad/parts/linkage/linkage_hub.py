@@ -12,7 +12,7 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.hub import JOURNAL_WALL
-from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.rotor.linkage import CROSS_RADIUS, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size
@@ -103,7 +103,7 @@ def _crossed(p: AlignmentLinkage) -> list[cq.Solid]:
     stack, cuts = p.stack, []
     for azimuth in p.cross_azimuths:
         cuts.append(solids.radial(p.cross_hole / 2, azimuth, stack.cross))
-        cuts.append(solids.radial(CROSS_ROOM, azimuth, stack.cross, cross_seat_mm(stack) - CROSS_WASHER_THICK))
+        cuts.append(solids.radial(CROSS_RADIUS, azimuth, stack.cross, cross_seat_mm(stack) - CROSS_WASHER_THICK))
     return cuts
 
 

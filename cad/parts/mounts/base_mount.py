@@ -137,9 +137,10 @@ def base_mount(place: Placement) -> cq.Solid:
         feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
         body = body.fuse(*rails, *feet)
         cuts: list[cq.Shape] = []
+        driver, heads = mounted.screw.driver_radius, mounted.ears - UNDER_MOUNT_HEAD
         for x, y in mounted.holes:
             cuts.append(solids.upright(hole, back - 20.0, mounted.ears + 1.0, x, y))
-            cuts.append(solids.upright(mounted.screw.head_room, back - 400.0, mounted.ears - UNDER_MOUNT_HEAD, x, y))
+            cuts.append(solids.upright(driver, back - 400.0, heads, x, y))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
         cuts += [cut.moved(on_deck) for seat in deck.ties for cut in tie_slots(seat)]
@@ -162,6 +163,6 @@ def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Sol
     x = side * mounted.holes[0][0]
     _, cy, cz = deck.back_centre
     y = deck.back_half[1] - RAIL_INSET
-    half = max(RAIL_HALF_WIDTH, mounted.screw.head_room + rail_wall(printer))
+    half = max(RAIL_HALF_WIDTH, mounted.screw.driver_radius + rail_wall(printer))
     low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))

@@ -53,7 +53,7 @@ from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
-ROOM = 0.7  # around the bell's foot
+BELL_GAP = 0.7  # around the bell's foot
 
 
 def bell_spec(place: Placement) -> PartSpec | None:
@@ -151,7 +151,7 @@ def bearing_cage(p: BearingCage) -> cq.Solid:
         for azimuth in p.legs:
             middle, heads = (p.foot + p.high) / 2, stack.cage_inner + UNDER_CAGE_HEAD
             cuts.append(solids.radial(p.cage_hole / 2, azimuth, middle))
-            cuts.append(solids.radial(CAGE_SCREW.head_room, azimuth, middle, heads))
+            cuts.append(solids.radial(CAGE_SCREW.driver_radius, azimuth, middle, heads))
         return checked(body.cut(*cuts).clean())
 
 
@@ -161,9 +161,9 @@ def cage_base(p: BearingCage) -> cq.Solid:
     seats = stack.horn + ears.seats
     last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
     with building(CAGE_BASE, "plate and boss", "holes", ears.holes) as checked:
-        reaches_out = -last > stack.cage_outer + ROOM + 2 * FOOT_RADIUS
+        reaches_out = -last > stack.cage_outer + BELL_GAP + 2 * FOOT_RADIUS
         tail = solids.box((-ears.half_x, last, p.low), (ears.half_x, 0.0, p.high if reaches_out else p.foot))
-        around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
+        around = solids.upright(stack.cage_outer + BELL_GAP, p.foot, p.high + 1.0)
         boss = solids.upright(stack.cage_inner - p.fit / 2, p.low, p.high)
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
         half, reach = p.lead_hole
@@ -175,7 +175,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.upright(ears.opening, stack.horn + ears.front, p.high + 1.0)]
         for x, y in ears.holes:
             cuts.append(solids.upright(ears.hole / 2, seats - 1.0, p.high + 1.0, x, y))
-            cuts.append(_head_room(p, x, y))
+            cuts.append(_head_recess(p, x, y))
         for azimuth in p.legs:
             middle, start = (p.foot + p.high) / 2, stack.cage_inner - SCREW_DEPTH
             cuts.append(solids.radial(p.thread.hole / 2, azimuth, middle, start, SCREW_DEPTH + 1.0))
@@ -192,9 +192,9 @@ def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
     return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
 
 
-def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
+def _head_recess(p: BearingCage, x: float, y: float) -> cq.Shape:
     """Return the recess of one screw's head; next to the opening it is open, else a sliver would remain."""
-    radius, low, high = p.ears.screw.head_room, p.low + UNDER_HEAD, p.high + 1.0
+    radius, low, high = p.ears.screw.driver_radius, p.low + UNDER_HEAD, p.high + 1.0
     recess: cq.Shape = solids.upright(radius, low, high, x, y)
     reach = math.hypot(x, y)
     if reach - radius > p.ears.opening + 1.0:

@@ -20,7 +20,7 @@ import numpy as np
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.belt.stack import (
     BOSS,
-    CASE_ROOM,
+    CASE_GAP,
     DISC,
     FOOT,
     FOOT_HALF,
@@ -66,7 +66,7 @@ def tower_spec(place: Placement) -> PartSpec | None:
         placed_axes(inward_axes(disc_azimuths(stack), heads, stack.disc_top - DISC / 2), stack.turn()),
         grip_mm=round_wall_mm(stack.chamber_radius, heads, passing_hole(DISC_SCREW, printer)),
         thread_mm=SCREW_DEPTH - fit / 2,
-        thread=thread_in_part(DISC_SCREW, printer, room_for_nut=False),
+        thread=thread_in_part(DISC_SCREW, printer, nut_fits=False),
     )
     words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
     return PartSpec(
@@ -168,8 +168,8 @@ def _shelf(stack: BeltStack) -> cq.Shape:
     low, high = stack.plate_y
     (inner_low, _), (inner_high, _) = stack.arms_y
     bottom, top = stack.tower_top - SHELF, stack.tower_top
-    root = stack.centre + stack.servo.case_min_mm[0] - TRAVEL - CASE_ROOM
-    end = stack.centre + stack.slot_x + TRAVEL + PLATE_SCREW.head_room + 1.0
+    root = stack.centre + stack.servo.case_min_mm[0] - TRAVEL - CASE_GAP
+    end = stack.centre + stack.slot_x + TRAVEL + PLATE_SCREW.driver_radius + 1.0
     back = -stack.tower_radius
     outline = [[-MARKED, low], [end, low], [end, high], [-MARKED, high], [back, 12.0], [back, -12.0]]
     shelf = solids.prism(outline, bottom, top)
@@ -201,7 +201,7 @@ def _holes(stack: BeltStack, printer: Printer, foot: Thread) -> list[cq.Solid]:
     for azimuth in disc_azimuths(stack):
         height, heads = stack.disc_top - DISC / 2, stack.chamber_radius + UNDER_HEAD
         cuts.append(solids.radial(passing_hole(DISC_SCREW, printer) / 2, azimuth, height))
-        cuts.append(solids.radial(DISC_SCREW.head_room, azimuth, height, heads))
+        cuts.append(solids.radial(DISC_SCREW.driver_radius, azimuth, height, heads))
     ring = stack.collar_low + BOSS / 2
     cuts.append(solids.cylinder(WINDOW / 2, (0.0, 0.0, ring), (-1.0, 0.0, 0.0), 80.0))
     return cuts

@@ -22,7 +22,7 @@ from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 
-BODY_ROOM = 0.5  # around the capsule's body
+BODY_GAP = 0.5  # around the capsule's body
 SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
 RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
@@ -65,10 +65,10 @@ def capsule_holder(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the disc."""
     low, high = stack.disc_top - DISC, stack.disc_top
     hole = passing_hole(SCREWS[stack.flange.screw], printer)
-    thread = thread_in_part(DISC_SCREW, printer, room_for_nut=False)
+    thread = thread_in_part(DISC_SCREW, printer, nut_fits=False)
     with building(SLIP_RING_ADAPTER, "disc", "flange.diameter_mm", f"{stack.flange.diameter_mm:g}") as checked:
         radius = stack.chamber_radius - printer.fit_clearance_mm / 2
-        cuts = [solids.upright(stack.ring_radius + BODY_ROOM, low - 1.0, high + 1.0)]
+        cuts = [solids.upright(stack.ring_radius + BODY_GAP, low - 1.0, high + 1.0)]
         cuts += [solids.upright(hole / 2, low - 1.0, high + 1.0, x, y) for x, y in flange_centres(stack.flange)]
         for azimuth in disc_azimuths(stack):
             start = radius - SCREW_DEPTH

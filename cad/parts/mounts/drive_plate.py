@@ -85,7 +85,7 @@ def drive_plate(stack: BeltStack, p: Ears, slot: float) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.upright(p.opening, seats - 1.0, high + 1.0)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, high + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, high + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.driver_radius, low + UNDER_HEAD, high + 1.0, x, y))
         for x in (-stack.slot_x, stack.slot_x):
             for _, y in stack.arms_y:
                 cuts.append(solids.slot(slot / 2, (x - TRAVEL, y), (x + TRAVEL, y), low - 1.0, high + 1.0))

@@ -48,9 +48,9 @@ def servo_frame(p: ServoFrame) -> cq.Solid:
     with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
         body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))
         feet = [solids.box((-p.reach_x, a, p.low), (p.reach_x, b, p.low + FOOT)) for a, b in ((y0, w0), (w1, y1))]
-        room = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
+        inside = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
         window = solids.box((-p.reach_x - 1.0, w0, p.low - 1.0), (p.reach_x + 1.0, w1, p.plate - HEADER))
-        body = checked(body.fuse(*feet).cut(room, window).clean())
+        body = checked(body.fuse(*feet).cut(inside, window).clean())
     with building(SERVO_FRAME, "opening and holes", "holes", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.plate - 1.0, p.high + 1.0)]
         if y1 - p.opening < LEAST_BRIDGE:  # a plate that ends so close to the horn is open there

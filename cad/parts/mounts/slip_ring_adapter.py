@@ -113,5 +113,5 @@ def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
         cuts = [solids.box((-p.opening, slot_end, low - 9), (p.opening, 99.0, top + 9))]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, top + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, top + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.driver_radius, low + UNDER_HEAD, top + 1.0, x, y))
         return checked(tail.fuse(prongs, *feet).cut(*cuts))

@@ -21,7 +21,7 @@ from scanwright.cad import solids
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
 from scanwright.cad.layout.belt.plate import pulley_foot_radius
-from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
 from scanwright.cad.layout.joints import (
     Joint,
     horn_centres,
@@ -84,7 +84,7 @@ def _bore(stack: BeltStack, printer: Printer) -> float:
 
 
 def _grub_thread(printer: Printer) -> Thread:
-    return thread_in_part(GRUB, printer, room_for_nut=False)
+    return thread_in_part(GRUB, printer, nut_fits=False)
 
 
 def drive_pulley_spec(place: Placement) -> PartSpec | None:
@@ -108,7 +108,7 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         name=names.DRIVE_PULLEY,
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer),
-        step=Step("Drive pulley, and the servo beside the shaft", words, "the belt runs a turn in its rims"),
+        step=Step("Drive pulley, and the servo next to the shaft", words, "the belt runs a turn in its rims"),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack),
@@ -140,10 +140,10 @@ def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
         cuts = []
         for x, y in horn_centres(servo).tolist():
             cuts.append(solids.upright(passing_hole(screw, printer) / 2, horn - 1.0, top, x, y))
-            cuts.append(solids.upright(screw.head_room, stack.pulley_seat, top, x, y))
+            cuts.append(solids.upright(screw.driver_radius, stack.pulley_seat, top, x, y))
         if boss > 0:
             radius = boss + printer.fit_clearance_mm / 4
-            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + HORN_BOSS_ROOM))
+            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + HORN_BOSS_GAP))
         made = checked(body.cut(*cuts).clean())
     return made.moved(solids.location(stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0]))
 

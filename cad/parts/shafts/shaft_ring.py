@@ -60,7 +60,7 @@ def _bore(stack: BeltStack, printer: Printer) -> float:
 
 def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
     """Make the ring."""
-    hole, head = passing_hole(RING_SCREW, printer) / 2, RING_SCREW.head_room
+    hole, head = passing_hole(RING_SCREW, printer) / 2, RING_SCREW.driver_radius
     with building(SHAFT_RING, "ring", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         low, high = stack.collar_low, stack.collar_low + BOSS
         body = solids.upright(stack.boss_radius, low, high).fuse(

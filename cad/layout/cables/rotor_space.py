@@ -22,7 +22,7 @@ BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, 
 
 
 @dataclass(frozen=True, slots=True)
-class RotorRoom:
+class RotorSpace:
     """Space for a lead on the rotor."""
 
     shapes: tuple[Shape, ...]  # convex shapes that turn
@@ -36,11 +36,11 @@ class RotorRoom:
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
         """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
-        room = half + gap
-        clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room)
+        apart = half + gap
+        clear = (points[:, 2] > self.floor + apart) & self._over_deck(points, apart)
         for is_clear in (  # the cheapest first, and of what is left only
-            lambda some: ~self._in_fan(some, room),
-            lambda some: clear_of(self.shapes, some, room, lambda inside: self._carved(inside, room)),
+            lambda some: ~self._in_fan(some, apart),
+            lambda some: clear_of(self.shapes, some, apart, lambda inside: self._carved(inside, apart)),
             self.clear_of_others,
         ):
             left = np.flatnonzero(clear)
@@ -51,20 +51,20 @@ class RotorRoom:
         """Return whether each point, shape (n, 3), is far enough from earlier leads, shape (n,)."""
         return farther(points, *self.others)
 
-    def _carved(self, points: Array, room: float) -> Mask:
+    def _carved(self, points: Array, apart: float) -> Mask:
         """Return whether points are in the linkage's channels for the cables and for inserting the lidar."""
         at = points @ self.R_rot_laser
         inside = [
-            (at > np.array(low) + room).all(axis=1) & (at[:, :2] < np.array(high[:2]) - room).all(axis=1)
+            (at > np.array(low) + apart).all(axis=1) & (at[:, :2] < np.array(high[:2]) - apart).all(axis=1)
             for low, high in self.channels
         ]
         return np.asarray(np.any(inside, axis=0))
 
-    def _over_deck(self, points: Array, room: float) -> Mask:
+    def _over_deck(self, points: Array, apart: float) -> Mask:
         """Return whether points are over the foot of the mount in every position of the turn."""
         normal = np.array(self.deck.normal)
         lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
-        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + room)
+        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + apart)
 
     def _in_fan(self, points: Array, half: float) -> Mask:
         """Return whether a lead at points would meet a beam; both turn together."""
@@ -80,13 +80,13 @@ class RotorRoom:
         return np.asarray(near & (polar > self.hidden_half_angle))
 
 
-def room_of(place: Placement, avoid: Iterable[Shape]) -> RotorRoom:
+def rotor_space_of(place: Placement, avoid: Iterable[Shape]) -> RotorSpace:
     """Return the space on the rotor of one scanner, without leads; `avoid` are shapes of parts that turn."""
     stack, envelope, lidar = place.stack, place.drive.envelope, place.scanner.lidar
     R, sub_plate = stack.R(), stack.sub_plate
     boxes = (envelope.body, envelope.plate(sub_plate), envelope.under(sub_plate), *_stubs(lidar))
     bearings = lidar.bearings_rad()
-    return RotorRoom(
+    return RotorSpace(
         shapes=(*(shape_of(box_corners(box) @ R.T) for box in boxes), *avoid),
         channels=envelope.cables,
         R_rot_laser=R,

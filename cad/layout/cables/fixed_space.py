@@ -19,7 +19,7 @@ from scanwright.design.arrays import Array, Mask
 
 
 @dataclass(frozen=True, slots=True)
-class FixedRoom:
+class FixedSpace:
     """Space for a cable that does not turn."""
 
     shapes: tuple[Shape, ...]  # convex shapes to avoid
@@ -29,24 +29,24 @@ class FixedRoom:
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
         """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
-        room = half + gap
+        apart = half + gap
         over_deck = (points - np.array(self.deck.centre)) @ np.array(self.deck.normal)
-        clear = (points[:, 2] < self.ceiling - room) & (over_deck > half)
+        clear = (points[:, 2] < self.ceiling - apart) & (over_deck > half)
         middles, radius = self.others
         left = np.flatnonzero(clear)
-        clear[left] = clear_of(self.shapes, points[left], room) & farther(points[left], middles, radius + room)
+        clear[left] = clear_of(self.shapes, points[left], apart) & farther(points[left], middles, radius + apart)
         return np.asarray(clear)
 
-    def with_cable(self, middles: Array, radius: float) -> FixedRoom:
+    def with_cable(self, middles: Array, radius: float) -> FixedSpace:
         """Return the space that a cable leaves."""
         return replace(self, others=(np.concatenate([middles, self.others[0]]), max(radius, self.others[1])))
 
 
-def fixed_room_of(place: Placement, avoid: Iterable[Shape]) -> FixedRoom:
+def fixed_space_of(place: Placement, avoid: Iterable[Shape]) -> FixedSpace:
     """Return the space around all that does not turn, without cables; `avoid` are shapes of parts."""
     products = [_around(each.shape) for each in place.drive.stations if each.shape is not None]
     shapes = (*(shape_of(corners) for corners in products), *avoid)
-    return FixedRoom(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0))
+    return FixedSpace(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0))
 
 
 def _around(shape: Cuboid | Rod) -> Array:
