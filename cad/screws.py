@@ -63,10 +63,7 @@ class Trap:
 def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | None:
     """Return the nut pocket of a screw; None if the profile uses none.
 
-    Args:
-        screw: the size.
-        printer: the profile.
-        carries: whether the lidar hangs on it: threads in bare plastic creep, so these always get nuts.
+    If the lidar hangs on the screw (`carries`), a thread in bare plastic always gets a nut, since plastic creeps.
     """
     bare = printer.thread == "cut" or screw.insert is None
     if printer.thread != "nut" and not (carries and bare):
@@ -87,11 +84,7 @@ class Thread:
 def thread_in_part(screw: Screw, printer: Printer, *, nut_fits: bool = True, carries: bool = False) -> Thread:
     """Return the thread that a printer's profile gives a screw.
 
-    Args:
-        screw: the size.
-        printer: the profile.
-        nut_fits: whether a nut fits; if not and the lidar hangs on the screw, an insert is used.
-        carries: whether the lidar hangs on it.
+    If no nut fits and the lidar hangs on the screw (`carries`), an insert is used.
     """
     trap = trap_of(screw, printer, carries=carries)
     if trap is not None and not nut_fits:

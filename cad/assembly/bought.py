@@ -139,7 +139,6 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
 
 
 def _of_cables(layout: Layout) -> Iterator[BodySpec]:
-    """Yield the leads on the rotor and the fixed cables that have a path."""
     drawn = partial(BodySpec, colour=LEAD, chords=LEAD_CHORDS)
     for i, lead in enumerate(layout.leads, start=1):
         if lead.path is not None:

@@ -77,13 +77,7 @@ def triangles_of(assembly: Assembly) -> dict[str, Array]:
 
 
 def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Container[str]) -> SelfOcclusion:
-    """Return the beams that the parts of one scanner hide.
-
-    Args:
-        scanner: angles and lidar.
-        triangles_m: of `triangles_of`, rotation frame at gamma = 0.
-        turning: names of the parts that turn.
-    """
+    """Return the beams that parts hide; triangles of `triangles_of`, `turning` names the parts that turn."""
     by_motion: dict[bool, list[Array]] = {True: [], False: []}
     for name, triangles in triangles_m.items():
         by_motion[name in turning].append(triangles)

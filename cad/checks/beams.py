@@ -23,11 +23,7 @@ def beam_checks(
 ) -> list[Finding]:
     """Return the width of the hidden beams, and of those that the linkage alone hides.
 
-    Args:
-        scanner: angles and lidar.
-        shadow: of all parts.
-        triangles_m: of `shadow.triangles_of`.
-        carriers: names of linkage and sub-plate.
+    `triangles_m` are of `shadow.triangles_of`, `carriers` the names of linkage and sub-plate.
     """
     bearings = scanner.lidar.bearings_rad()
     step = math.degrees(float(bearings[1] - bearings[0]))

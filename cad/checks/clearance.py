@@ -38,13 +38,7 @@ def clearance_checks(assembly: Assembly) -> list[Finding]:
 def turning_check(
     meshes: Mapping[str, TriMesh], turning: Container[str], meet: Container[frozenset[str]] = frozenset()
 ) -> Finding:
-    """Check the least distance of turning and fixed bodies over a full turn.
-
-    Args:
-        meshes: of all bodies by name, as they look while they turn.
-        turning: names of those that turn about the axis.
-        meet: pairs that may touch.
-    """
+    """Check the least distance of turning and fixed bodies over a full turn; `meet` are pairs that may touch."""
     rings = {name: _image(mesh) for name, mesh in meshes.items()}
     sides = {turns: [rings[name] for name in rings if (name in turning) == turns] for turns in (True, False)}
     boxes = {turns: shapely.total_bounds(np.concatenate([[], *side])) for turns, side in sides.items()}

@@ -48,8 +48,8 @@ def glb_bytes(
     Args:
         nodes: parents before children; the first one is the root.
         surfaces: of the nodes with a mesh by name, of `shaded`.
-        extras: values for programs, in `asset.extras`.
-        spin: name of a node that turns about its z, counter-clockwise, and the seconds of one turn.
+        extras: values in `asset.extras`.
+        spin: name of a node that turns counter-clockwise about its z, and the seconds of one turn.
     """
     index = {node.name: i + 1 for i, node in enumerate(nodes)}
     children: dict[str, list[int]] = {}

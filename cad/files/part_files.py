@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartReport:
-    """One made part: volume and mass of the solid material, box in the rotation frame."""
+    """One made part: volume and mass, box in the rotation frame."""
 
     name: str
     volume_mm3: float
@@ -50,7 +50,7 @@ class PartsResult:
 
 
 def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Progress) -> PartsResult:
-    """Label every part and write it into a build folder.
+    """Return label every part and write it into a build folder.
 
     Args:
         scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.

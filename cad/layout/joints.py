@@ -106,11 +106,7 @@ class Joint:
 def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
     """Return the shortest sufficient standard length; in a shallow thread the longest that does not bottom.
 
-    Args:
-        screw: the size.
-        grip: length of the shank before its thread engages.
-        fixing: kind of thread.
-        depth: of the thread, or of the material before the nut.
+    `grip` is the length before the thread, `depth` that of the thread, or of the material before the nut.
     """
     known = LENGTHS[screw.name]
     if fixing == "grub":

@@ -61,10 +61,7 @@ class Hold:
 def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     """Return the strength of one of a joint's screws; None for grub screws, which hold by friction.
 
-    Args:
-        joint: the joint.
-        under: material below its heads.
-        into: material of its threads, or of the body that carries nuts or inserts.
+    `under` is the material below its heads, `into` that of its threads, or of the body that carries nuts or inserts.
     """
     if joint.fixing == "grub":
         return None

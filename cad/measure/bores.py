@@ -36,12 +36,9 @@ class Bore:
 
 
 def bores_of(triangles: Array, walls: Iterable[Wall], preferred: Sequence[float] = (0.0, 0.0, -1.0)) -> list[Bore]:
-    """Return the holes that open to the outside, in a fixed order.
+    """Return the holes that open to the outside, in a fixed order; corners of shape (t, 3, 3).
 
-    Args:
-        triangles: corners, shape (t, 3, 3).
-        walls: of the same mesh.
-        preferred: side that a hole through the device belongs to if both sides are alike.
+    A hole through the device opens on the side `preferred` if both sides are alike.
     """
     scene = build_scene(triangles)
     groups: dict[tuple[int, ...], list[Wall]] = {}

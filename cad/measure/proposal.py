@@ -228,13 +228,7 @@ def _rounded(values: Sequence[float] | Array) -> list[float]:
 
 
 def toml_text(proposal: Proposal, model: str, digest: str) -> str:
-    """Return the lines for a product file; comments state what a person decides.
-
-    Args:
-        proposal: what was measured.
-        model: name of the file.
-        digest: SHA-256 of the file.
-    """
+    """Return the lines for a product file; `model` is the name of the file, `digest` its SHA-256."""
     source = f"measured by scanwright in {model} (sha256 {digest[:12]})"
     record = KINDS[proposal.kind]
     missing = [

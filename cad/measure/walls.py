@@ -74,11 +74,7 @@ class _Piece:
 
 
 def walls_of(triangles: Array) -> list[Wall]:
-    """Return the cylinders of a mesh along x, y, z and across its larger planes.
-
-    Args:
-        triangles: corners [mm], shape (t, 3, 3).
-    """
+    """Return the cylinders of a mesh along x, y, z and across its larger planes; corners [mm], shape (t, 3, 3)."""
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     twice_area = np.linalg.norm(across, axis=1)
     triangles, across, twice_area = (each[twice_area > 1e-9] for each in (triangles, across, twice_area))

@@ -30,8 +30,7 @@ class ScanWindow:
 def window_of(triangles: Array) -> ScanWindow | None:
     """Return the largest band that is round about an upright axis, in the upper part; None if there is none.
 
-    Args:
-        triangles: corners with z up [mm], shape (t, 3, 3).
+    Corners with z up [mm], shape (t, 3, 3).
     """
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
     area = np.linalg.norm(across, axis=1)

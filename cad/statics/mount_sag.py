@@ -41,18 +41,10 @@ class Carried:
 def mount_sag(
     mesh: TriMesh, deck: Deck, mounted: Mounted, carried: Carried, modulus_mpa: float, density_g_cm3: float
 ) -> tuple[Array, Array, Spring]:
-    """Return the deformation of the mount under its load.
+    """Return the deformation of the mount, a mesh in the rotation frame [mm], under its load.
 
     Rotation [rad] on the finer grid, and its error, rotation frame, shapes (3,); the mount as a spring between deck and
     servo.
-
-    Args:
-        mesh: of the mount, rotation frame [mm].
-        deck: its deck.
-        mounted: its load's holes.
-        carried: the load.
-        modulus_mpa: of the material.
-        density_g_cm3: of the material.
 
     Raises:
         RuntimeError: nothing holds the mount.

@@ -44,15 +44,9 @@ class Sag:
 def linkage_sag(
     stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
 ) -> Sag:
-    """Return the sag of the printed parts alone.
+    """Return the sag of linkage and sub-plate, meshes in the rotation frame [mm].
 
-    Args:
-        stack: the layout.
-        meshes: linkage, and sub-plate where there is one; rotation frame [mm].
-        seat: half width, half depth and height of the lidar's seat, laser frame [mm].
-        lidar: in the laser frame.
-        modulus_mpa: of the material.
-        density_g_cm3: of the material.
+    `seat` is half width, half depth and height of the lidar's seat [mm], `lidar` its body, both in the laser frame.
     """
     coarse, fine = (_on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3) for edge in EDGES)
     # remaining error if it falls linearly with the edge: that of the elements falls faster, of corners as fast

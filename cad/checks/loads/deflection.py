@@ -45,13 +45,7 @@ def deflection_checks(
 ) -> tuple[list[Finding], Spring | None]:
     """Check the constant part, which a calibration estimates, and the part that changes over a turn.
 
-    Also returns what lies between hub and lidar as a spring, if it supports the lidar.
-
-    Args:
-        scanner: angles and products.
-        assembly: its parts.
-        bodies: of `masses.link_bodies`.
-        meshes: of all parts.
+    Also returns the parts between hub and lidar as a spring, if they support the lidar; bodies of `masses.link_bodies`.
     """
     down = -scanner.angles.T_world_rot(0.0)[2, :3]
     limit = noise_deg(scanner)

@@ -39,11 +39,7 @@ def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
 def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: float) -> tuple[float, float]:
     """Return the force across the upper and the lower bearing [N] if weight and belt pull in the same direction.
 
-    Args:
-        stack: its layout.
-        weight: of all that turns.
-        centre_mm: height of its centre of mass, rotation frame.
-        pull_n: of both strands.
+    `centre_mm` is the height of the rotor's centre of mass, rotation frame, `pull_n` the pull of both strands.
     """
     span = stack.upper_middle - stack.lower_middle
     moment = 1000 * weight.along_n * weight.off_axis_m  # N mm

@@ -45,13 +45,9 @@ class LeadJoint:
 
 
 def joint_of(path: Path, half: float, space: CableSpace, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
-    """Return the joint of a lead; None if no straight piece is long enough.
+    """Return the joint of a lead with radius `half`; None if no straight piece is long enough.
 
-    Args:
-        path: of the lead.
-        half: its radius.
-        space: space for the lead.
-        others: middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
+    `others` are middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
     """
     places = [place for piece in straights(path) for place in _places(piece)]
     for place in places:

@@ -78,11 +78,6 @@ def with_waist(scanner: Scanner, stack: DirectStack, ears: Ears) -> DirectStack:
 
     Of every length the thickest sufficient diameter, of the lengths the shortest: a low cage is stiff. If none is
     sufficient, the longest strong one is used, and the check `tilt_moment` fails.
-
-    Args:
-        scanner: a horn without a rating is allowed `UNRATED_NM`.
-        stack: with a bearing; its waist is replaced.
-        ears: of the cage.
     """
     rated = rated_moment_nm(scanner)
     bears = SURELY * (UNRATED_NM if rated is None else SHARE * rated)
