@@ -1,7 +1,5 @@
 """Check whether the CAD kernel is installed, without loading it, which takes seconds."""
 
-from __future__ import annotations
-
 import ctypes
 import sys
 

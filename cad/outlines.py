@@ -1,7 +1,5 @@
 """Corners of plane outlines. Millimetres. No kernel."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Metric cap screws (ISO 4762 heads), in mm: holes, heads, drivers, nuts, and threads in printed parts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 OCC reports empty and split results as valid, so every step ends in the check of `building`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

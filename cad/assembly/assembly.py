@@ -1,7 +1,5 @@
 """The entire scanner in the rotation frame at gamma = 0: made parts and bought bodies with their descriptions. mm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -3,8 +3,6 @@
 The lidar is placed by `T_rot_laser` of the angle set, the same transform as for the point cloud.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial

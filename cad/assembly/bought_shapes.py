@@ -4,8 +4,6 @@ The lidar is in its body frame (origin on the base at the optical axis, x to the
 axis as z; ring, bearing and belt are in the rotation frame at gamma = 0. Teeth of the belt and balls are not drawn.
 """
 
-from __future__ import annotations
-
 import cadquery as cq
 
 from scanwright.cad import solids

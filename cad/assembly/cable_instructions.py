@@ -1,7 +1,5 @@
 """Instructions for laying the cables: exit from the device, length, joints and ties."""
 
-from __future__ import annotations
-
 import math
 
 from scanwright.cad.layout.cables.leads import RotorLead, tied_mm

@@ -4,8 +4,6 @@ Booleans of meshes take milliseconds, those of the kernel a second. The result i
 not checked; `cad.parts.linkage.alignment_linkage` makes the printed part.
 """
 
-from __future__ import annotations
-
 import cadquery as cq
 import manifold3d
 import numpy as np

@@ -1,7 +1,5 @@
 """Making the parts of one scanner, and the bought bodies around them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Mass properties of the bodies of a scanner, for the URDF, the checks and the counterweight."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

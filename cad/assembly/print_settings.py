@@ -5,8 +5,6 @@ hold for solid parts. Time is saved by wide lines and by few closed layers, whic
 speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from scanwright.design.catalogue.products import Printer

@@ -3,8 +3,6 @@
 A step works on the scanner, or on the bench, where it assembles what is later put in as one piece.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Assembly steps of a scanner in order: those of its parts and of bought products."""
 
-from __future__ import annotations
-
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.cable_instructions import cables_text, leads_text
 from scanwright.cad.layout.joints import screws

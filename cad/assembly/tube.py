@@ -1,7 +1,5 @@
 """A cable as a solid: a round section along its path, thicker at its joint. Millimetres."""
 
-from __future__ import annotations
-
 import cadquery as cq
 import numpy as np
 

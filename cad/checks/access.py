@@ -3,8 +3,6 @@
 Bodies that turn may be at any angle of the axis.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Beams that the parts hide."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 

@@ -3,8 +3,6 @@
 Clearance and hidden beams are checked with all other bodies, since cables are bodies of the assembly.
 """
 
-from __future__ import annotations
-
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.checks.limits import at_least, note, tidy
 from scanwright.cad.layout.cables import joint

@@ -1,7 +1,5 @@
 """`checks.json`: the findings of all checks, written and read, and the lines of those that failed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -6,8 +6,6 @@ triangle is drawn by its horizontal chords, so that it is right within CHORD_MM.
 intersected as solids.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container, Mapping
 

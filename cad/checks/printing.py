@@ -5,8 +5,6 @@ measured from points on the surface along the normal, if the other side is paral
 note; thin walls on more than THIN_SHARE of the surface are an error.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

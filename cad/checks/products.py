@@ -1,7 +1,5 @@
 """Unverified values of the products, and required modules that do not fit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from scanwright.cad.assembly.assembly import Assembly

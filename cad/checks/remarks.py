@@ -1,7 +1,5 @@
 """Findings for a person to read before the parts are made, and the parts that this scanner does not need."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from scanwright.cad.assembly.assembly import Assembly

@@ -3,8 +3,6 @@
 They use the parts without labels: the wall between two engraved strokes is no thin wall.
 """
 
-from __future__ import annotations
-
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.masses import link_bodies

@@ -3,8 +3,6 @@
 Constant limits are here, with their reason; limits of products, printer or layout are described.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most

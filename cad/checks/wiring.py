@@ -1,7 +1,5 @@
 """The electrical rule check of the wiring, and the values that it lacks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from scanwright.cad.layout.names import RING

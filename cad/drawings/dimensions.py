@@ -4,8 +4,6 @@ Ordinates are the running dimensions of ISO 129; close ones are spread without c
 paper.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """`drawings/<part>.pdf`, `.dxf` and `.svg` of every made part."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Content of a drawing: solid, holes, cylinders about the axis, and plane faces. Rotation frame, mm."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Holes that belong together, and their call-outs. Millimetres, rotation frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ The kernel's hidden-line removal takes 8.6 s if edges are exactly behind one ano
 turned by SKEW_RAD. Lines within TOLERANCE_MM are drawn once, and no hidden line under a visible one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A part cut along its axis: the half behind the cut, and the hatching of the cut faces. Millimetres."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

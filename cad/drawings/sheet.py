@@ -3,8 +3,6 @@
 A3 at full size or larger; else A2 at full size, else the smallest reduction.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ezdxf.document import Drawing

@@ -1,7 +1,5 @@
 """Dimensions of a view, and the view drawn with them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ SVG and PDF are written from the DXF's entities. ezdxf's drawing add-on draws te
 search, in SVGs 2.5 to 5 times as large and 0.2 to 0.9 s a sheet more.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Prices are those of the catalogue, each with its source and year, or a range of 
 last row adds up both and names the rows that have neither.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 from collections import Counter

@@ -3,8 +3,6 @@
 glTF is y-up and the project z-up: one root node turns z to y. Normals are smooth on round surfaces and sharp at edges.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Mapping

@@ -6,8 +6,6 @@ Exploded, each product is lifted along the rotation axis until it is free of tho
 along the lidar's z, a counterweight along its radius.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Rows of boxes, the deepest at the back: each part lies in its own pose, moved along the bed only.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

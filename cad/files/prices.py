@@ -4,8 +4,6 @@ The ranges are usual prices in small numbers without tax and shipping, not quote
 unverified or older than RECENT is multiplied by UNSURE.
 """
 
-from __future__ import annotations
-
 import re
 
 from scanwright.cad.layout.names import JOURNAL_SLEEVE

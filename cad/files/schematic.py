@@ -5,8 +5,6 @@ change height, then space for its text. Wires that pass a column run below all b
 between two pins of a box is at its right.
 """
 
-from __future__ import annotations
-
 import textwrap
 from dataclasses import dataclass
 from xml.sax.saxutils import escape

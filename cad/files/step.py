@@ -5,8 +5,6 @@ the hash of its own text with its references replaced by their hashes (a Merkle 
 everything is renumbered depth first.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 import tempfile

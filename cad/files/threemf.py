@@ -4,8 +4,6 @@ The file also contains the settings of PrusaSlicer (Metadata/Slic3r_PE_model.con
 entries are stored, not deflated, with the zip format's first date: the output of a compressor depends on its version.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Iterator, Mapping

@@ -6,8 +6,6 @@ The origins of `servo` and `rot` are the optical centre, so every mesh, made in 
 its pose. Transforms are those of the angle set. SI units.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr

@@ -1,7 +1,5 @@
 """`wiring.svg` and `wiring.md`: the wiring of a scanner as a drawing and as text, with the load of each wire."""
 
-from __future__ import annotations
-
 from scanwright.cad.files.schematic import schematic_svg
 from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
 from scanwright.design.electrics.network import Network

@@ -1,7 +1,5 @@
 """Files for the workshop besides STEP, STL and drawings: print files, scenes, parts list, wiring, assembly steps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Cylindrical features of a solid, read from its faces: holes and bosses. Millimetres."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The kernel's tessellation depends on earlier meshes of the shape and repeats ver
 vertices are rounded and merged, triangles without area dropped, and everything sorted: equal solids give equal bytes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cadquery as cq

@@ -1,7 +1,5 @@
 """Error against run time of the meshes that STL, 3MF and GLB are written from, over the kernel's two tolerances."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 

@@ -3,8 +3,6 @@
 The face gets a hole per outline, and each hole walls and a floor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

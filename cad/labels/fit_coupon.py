@@ -7,8 +7,6 @@ slides without backlash, and of the hole that the screw just falls through, into
 `screw_clearance_mm`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Planar faces of a solid as polygons. Millimetres, rotation frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cadquery as cq

@@ -3,8 +3,6 @@
 A glyph is a list of chains on a grid 4 wide and 6 high.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ assembled scanner, else one that touches nothing there. A small part gets the co
 screws and checks use the part without its label.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product

@@ -1,7 +1,5 @@
 """Lines of lettering, and their place on a face. Millimetres."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

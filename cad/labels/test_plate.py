@@ -3,8 +3,6 @@
 Frame: its own, mm, on the bed with its upper side away from the device. The middle of each pattern is open.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cadquery as cq

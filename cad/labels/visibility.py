@@ -3,8 +3,6 @@
 The deck is endless and the servo is at joint 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -5,8 +5,6 @@ scanner (face at z = 0, scanner at z > 0), or above it if the axis points down (
 rotation frame at gamma = 0, mm, unless its name contains world.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Rotation frame at gamma = 0, mm. `drive_of` in `cad/layout/placement.py` selects
 in its folder (`direct/`, `belt/`), which all other code reads.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 The same boxes do both, so the two cannot disagree.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

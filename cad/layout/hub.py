@@ -3,8 +3,6 @@
 All below the hub is in `cad/layout/direct/` (servo on the axis) or `cad/layout/belt/` (servo next to the axis).
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Each part declares its own (`PartSpec.joints`); parts list, steps, drawings and 
 shortest sufficient ones of the standards.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 `layout_of` places everything, collects the descriptions of the parts, and routes the cables around them.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Names of parts, bought products and their bodies, in files, lists and texts."""
 
-from __future__ import annotations
-
 # made parts
 ALIGNMENT_LINKAGE = "alignment_linkage"
 BASE_MOUNT = "base_mount"

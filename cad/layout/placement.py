@@ -1,7 +1,5 @@
 """Places of everything of one scanner; each step is a function of earlier records. No kernel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from scanwright.cad.layout.belt.drive import belt_drive

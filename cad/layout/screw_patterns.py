@@ -1,7 +1,5 @@
 """Hole patterns of bought devices and of the deck that the joints use, as seen on the device. Millimetres."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A slotted tab for a cable tie. Millimetres."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Forces in N, stresses in MPa, lengths in mm, torques in N m. Screws are stainles
 strong. Friction is neglected.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

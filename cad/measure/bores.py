@@ -1,7 +1,5 @@
 """Holes of a device: walls of one axis joined, with mouth, depth and likely screw. Millimetres."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The files of a measured model: a proposal for a product file, and its picture."""
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 from dataclasses import dataclass

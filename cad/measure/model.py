@@ -1,7 +1,5 @@
 """A maker's model as triangles in the frame of its device. Millimetres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cadquery as cq

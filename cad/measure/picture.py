@@ -1,7 +1,5 @@
 """The picture of a proposal: silhouettes of the model with the proposed holes."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Values of a product file from a maker's model. All are unverified: a person compares them with the device."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

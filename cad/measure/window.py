@@ -1,7 +1,5 @@
 """The window or head of a lidar in a mesh: its surfaces of revolution about an upright axis. Millimetres."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

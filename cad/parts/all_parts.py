@@ -1,7 +1,5 @@
 """Every part that a scanner may have, in the order of their drawing numbers: a new part is listed here."""
 
-from __future__ import annotations
-
 from scanwright.cad.layout.layout import Layout, layout_of
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.linkage.alignment_linkage import linkage_spec

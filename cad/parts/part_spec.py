@@ -1,7 +1,5 @@
 """The description of a made part: its shape, joints, space, steps, rows of lists, and what shapes it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

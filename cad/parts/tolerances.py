@@ -1,7 +1,5 @@
 """Data of a part's sheet that its solid does not show: fits, the axis of its ordinates, lines of text. mm."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from scanwright.design.catalogue.products import Bearing

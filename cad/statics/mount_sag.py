@@ -4,8 +4,6 @@ The deck is rigid and holds the foot under the washers of its screws alone; cont
 unknown amount. A face of the grid is on the deck.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

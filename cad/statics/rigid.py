@@ -1,7 +1,5 @@
 """Forces of a rigid body on many points, and the rigid motion that fits many points."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from scanwright.design.arrays import Array

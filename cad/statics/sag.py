@@ -6,8 +6,6 @@ the seat is a face of theirs. A cell bridges gaps narrower than itself; the two 
 includes it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ Displacements and loads are six numbers at the origin of the rotation frame: a r
 moment [N m] before a force [N]. With one origin, compliances of springs in a row add up.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The bodies are numbered from the deck; body i is on spring i, which is on body i
 the springs' deformations, six each (`spring.py`): the stiffness is block-diagonal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Filled share of each small cube of a grid in a closed mesh: rays along z, in and out by the surface's normals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

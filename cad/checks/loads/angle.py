@@ -1,7 +1,5 @@
 """Whether the mount keeps its angle about the axis: friction of its clamp, and the largest slip."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

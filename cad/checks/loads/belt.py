@@ -1,7 +1,5 @@
 """Loads on bearings, belt and servo horn of the belt drive against their ratings, and the angle error of the belt."""
 
-from __future__ import annotations
-
 import math
 
 from scanwright.cad.checks.limits import at_most, horn_check, note, tidy

@@ -6,8 +6,6 @@ mount), a part that is constant in the world (an error of the axis), and a rest 
 and deck are rigid here: the lean of the mount is in `mount`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ The shaft bends as a beam; the cage is a spring whose stiffness is known within 
 The bend of the linkage is in `deflection.py`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Torques that the rotor's weight requires of the servo, and the backlash of its gears. SI units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -3,8 +3,6 @@
 It is the same in every position of the servo (to 0.0001 deg, `benchmarks.cad.elements`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -6,8 +6,6 @@ as a group of equal springs; radial screws of a hub or a boss carry no moment, t
 foot from tipping over its edge. A joint that yields fails; a margin below LEAST_MARGIN is a warning.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

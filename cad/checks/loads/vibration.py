@@ -5,8 +5,6 @@ and mount are finite elements, the shaft is a beam, horn or bearing seats are sp
 mount by its screws alone; servo frame, tower and tripod foot are rigid; the servo keeps its position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Geometry of a device's sketch: boxes, cylinders and holes, from its catalogue record."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

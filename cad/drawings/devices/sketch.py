@@ -1,7 +1,5 @@
 """A dimensioned sketch of a device: a view onto each face that has holes, one from above and one from the side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 

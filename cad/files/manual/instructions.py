@@ -1,7 +1,5 @@
 """`assembly.md`: how to assemble one scanner, with its screws and a picture of each step."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 

@@ -3,8 +3,6 @@
 `design/scene/parallel_view.py` casts the pixels, as for the pictures of the checks in the report.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Sequence

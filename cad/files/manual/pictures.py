@@ -4,8 +4,6 @@ The rotation axis is upright, on the bench the lidar's axis. Of eight sides, fro
 that shows the heads of the screws best; without screws it is the first.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The servo next to the axis, for capsule rings, as a `DriveLayout`: belt, hollow shaft, tower."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from typing import Literal

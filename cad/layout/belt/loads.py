@@ -3,8 +3,6 @@
 SI units; lengths of the stack are millimetres.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Numbers of the plate that holds the servo next to the axis. No kernel."""
 
-from __future__ import annotations
-
 import math
 
 from scanwright.cad.layout.drive import Ears, ears_on

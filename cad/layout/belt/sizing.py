@@ -1,7 +1,5 @@
 """Sizes of the belt drive: bearings by the capsule, pulleys by the boss, the belt by the servo's place. mm."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

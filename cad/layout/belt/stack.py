@@ -19,8 +19,6 @@ The servo's frame has the directions of the rotation frame turned by `quarter` a
 centres, on which the plate slides: `centre` is the distance at which the belt is tight.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Numbers of the bearing tower: screws of plate, foot and disc. No kernel."""
 
-from __future__ import annotations
-
 import math
 
 from scanwright.cad import outlines

@@ -4,8 +4,6 @@ Their exits are assumed, as the catalogue states. They end tied to a side of the
 the servo. Rotation frame at gamma = 0, mm.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

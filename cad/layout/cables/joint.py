@@ -4,8 +4,6 @@ The tube is thicker than the bundle: it is on the longest straight piece with en
 bend.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

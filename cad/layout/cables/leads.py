@@ -4,8 +4,6 @@ The jacket of the lidar's cable ends behind its straight piece. Its wires bend l
 in a joint. Both turn with the lidar and do not flex.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 Distances from convex shapes are those from their planes: never more than the true one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 The arcs are tangent to the straight pieces, so the radius is kept; pieces that are too short have no path.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Rotation frame at gamma = 0, mm.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

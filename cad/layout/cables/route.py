@@ -5,8 +5,6 @@ space for their arcs. Each piece provides at most half of its length to the arc 
 allowed neighbours is a path.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Numbers of the slip-ring adapter's fork on the servo's ears. No kernel."""
 
-from __future__ import annotations
-
 from scanwright.cad.layout.direct.cage import FOOT_RADIUS
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears, ears_on

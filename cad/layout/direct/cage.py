@@ -1,7 +1,5 @@
 """Numbers of the bearing's cage: its base on the servo's ears, and its stiffness. No kernel."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A cup around the heads of the horn's screws, low and wide: a cup of 30 mm with a
 aluminium rod of 12. Nuts in slots of its wall hold the hub.
 """
 
-from __future__ import annotations
-
 import math
 
 from scanwright.cad.layout.direct.frame import GRIP, OVER_HEADS, needs_frame

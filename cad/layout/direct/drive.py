@@ -1,7 +1,5 @@
 """The servo on the axis, as a `DriveLayout`: horn, shaft through the ring, hub."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

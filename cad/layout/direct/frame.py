@@ -4,8 +4,6 @@ For servos whose rear has only case screws, such as the X series: the servo hang
 are screwed to the deck or to the base mount.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

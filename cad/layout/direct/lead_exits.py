@@ -3,8 +3,6 @@
 Rotation frame at gamma = 0, mm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -5,8 +5,6 @@ beam, clamped in the horn and supported by the cage, a spring, at the bearing; i
 beam. SI units; lengths of the stack are millimetres.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

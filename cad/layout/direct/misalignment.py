@@ -6,8 +6,6 @@ since the bearing is bonded while the shaft is in it; growth along the axis, sin
 Runout of horn, flange and shaft is one number, trued at the shaft's upper end.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from scanwright.cad.layout.direct.cage import BearingCage, stiffness_n_per_m

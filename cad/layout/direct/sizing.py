@@ -1,7 +1,5 @@
 """Sizes of the direct drive: shaft and flange by ring and horn, the hub by the lidar, and the bearing. mm."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

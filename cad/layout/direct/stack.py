@@ -19,8 +19,6 @@ A tilted axis whose rotor is too heavy for the horn alone gets a bearing on a sl
 (`cad/layout/direct/cup.py`), its flange CUP_GAP below the shoulder.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

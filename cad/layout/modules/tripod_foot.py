@@ -5,8 +5,6 @@ no thread is in plastic. Millimetres, in the axes of the deck (`Deck.rotation`),
 foot.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from scanwright.cad.layout.joints import shank_mm

@@ -3,8 +3,6 @@
 Millimetres. Points are in the laser frame, shape (n, 3), except for `in_hull`; each result has the shape (n,).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

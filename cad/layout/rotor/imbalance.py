@@ -1,7 +1,5 @@
 """Estimated imbalance of a rotor, and the torque of gravity on it. Grams and mm."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Numbers of the alignment linkage. Rotation frame at gamma = 0, mm."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

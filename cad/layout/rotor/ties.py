@@ -4,8 +4,6 @@ The hub has one above the exit of the ring's leads, rotation frame; the plate on
 frame. Millimetres. No kernel.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

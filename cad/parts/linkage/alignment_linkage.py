@@ -8,8 +8,6 @@ Tabs of hub and plate have slots for cable ties. Under a sub-plate (`sub_plate.p
 its ears and pockets for the heads of its screws. An ear of the hub carries a counterweight.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 Frame: rotation frame at gamma = 0, mm. It lies along a radius; its screws come from below, through slots of the ear.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import partial

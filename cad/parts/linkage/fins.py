@@ -3,8 +3,6 @@
 Also cut off are the claws outside of the cables of a lying lidar, which carry nothing.
 """
 
-from __future__ import annotations
-
 import math
 
 import cadquery as cq

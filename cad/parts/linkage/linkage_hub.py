@@ -3,8 +3,6 @@
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm.
 """
 
-from __future__ import annotations
-
 import math
 
 import cadquery as cq

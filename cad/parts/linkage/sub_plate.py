@@ -5,8 +5,6 @@ the lidar on the bench; then its two ears are screwed to the linkage from the li
 screws are in pockets of the linkage.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import cadquery as cq

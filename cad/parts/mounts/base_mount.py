@@ -7,8 +7,6 @@ the sides of the foot are for cable ties. Screws: first the case from behind thr
 deck.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial

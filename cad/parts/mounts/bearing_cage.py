@@ -11,8 +11,6 @@ is centred on the sleeve, and the bond in its seat last. The sleeve slides in th
 loads.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -8,8 +8,6 @@ of `shaft_ring`. It prints upside down on its flat top. An index groove in the e
 the linkage's hub.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import partial

@@ -5,8 +5,6 @@ through its middle, its flange on top, screws from below with nuts on the flange
 from below, and three radial screws hold it. The wide holes of the flange and the soft tube compensate misalignment.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import cadquery as cq

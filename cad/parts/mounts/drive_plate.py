@@ -4,8 +4,6 @@ Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A flat plat
 feet down to the ears, and four slots along the line of centres.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import cadquery as cq

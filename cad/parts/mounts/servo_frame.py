@@ -4,8 +4,6 @@ Frame: rotation frame at gamma = 0 (`cad/layout/direct/frame.py`), mm. A plate w
 along the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import cadquery as cq

@@ -9,8 +9,6 @@ Under the cage of a bearing (`bearing_cage.py`) it is a thick closed plate with 
 every pair of ears outside the flange; it is lowered over the shaft. Without a ring it has no arms and is `cage_base`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

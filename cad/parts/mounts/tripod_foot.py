@@ -5,8 +5,6 @@ mount's foot and has its outline. The tripod's nut is in a pocket that the mount
 pockets from below.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import partial

@@ -5,8 +5,6 @@ and a pocket for its boss; on it a wall around the heads of the horn's screws, w
 at +y keys it. Two nuts are in slots of the wall, open above, for the screws that cross from the hub.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -5,8 +5,6 @@ a retaining ring, is bonded there, and the hub above keeps it down. The wires of
 along it, inside the bearing, below the channel of the hub.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -5,8 +5,6 @@ Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. The spigot 
 two windows below the web under the spigot.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -8,8 +8,6 @@ half of the sliding fit: their offset from the axis changes the angle once per t
     drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial

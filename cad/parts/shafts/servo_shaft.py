@@ -6,8 +6,6 @@ not pass the ring. If a bearing holds the shaft, it has a waist above the collar
 line, and a stiff shaft would turn the error into a moment on the horn. One shaft fits every linkage.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import cadquery as cq

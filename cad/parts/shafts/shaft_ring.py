@@ -4,8 +4,6 @@ Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that
 screws into threads of the shaft, 90 deg apart; a driver reaches them through the window of the tower.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 
