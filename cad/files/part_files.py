@@ -50,7 +50,7 @@ class PartsResult:
 
 
 def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Progress) -> PartsResult:
-    """Return label every part and write it into a build folder.
+    """Label every part and write it into a build folder.
 
     Args:
         scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.

@@ -43,7 +43,7 @@ def to_centre(servo: Servo) -> str:
 class Step:
     """One assembly step."""
 
-    title: str  # of it
+    title: str
     words: str  # with marks of `cad/layout/joints.py` for screws
     check: str = ""  # condition to check before the next step
     brings: tuple[str, ...] = ()  # bought products without a step of their own that come with it
@@ -53,10 +53,10 @@ class Step:
 class Row:
     """One row of the parts list."""
 
-    kind: Literal["consumable", "wiring", "tool"]  # of the row
+    kind: Literal["consumable", "wiring", "tool"]
     estimate: str  # name of its price in `cad/files/prices.py`
     part: str  # name and size
-    source: str  # of the row
+    source: str
     note: str = ""  # for the buyer
 
 
