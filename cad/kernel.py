@@ -1,6 +1,4 @@
-"""The CAD kernel takes seconds to load, so it is loaded late; whether it can be is asked first, and costs nothing."""
-
-from __future__ import annotations
+"""Check whether the CAD kernel is installed, without loading it, which takes seconds."""
 
 import ctypes
 import sys
@@ -11,13 +9,10 @@ _PACKAGES = ("cadquery", "OCP", "ezdxf", "jinja2", "manifold3d", "reportlab", "s
 
 
 def require_kernel(work: str) -> None:
-    """Refuse work that needs the CAD kernel where that is not installed. It is not loaded.
-
-    Args:
-        work: what the line says needs it, such as "build".
+    """Raise if the CAD kernel is not installed; `work` is the subject of the message, such as "build".
 
     Raises:
-        InstallError: a package of the extra `cad`, or the system library that the kernel draws with, is missing.
+        InstallError: a package of the extra `cad`, or a system library of the kernel, is missing.
     """
     require("cad", f"{work} needs the CAD kernel", *_PACKAGES)
     if sys.platform == "linux":

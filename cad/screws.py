@@ -1,6 +1,4 @@
-"""Metric cap screws (ISO 4762 heads), in mm: what a hole, a head and a driver need, and what a thread in a part."""
-
-from __future__ import annotations
+"""Metric cap screws (ISO 4762 heads), in mm: holes, heads, drivers, nuts, and threads in printed parts."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +8,7 @@ from scanwright.design.catalogue.products import Printer
 
 @dataclass(frozen=True, slots=True)
 class Screw:
-    """Thread, head and driver of one size."""
+    """Thread and head of one size [mm]."""
 
     name: str
     nominal: float
@@ -23,7 +21,7 @@ class Screw:
     nut_standard: str = "ISO 4032"
 
     @property
-    def head_room(self) -> float:
+    def driver_radius(self) -> float:
         """Radius that the head and a driver or socket around it need."""
         return self.head_diameter / 2 + 0.4
 
@@ -46,24 +44,13 @@ TRIPOD_SCREW = Screw("1/4-20 UNC", 6.35, 9.53, 6.35, 5.1, 11.11, 5.74, nut_stand
 INSERT_LENGTH = 5.7  # of the usual M3 insert: every threaded hole of the parts is deeper
 
 
-def thread_hole(screw: Screw, printer: Printer) -> float:
-    """Diameter of the hole in a part that a screw holds on to: the core of a thread, or the seat of an insert."""
-    return screw.insert if printer.thread == "insert" and screw.insert is not None else screw.core
-
-
 @dataclass(frozen=True, slots=True)
 class Trap:
-    """Room for a hexagon nut in a part, and the hole through it.
+    """Pocket for a hexagon nut in a part, and the hole through it."""
 
-    Attributes:
-        hole: diameter, with half of a screw's clearance: it leads the screw into the nut, and no other hole is alike.
-        across: across the flats of the pocket.
-        depth: of a pocket, thickness of a slot.
-    """
-
-    hole: float
-    across: float
-    depth: float
+    hole: float  # diameter, with half of a screw's clearance
+    across: float  # across the flats of the pocket
+    depth: float  # of a pocket, thickness of a slot
 
     @property
     def corner(self) -> float:
@@ -72,12 +59,9 @@ class Trap:
 
 
 def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | None:
-    """Nut trap of a screw; None where the profile asks for none.
+    """Return the nut pocket of a screw; None if the profile uses none.
 
-    Args:
-        screw: the size.
-        printer: the profile.
-        carries: whether the lidar hangs on it: threads in bare plastic creep, so these get nuts whatever it asks for.
+    If the lidar hangs on the screw (`carries`), a thread in bare plastic always gets a nut, since plastic creeps.
     """
     bare = printer.thread == "cut" or screw.insert is None
     if printer.thread != "nut" and not (carries and bare):
@@ -88,37 +72,27 @@ def trap_of(screw: Screw, printer: Printer, *, carries: bool = False) -> Trap | 
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """What a screw holds on to in a printed part: a thread, an insert, or a nut in a trap.
+    """Thread of a screw in a printed part: cut, an insert, or a nut in a pocket."""
 
-    Attributes:
-        hole: diameter.
-        trap: room for the nut, if it is one.
-        insert: whether it is an insert.
-    """
-
-    hole: float
-    trap: Trap | None
-    insert: bool
+    hole: float  # diameter
+    trap: Trap | None  # pocket of the nut, if there is one
+    insert: bool  # whether it is an insert
 
 
-def thread_in_part(screw: Screw, printer: Printer, *, room_for_nut: bool = True, carries: bool = False) -> Thread:
-    """What a printer's profile gives a screw to hold on to.
+def thread_in_part(screw: Screw, printer: Printer, *, nut_fits: bool = True, carries: bool = False) -> Thread:
+    """Return the thread that a printer's profile gives a screw.
 
-    Args:
-        screw: the size.
-        printer: the profile.
-        room_for_nut: whether a nut finds room; where it does not and the lidar hangs on it, an insert does.
-        carries: whether the lidar hangs on it.
+    If no nut fits and the lidar hangs on the screw (`carries`), an insert is used.
     """
     trap = trap_of(screw, printer, carries=carries)
-    if trap is not None and not room_for_nut:
+    if trap is not None and not nut_fits:
         if carries and screw.insert is not None:
             return Thread(screw.insert, None, True)
         trap = None
-    hole = thread_hole(screw, printer) if trap is None else trap.hole
-    return Thread(hole, trap, printer.thread == "insert" and screw.insert is not None)
+    insert = screw.insert if printer.thread == "insert" else None
+    return Thread(trap.hole if trap is not None else insert or screw.core, trap, insert is not None)
 
 
 def passing_hole(screw: Screw, printer: Printer) -> float:
-    """Diameter of the hole in a part that a screw passes through."""
+    """Return the diameter of the hole in a part that a screw passes through."""
     return screw.nominal + printer.screw_clearance_mm

@@ -1,9 +1,7 @@
-"""The few kernel operations that the parts are made of, each checked. Millimetres, rotation frame.
+"""Kernel operations of the parts. Millimetres, rotation frame.
 
-OCC calls empty and split results valid, so every step that can fail ends in the check of `building`.
+OCC reports empty and split results as valid, so every step ends in the check of `building`.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -21,10 +19,10 @@ from scanwright.design.errors import BuildError
 
 @contextmanager
 def building(part: str, feature: str, parameter: str, value: object) -> Iterator[Callable[[cq.Shape], cq.Solid]]:
-    """One step of making a part: it yields what returns the one valid solid that the step made.
+    """Yield a function that returns the one valid solid of a step of a part.
 
     Raises:
-        BuildError: the kernel throws inside, or the step split the part, emptied it, or left an invalid solid; one line
+        BuildError: the kernel raised, or the step split the part, emptied it, or left an invalid solid; the message
             names part, feature, parameter and value.
     """
     step = f"{part}: {feature}: {parameter} = {value}"
@@ -49,54 +47,54 @@ def _checked(step: str, shape: cq.Shape) -> cq.Solid:
 
 
 def location(R: ArrayLike, t: ArrayLike = (0.0, 0.0, 0.0)) -> cq.Location:
-    """Pose with rotation R and origin t."""
+    """Return the pose with rotation R and origin t."""
     R = np.asarray(R, dtype=float)
     plane = cq.Plane(origin=vector(t), xDir=vector(R[:, 0]), normal=vector(R[:, 2]))
     return cq.Location(plane)
 
 
 def about_axis(angle: float) -> cq.Location:
-    """Turn by an angle [rad] about z."""
+    """Return the rotation by an angle [rad] about z."""
     return cq.Location(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(angle))
 
 
 def vector(v: ArrayLike) -> cq.Vector:
-    """Kernel vector from three numbers."""
+    """Return a kernel vector from three numbers."""
     x, y, z = (float(c) for c in np.asarray(v, dtype=float))
     return cq.Vector(x, y, z)
 
 
 def box(low: Sequence[float], high: Sequence[float]) -> cq.Solid:
-    """Axis-parallel box between two corners."""
+    """Return the axis-parallel box between two corners."""
     x, y, z = (b - a for a, b in zip(low, high, strict=True))
     return cq.Solid.makeBox(x, y, z, pnt=vector(low))
 
 
 def cylinder(radius: float, start: ArrayLike, direction: ArrayLike, length: float) -> cq.Solid:
-    """Cylinder from `start` along `direction`."""
+    """Return a cylinder from `start` along `direction`."""
     return cq.Solid.makeCylinder(radius, length, vector(start), vector(direction))
 
 
 def upright(radius: float, z_low: float, z_high: float, x: float = 0.0, y: float = 0.0) -> cq.Solid:
-    """Cylinder parallel to z."""
+    """Return a cylinder parallel to z."""
     return cylinder(radius, (x, y, z_low), (0.0, 0.0, 1.0), z_high - z_low)
 
 
 def radial(radius: float, azimuth: float, z: float, start: float = 0.0, length: float = 80.0) -> cq.Solid:
-    """Cylinder away from the z axis, at an azimuth [rad] and a height, from a distance on."""
+    """Return a cylinder away from the z axis, at an azimuth [rad] and a height, from a distance on."""
     out = (math.cos(azimuth), math.sin(azimuth), 0.0)
     return cylinder(radius, (start * out[0] + 0.0, start * out[1] + 0.0, z), out, length)  # no -0.0
 
 
 def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
-    """Polygon (n, 2) extruded along z."""
+    """Return a polygon (n, 2) extruded along z."""
     points = [cq.Vector(float(x), float(y), z_low) for x, y in np.asarray(outline, dtype=float)]
     wire = cq.Wire.makePolygon(points, close=True)
     return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
 
 
 def slot(radius: float, first: Sequence[float], last: Sequence[float], z_low: float, z_high: float) -> cq.Shape:
-    """Slot parallel to z between the middles (2,) of its round ends; a cylinder where they are one."""
+    """Return a slot parallel to z between the middles (2,) of its round ends; a cylinder if they are one."""
     start, end = np.asarray(first, dtype=float), np.asarray(last, dtype=float)
     length = float(np.linalg.norm(end - start))
     if length == 0:
@@ -107,14 +105,14 @@ def slot(radius: float, first: Sequence[float], last: Sequence[float], z_low: fl
 
 
 def lathe(profile: ArrayLike) -> cq.Solid:
-    """Solid of revolution about z of a polygon (n, 2) of (r, z); no edge of it may lie on the axis."""
+    """Return a solid of revolution about z of a polygon (n, 2) of (r, z); no edge of it may lie on the axis."""
     points = [cq.Vector(float(r), 0.0, float(z)) for r, z in np.asarray(profile, dtype=float)]
     wire = cq.Wire.makePolygon(points, close=True)
     return cq.Solid.revolve(wire, [], 360.0, cq.Vector(0, 0, 0), cq.Vector(0, 0, 1))
 
 
 def sector(r_low: float, r_high: float, start: float, end: float, z_low: float, z_high: float) -> cq.Solid:
-    """Part of a thick ring about z between two angles [rad], with chords for arcs: planes cut more safely."""
+    """Return a sector of a thick ring about z between two angles [rad], with chords for arcs, which cut more safely."""
     count = max(2, math.ceil((end - start) / 0.2) + 1)
     angle = np.linspace(start, end, count)
     arc = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -123,7 +121,7 @@ def sector(r_low: float, r_high: float, start: float, end: float, z_low: float, 
 
 
 def hull(points: Array) -> cq.Solid:
-    """Convex hull of points (n, 3) with one planar face per plane of the hull."""
+    """Return a convex hull of points (n, 3) with one planar face per plane of the hull."""
     points = np.unique(np.round(points, 9), axis=0)
     convex = ConvexHull(points)
     order = np.lexsort(np.round(convex.equations, 7).T)
@@ -145,7 +143,7 @@ def hull(points: Array) -> cq.Solid:
 
 
 def _around(corners: Array, normal: Array) -> Array:
-    """Corners of a convex polygon in order about its normal, those inside an edge dropped."""
+    """Return corners of a convex polygon in order about its normal, those inside an edge dropped."""
     centre = corners.mean(axis=0)
     first = corners[0] - centre
     first /= np.linalg.norm(first)

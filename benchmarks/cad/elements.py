@@ -164,7 +164,7 @@ def linkage_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Comp
     body = tetrahedra(first.fuse(*others) if others else first, folder)
     corners = body.nodes[body.surface[:, :3]]
     radius, z = np.hypot(corners[..., 0], corners[..., 1]), corners[..., 2]
-    bore = (radius < stack.shaft_diameter / 2 + BORE_MM) & (z < stack.shoulder + stack.spigot + 0.1)
+    bore = (radius < stack.shaft_diameter / 2 + BORE_MM) & (z < stack.spigot_top + 0.1)
     x, y, z = np.moveaxis(corners @ R, 2, 0)  # laser frame
     on_seat = (abs(z - linkage.seat) < 0.01) & (abs(x) < linkage.half_x) & (abs(y) < linkage.half_y)
     seat = body.middles(on_seat.all(axis=1))

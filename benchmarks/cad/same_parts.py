@@ -77,6 +77,7 @@ def build(scanners: Path, result: Path, earlier: Path | None, names: list[str], 
 
 
 def _built(scanner: Scanner, parts_only: bool) -> dict[str, Any]:
+    from scanwright.cad.assembly.make import make_parts
     from scanwright.cad.checks.run import check_files
     from scanwright.cad.drawings.files import drawing_files
     from scanwright.cad.files.part_files import build_parts, write_files
@@ -85,7 +86,7 @@ def _built(scanner: Scanner, parts_only: bool) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         try:
-            made = build_parts(scanner, folder, no_progress)
+            made = build_parts(scanner, make_parts(scanner), folder, no_progress)
         except BuildError as error:
             return {"error": str(error), "files": {}, "checks": []}
         checks = check_files(scanner, made.assembly, no_progress)

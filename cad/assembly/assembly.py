@@ -1,6 +1,4 @@
-"""The whole scanner in the rotation frame at gamma = 0: made parts and bought bodies with what is known of each. mm."""
-
-from __future__ import annotations
+"""The entire scanner in the rotation frame at gamma = 0: made parts and bought bodies with their descriptions. mm."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,55 +15,47 @@ from scanwright.cad.parts.part_spec import Colour, PartSpec
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """Solids by name, rotation frame, mm.
+    """Solids by name, rotation frame, mm."""
 
-    Attributes:
-        layout: the numbers that they were made from.
-        parts: what is known of the made ones.
-        bodies: what is known of the bought ones.
-        made: parts of this project.
-        bought: bodies of bought products.
-    """
-
-    layout: Layout
-    parts: dict[str, PartSpec]
-    bodies: dict[str, BodySpec]
-    made: dict[str, cq.Solid]
-    bought: dict[str, cq.Solid]
+    layout: Layout  # the numbers that they were made from
+    parts: dict[str, PartSpec]  # what is known of the made ones
+    bodies: dict[str, BodySpec]  # what is known of the bought ones
+    made: dict[str, cq.Solid]  # parts of this project
+    bought: dict[str, cq.Solid]  # bodies of bought products
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)
     _poses: dict[str, PrintPose] = field(default_factory=dict, init=False, repr=False, compare=False)
     _inertials: dict[str, Inertial] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def spec(self, name: str) -> PartSpec | BodySpec:
-        """What is known of a part or a body."""
+        """Return the description of a part or a body."""
         return self.parts[name] if name in self.parts else self.bodies[name]
 
     def metal(self) -> frozenset[str]:
-        """Names of the made parts that no printer makes."""
+        """Return the names of the made parts that are not printed."""
         return frozenset(name for name in self.made if self.parts[name].metal)
 
     def turning(self) -> frozenset[str]:
-        """Names of all parts and bodies that turn about the axis."""
+        """Return the names of all parts and bodies that turn about the axis."""
         return frozenset(name for name in (*self.made, *self.bought) if self.spec(name).turns)
 
     def fixed_parts(self) -> list[str]:
-        """Names of the made parts that do not turn."""
+        """Return the names of the made parts that do not turn."""
         return [name for name in self.made if not self.parts[name].turns]
 
     def turning_parts(self) -> list[str]:
-        """Names of the made parts that turn about the axis."""
+        """Return the names of the made parts that turn about the axis."""
         return [name for name in self.made if self.parts[name].turns]
 
     def carriers(self) -> list[str]:
-        """Names of the made parts between hub and lidar."""
+        """Return the names of the made parts between hub and lidar."""
         return [name for name in self.made if self.parts[name].seat is not None]
 
     def thing(self, body: str) -> str:
-        """The part, or the bought product that a body is a piece of."""
+        """Return the name of a part, or of the bought product that a body belongs to."""
         return self.bodies[body].product if body in self.bodies else body
 
     def mesh(self, name: str) -> TriMesh:
-        """The mesh of a part, made or bought; made once, as beams, checks and scenes all want it."""
+        """Return the mesh of a part or a body; it is made once."""
         if name not in self._meshes:
             if name in self.made:
                 self._meshes[name] = mesh_of(self.made[name])
@@ -74,24 +64,24 @@ class Assembly:
         return self._meshes[name]
 
     def meshes(self) -> dict[str, TriMesh]:
-        """Meshes of all parts by name."""
+        """Return the meshes of all parts and bodies by name."""
         return {name: self.mesh(name) for name in (*self.made, *self.bought)}
 
     def inertial(self, name: str) -> Inertial:
-        """Mass properties of a made part, integrated once: each joint asks for all that hangs on it."""
+        """Return the mass properties of a made part; they are integrated once."""
         if name not in self._inertials:
             density = self.parts[name].density_g_cm3(self.layout.scanner.printer)
             self._inertials[name] = of_solid(self.made[name], density)
         return self._inertials[name]
 
     def print_pose(self, name: str) -> PrintPose:
-        """How a part is printed: decided once, before its label, for checks, print files, sheet and plates."""
+        """Return the pose in which a part is printed, without its label; it is computed once."""
         if name not in self._poses:
             self._poses[name] = print_pose(self.mesh(name), self.layout.scanner.printer.bed_mm)
         return self._poses[name]
 
     def outlines(self) -> dict[str, TriMesh]:
-        """Outlines of all parts by name, as they look from outside while they turn."""
+        """Return the meshes of all parts by name, swept if a part turns about another axis."""
         return self.meshes() | {
             name: self._swept(name, part.sweep)
             for name, part in self.parts.items()
@@ -106,7 +96,7 @@ class Assembly:
 
 
 def as_tree(assembly: Assembly) -> cq.Assembly:
-    """All parts under one named root, each with its name and colour."""
+    """Return all parts under one named root, each with its name and colour."""
     tree = cq.Assembly(name="scanwright")
     for name, solid in (assembly.made | assembly.bought).items():
         tree.add(solid, name=name, color=cq.Color(*assembly.spec(name).colour))
@@ -114,5 +104,5 @@ def as_tree(assembly: Assembly) -> cq.Assembly:
 
 
 def alone(name: str, solid: cq.Solid, colour: Colour) -> cq.Assembly:
-    """One part under a named root: a STEP file without a root names its product by a process-wide counter."""
+    """Return one part under a root: without a root, a process-wide counter names the product of a STEP file."""
     return cq.Assembly(name="scanwright").add(solid, name=name, color=cq.Color(*colour))

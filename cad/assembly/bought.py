@@ -1,12 +1,9 @@
-"""Bought products: which bodies draw them, what moves these, and their colours.
+"""Bodies of bought products: shape, frame, colour. Millimetres, rotation frame at gamma = 0.
 
-Millimetres, rotation frame at gamma = 0. Every body is placed by an explicit location; the lidar by the angle set's
-own `T_rot_laser`, the one that the point cloud goes through.
+The lidar is placed by `T_rot_laser` of the angle set, the same transform as for the point cloud.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -20,8 +17,6 @@ from scanwright.cad.assembly.tube import LEAD_CHORDS, cable_solid, lead_solid
 from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.cables.fixed import FixedCable
-from scanwright.cad.layout.cables.leads import RotorLead
 from scanwright.cad.layout.drive import DriveLayout, Station
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.parts.part_spec import STEEL, Colour
@@ -40,28 +35,17 @@ Frame = Literal["servo", "rot", "laser"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodySpec:
-    """One body of a bought product.
+    """One body of a bought product."""
 
-    Attributes:
-        name: unique in the scanner.
-        product: that it is a piece of, of `cad/layout/names.py`.
-        frame: that it moves with.
-        colour: sRGB.
-        make: its solid, rotation frame.
-        meets: body that it may touch though the other one moves: the other half of a ring, or what it drives.
-        clear: whether beams pass it.
-        from_below: whether it is put in from below, where its product comes twice.
-        chords: what the mesh may be off by [mm], and the angle between two of its facets [rad].
-    """
-
-    name: str
-    product: str
-    frame: Frame
-    colour: Colour
-    make: Callable[[], cq.Solid]
-    meets: str = ""
-    clear: bool = False
-    from_below: bool = False
+    name: str  # unique in the scanner
+    product: str  # that it belongs to, of `cad/layout/names.py`
+    frame: Frame  # that it moves with
+    colour: Colour  # sRGB
+    make: Callable[[], cq.Solid]  # its solid, rotation frame
+    meets: str = ""  # moving body that it may touch: the other half of a ring, or a driven part
+    clear: bool = False  # whether beams pass it
+    from_below: bool = False  # whether it is inserted from below, if its product is used twice
+    # tolerance of the mesh [mm], and angle between its facets [rad]
     chords: tuple[float, float] = (CHORD_ERROR, CHORD_ANGLE)
 
     @property
@@ -71,10 +55,10 @@ class BodySpec:
 
 
 def bought_of(layout: Layout) -> list[BodySpec]:
-    """The bodies of everything that one scanner is bought with, of the leads on the rotor, and of the other cables."""
+    """Return the bodies of all bought products and cables of one scanner."""
     drawn = [body for station in layout.drive.stations for body in _of_station(layout.drive, station)]
     drawn.sort(key=lambda body: body.product != names.SERVO)
-    return [*drawn, *_of_lidar(layout), *_of_leads(layout.leads), *_of_cables(layout.cables)]
+    return [*drawn, *_of_lidar(layout), *_of_cables(layout)]
 
 
 def _of_station(drive: DriveLayout, station: Station) -> Iterator[BodySpec]:
@@ -92,20 +76,14 @@ def _of_station(drive: DriveLayout, station: Station) -> Iterator[BodySpec]:
         yield _ring(names.RING_STATOR, "servo", stator, meets=names.RING_ROTOR)
         yield _ring(names.RING_ROTOR, "rot", rotor)
     elif isinstance(product, Belt):
-        stack = drive.of(BeltStack)
-        assert stack is not None  # what a belt is laid out by
-        yield BodySpec(
-            name=names.BELT,
-            product=names.BELT,
-            frame="servo",
-            colour=RUBBER,
-            make=partial(draw.belt, stack),
-            meets=names.SHAFT_PULLEY,
-        )
+        stack, belt = drive.of(BeltStack), names.BELT
+        assert stack is not None  # of every belt
+        make = partial(draw.belt, stack)
+        yield BodySpec(name=belt, product=belt, frame="servo", colour=RUBBER, make=make, meets=names.SHAFT_PULLEY)
 
 
 def _of_servo(drive: DriveLayout, servo: Servo) -> Iterator[BodySpec]:
-    """Case and horn, which turns with the rotor if it is on its axis."""
+    """Yield the case and horn; the horn turns with the rotor if it is on its axis."""
     R, t = drive.servo_pose
     case, horn = partial(draw.servo_case, servo, t[2]), partial(draw.servo_horn, servo, t[2])
     if not np.any(t[:2]):
@@ -136,7 +114,7 @@ def _bearing(bearing: Bearing, top: float, place: str) -> Iterator[BodySpec]:
 
 
 def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
-    """Body, window, cap and cables."""
+    """Yield body, window, cap and cables."""
     lidar = layout.scanner.lidar
     makes = {
         names.LIDAR_BODY: partial(draw.lidar_body, lidar),
@@ -158,41 +136,24 @@ def _of_lidar(layout: Layout) -> Iterator[BodySpec]:
         )
 
 
-def _of_leads(leads: Sequence[RotorLead]) -> Iterator[BodySpec]:
-    """Those that have a path."""
-    for i, lead in enumerate(leads, start=1):
+def _of_cables(layout: Layout) -> Iterator[BodySpec]:
+    drawn = partial(BodySpec, colour=LEAD, chords=LEAD_CHORDS)
+    for i, lead in enumerate(layout.leads, start=1):
         if lead.path is not None:
-            yield BodySpec(
-                name=f"{names.ROTOR_LEAD}_{i}",
-                product=names.ROTOR_LEADS,
-                frame="rot",
-                colour=LEAD,
-                make=partial(lead_solid, lead),
-                chords=LEAD_CHORDS,
-            )
-
-
-def _of_cables(cables: Sequence[FixedCable]) -> Iterator[BodySpec]:
-    """Those that have a path."""
-    for cable in cables:
+            name, make = f"{names.ROTOR_LEAD}_{i}", partial(lead_solid, lead)
+            yield drawn(name=name, product=names.ROTOR_LEADS, frame="rot", make=make)
+    for cable in layout.cables:
         if cable.path is not None:
-            yield BodySpec(
-                name=cable.name,
-                product=names.FIXED_CABLES,
-                frame="servo",
-                colour=LEAD,
-                make=partial(cable_solid, cable),
-                chords=LEAD_CHORDS,
-            )
+            yield drawn(name=cable.name, product=names.FIXED_CABLES, frame="servo", make=partial(cable_solid, cable))
 
 
 def _moved(R: Array, t: Array, make: Callable[[], cq.Solid]) -> cq.Solid:
-    """A body of a servo that is not on the axis."""
+    """Return a body of a servo that is not on the axis."""
     return make().moved(solids.location(R, t * [1.0, 1.0, 0.0]))
 
 
 def _on_axis(layout: Layout, make: Callable[[], cq.Solid]) -> cq.Solid:
-    """A body of the lidar, its optical centre where the angle set has it."""
+    """Return a body of the lidar at its pose of the angle set."""
     T = layout.scanner.angles.T_rot_laser()
     base = cq.Location(cq.Vector(0, 0, -layout.scanner.lidar.optical_height_mm))
     return make().moved(solids.location(layout.stack.R(), T[:3, 3] * 1000) * base)

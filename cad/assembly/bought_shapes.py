@@ -1,18 +1,15 @@
-"""Shapes of bought products, true to size as far as the catalogue knows them. Millimetres.
+"""Shapes of bought products with the dimensions of the catalogue. Millimetres.
 
-The lidar is made in its body frame (origin on the base at the optical axis, x to the front, z up), the servo with its
-horn's axis as z, ring, bearing and belt in the rotation frame at gamma = 0. The teeth of the belt are left out: they
-fill the grooves of the pulleys; so are the balls of a bearing.
+The lidar is in its body frame (origin on the base at the optical axis, x to the front, z up), the servo has its horn's
+axis as z; ring, bearing and belt are in the rotation frame at gamma = 0. Teeth of the belt and balls are not drawn.
 """
-
-from __future__ import annotations
 
 import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
-from scanwright.cad.layout.joints import horn_centres, horn_thread_mm, lidar_thread_mm
+from scanwright.cad.layout.joints import horn_centres, lidar_thread_mm
 from scanwright.cad.layout.names import BELT, RING_STATOR
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
@@ -23,15 +20,15 @@ from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 
 CAP_INSET = 1.5
-CHORDS = 0.02  # what the facets of a round seat and of its hole may take from each other: no fit is as wide
-EAR_ROOM = 3.6  # radius of the recess around a case hole
+CHORDS = 0.02  # overlap of the facets of a round seat and its hole: no fit is as wide
+EAR_RECESS = 3.6  # radius of the recess around a case hole
 BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
 THROUGH = 0.25  # of a plain hole around its screw
 STUB = 0.4  # between the stub of a capsule's rotor and its body
 
 
 def lidar_body(lidar: Lidar) -> cq.Solid:
-    """Case of a lidar below its window, with its holes."""
+    """Return the case of a lidar below its window, with its holes."""
     half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
     radius = SCREWS[lidar.base.screw].nominal / 2 + (THROUGH if lidar.base.kind == "through" else 0.0)
     threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.base.places]
@@ -42,26 +39,26 @@ def lidar_body(lidar: Lidar) -> cq.Solid:
 
 
 def lidar_window(lidar: Lidar) -> cq.Solid:
-    """Window of a lidar, where the beams leave."""
+    """Return the window of a lidar, which the beams pass."""
     return solids.upright(lidar.window_radius_mm, *lidar.window_z_mm)
 
 
 def lidar_cap(lidar: Lidar) -> cq.Solid:
-    """Above the window."""
+    """Return the part of a lidar above its window."""
     return solids.upright(min(lidar.body_mm[:2]) / 2 - CAP_INSET, lidar.window_z_mm[1], lidar.body_mm[2])
 
 
 def lidar_cable(lidar: Lidar, y: float) -> cq.Solid:
-    """The straight stub of the cable that leaves at a y."""
+    """Return the straight stub of the cable at a y of the lidar."""
     start = (-lidar.body_mm[0] / 2, y, lidar.cable_z_mm)
     return solids.cylinder(lidar.cable_diameter_mm / 2, start, (-1.0, 0.0, 0.0), lidar.cable_straight_mm)
 
 
 def servo_case(servo: Servo, z: float) -> cq.Solid:
-    """The case, its horn face at height z, with recesses down to its front and rear holes, and their threads."""
+    """Return the case, its horn face at height z, with recesses and threads of its front and rear holes."""
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
-    recesses = [solids.upright(EAR_ROOM, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
-    recesses += [solids.upright(EAR_ROOM, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
+    recesses = [solids.upright(EAR_RECESS, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
+    recesses += [solids.upright(EAR_RECESS, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
     for pattern, inwards in ((servo.front, -1.0), (servo.rear, 1.0)):
         if pattern.kind != "through":
             low, high = sorted((z + pattern.z_mm, z + pattern.z_mm + inwards * pattern.depth_mm))
@@ -71,10 +68,10 @@ def servo_case(servo: Servo, z: float) -> cq.Solid:
 
 
 def servo_horn(servo: Servo, z: float) -> cq.Solid:
-    """The horn's disc with its threaded holes and boss, its face at height z."""
+    """Return the horn's disc with its threaded holes and boss, its face at height z."""
     disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
     radius = SCREWS[servo.horn_screw].nominal / 2
-    low, centres = z - horn_thread_mm(servo), horn_centres(servo)
+    low, centres = z - servo.horn_thread_depth_mm, horn_centres(servo)
     disc = disc.cut(*(solids.upright(radius, low, z + 1.0, float(x), float(y)) for x, y in centres))
     if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
         disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))
@@ -82,13 +79,13 @@ def servo_horn(servo: Servo, z: float) -> cq.Solid:
 
 
 def ring_stator(ring: SlipRing, low: float, high: float) -> cq.Solid:
-    """Stator of a through-bore ring; the split to its rotor is not in any drawing."""
+    """Return the stator of a through-bore ring; the split to its rotor is assumed."""
     stator = solids.upright(ring.outer_diameter_mm / 2, low, high - 1.0)
     return stator.cut(solids.upright(_split(ring), low - 1.0, high + 1.0)).Solids()[0]
 
 
 def ring_rotor(ring: SlipRing, low: float, high: float) -> cq.Solid:
-    """Rotor of a through-bore ring."""
+    """Return the rotor of a through-bore ring."""
     rotor: cq.Shape = solids.upright(_split(ring) - 0.2, low + 1.0, high)
     if ring.rotor is not None:
         high += ring.rotor.length_mm
@@ -102,13 +99,13 @@ def _split(ring: SlipRing) -> float:
 
 
 def bearing_inner(bearing: Bearing, high: float) -> cq.Solid:
-    """Inner ring, its upper face at a height."""
+    """Return the inner ring, its upper face at a height."""
     inner = bearing.bore_mm / 2
     return _tube(inner + CHORDS, inner + _race(bearing), high - bearing.width_mm, high)
 
 
 def bearing_outer(bearing: Bearing, high: float) -> cq.Solid:
-    """Outer ring, its upper face at a height."""
+    """Return the outer ring, its upper face at a height."""
     outer = bearing.outer_mm / 2
     return _tube(outer - _race(bearing), outer, high - bearing.width_mm, high)
 
@@ -122,7 +119,7 @@ def _tube(inner: float, outer: float, low: float, high: float) -> cq.Solid:
 
 
 def capsule(ring: SlipRing, low: float, high: float, R: Array) -> cq.Solid:
-    """Body and flange, hollow where the rotor's stub comes out; R turns it about the axis, shape (3, 3)."""
+    """Return body and flange of a capsule ring, turned about the axis by R, shape (3, 3)."""
     flange = ring.flange
     assert flange is not None  # as of every capsule
     flange_top = high - flange.below_top_mm
@@ -138,13 +135,13 @@ def capsule(ring: SlipRing, low: float, high: float, R: Array) -> cq.Solid:
 
 
 def capsule_rotor(ring: SlipRing, high: float) -> cq.Solid:
-    """The stub that the soft tube goes on."""
+    """Return the stub of a capsule's rotor."""
     assert ring.rotor is not None  # as of every capsule
     return solids.upright(ring.rotor.diameter_mm / 2, high + STUB, high + ring.rotor.length_mm)
 
 
 def belt(stack: BeltStack) -> cq.Solid:
-    """Its back, around both pulleys."""
+    """Return the back of the belt around both pulleys."""
     half = stack.belt.width_mm / 2
     low, high = stack.belt_middle - half, stack.belt_middle + half
     inner, outer = stack.tip_radius + BELT_GAP, stack.belt_radius + BELT_GAP

@@ -1,10 +1,8 @@
-"""The alignment linkage for the eye: put together from the very shapes of the part, but as meshes.
+"""The alignment linkage for display: the shapes of the part, joined as meshes.
 
-Booleans of meshes take milliseconds where those of the kernel take a second. What comes is the part to within the
-chords of its meshes, unchecked: `cad.parts.linkage.alignment_linkage` makes what is printed, and may refuse it.
+Booleans of meshes take milliseconds, those of the kernel a second. The result is within the chords of its meshes and
+not checked; `cad.parts.linkage.alignment_linkage` makes the printed part.
 """
-
-from __future__ import annotations
 
 import cadquery as cq
 import manifold3d
@@ -19,21 +17,21 @@ CHORD_ANGLE = 0.3  # rad
 
 
 def draft_linkage(p: AlignmentLinkage) -> TriMesh:
-    """The linkage, rotation frame.
+    """Return the linkage, rotation frame.
 
     Raises:
         BuildError: the kernel fails at one of its shapes.
     """
     shapes = shapes_of(p)
-    room = _together(shapes.room)
-    body = (_solid(shapes.plate) + _solid(shapes.neck)) - room - _together(shapes.fins)
+    free_space = _together(shapes.free_space)
+    body = (_solid(shapes.plate) + _solid(shapes.neck)) - free_space - _together(shapes.fins)
     carrying = max(body.decompose(), key=lambda piece: float(piece.volume()))  # the piece that holds the plate
-    mesh = ((carrying + _solid(shapes.hub)) - room - _together(shapes.holes)).to_mesh64()
+    mesh = ((carrying + _solid(shapes.hub)) - free_space - _together(shapes.holes)).to_mesh64()
     return TriMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
 
 
 def coarse_mesh(shape: cq.Shape) -> TriMesh:
-    """A shape for the eye, rotation frame."""
+    """Return a mesh of a shape for display."""
     return mesh_of(shape, CHORD_ERROR, CHORD_ANGLE)
 
 

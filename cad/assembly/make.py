@@ -1,7 +1,5 @@
 """Making the parts of one scanner, and the bought bodies around them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -24,7 +22,7 @@ Wanted = Callable[[PartSpec | BodySpec], bool]
 
 
 def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
-    """Make every part that this scanner needs, and the bought ones around them; of these, those that are wanted.
+    """Make the parts of a scanner and the bought bodies, limited to those that are `wanted`.
 
     Raises:
         BuildError: a part cannot be made, or fits no bed of the printer; the message names part, feature, parameter and
@@ -34,7 +32,7 @@ def make_parts(scanner: Scanner, wanted: Wanted = lambda _: True) -> Assembly:
 
 
 def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
-    """The same, of a layout."""
+    """Return the parts of a layout; `wanted` as for `make_parts`."""
     parts = {spec.name: spec for spec in parts_of(layout) if not isinstance(spec, LeftOut)}
     bodies = {spec.name: spec for spec in bought_of(layout)}
     last = parts.pop(COUNTERWEIGHT, None)
@@ -43,23 +41,23 @@ def made_from(layout: Layout, wanted: Wanted = lambda _: True) -> Assembly:
     assembly = Assembly(layout, parts, bodies, made, bought)
     if last is not None and wanted(last):
         assembly = _balanced(assembly)
-    require_room_on_bed(assembly)  # it makes meshes, which the balanced assembly would not keep
+    require_bed(assembly)  # it makes meshes, which the balanced assembly would not keep
     return assembly
 
 
 def _balanced(assembly: Assembly) -> Assembly:
-    """The assembly with its counterweight, cut to the solids; without linkage and sub-plate, to their estimate."""
+    """Return the assembly with its counterweight, cut to the solids, or to their estimate if some are missing."""
     layout = assembly.layout
     bar = layout.counterweight
     assert not isinstance(bar, LeftOut)
     if len(assembly.carriers()) == sum(part.seat is not None for part in assembly.parts.values()):
-        bar = bar.balancing(rotor_moment(layout.scanner, assembly))
+        bar = bar.balancing(rotor_moment(layout.scanner, assembly))  # all other parts are there
     spec = bar_spec(layout, bar)
     parts, made = assembly.parts | {spec.name: spec}, assembly.made | {spec.name: spec.make()}
     return replace(assembly, parts=parts, made=made)
 
 
-def require_room_on_bed(assembly: Assembly) -> None:
+def require_bed(assembly: Assembly) -> None:
     """Require a bed for every made part that is printed.
 
     Raises:
@@ -69,20 +67,19 @@ def require_room_on_bed(assembly: Assembly) -> None:
     for name in assembly.made:
         if assembly.parts[name].metal or _across(assembly, name) <= min(printer.bed_mm):
             continue
-        pose = assembly.print_pose(name)
-        if pose.fits:
+        if (pose := assembly.print_pose(name)).fits:
             continue
         size, bed = (" x ".join(f"{edge:.0f}" for edge in edges) for edges in (pose.size_mm, printer.bed_mm))
         least = [float(np.ceil(edge - SLACK_MM)) for edge in pose.size_mm]
         smaller = ", or a smaller pattern of holes in [deck]" if name in (BASE_MOUNT, TRIPOD_FOOT) else ""
         raise BuildError(
-            f"{name}: {size} mm as it is printed: the bed of {printer.name} is {bed} mm (bed_mm); a printer with "
-            f"bed_mm = {least} would hold it{smaller}, or other angles"
+            f"{name}: {size} mm in its print pose: the bed of {printer.name} is {bed} mm (bed_mm); use a printer with "
+            f"bed_mm = {least}{smaller}, or other angles"
         )
 
 
 def _across(assembly: Assembly, name: str) -> float:
-    """Diameter of a ball around a part: a bed as wide holds it in any pose."""
+    """Return the diameter of a ball around a part: a bed as wide holds it in any pose."""
     vertices = assembly.mesh(name).vertices
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     return 2 * float(np.linalg.norm(vertices - middle, axis=1).max())

@@ -1,6 +1,4 @@
-"""What every body of a scanner weighs, and where: for the URDF, the checks and the counterweight."""
-
-from __future__ import annotations
+"""Mass properties of the bodies of a scanner, for the URDF, the checks and the counterweight."""
 
 import math
 from collections.abc import Mapping
@@ -11,60 +9,61 @@ from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.cables.leads import SAMPLE
-from scanwright.cad.layout.drive import Mass
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.loads import Weight, weight_of
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.scanner import Scanner
 
 LIDAR_CENTRE_ERROR_MM = 2.0
-"""How far a lidar's centre of mass may be from the middle of its box, in any direction: assumed, no data sheet tells.
+"""Error of a lidar's centre of mass from the middle of its box, in any direction: assumed, undocumented.
 
-Motor, mirror and most of the boards lie around its axis; plugs and windows, a tenth of it, do not: 20 mm aside.
+Motor, mirror and most boards are around its axis; plugs and windows, a tenth of it, are 20 mm off.
 """
 
 
 def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
-    """Mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
+    """Return the mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
 
-    Of bought parts only mass and size are known: homogeneous boxes; half of ring and bearing turns. Leads are lines.
+    Bought parts are homogeneous boxes, of which a share may turn; cables are lines.
     """
-    lidar, masses = scanner.lidar, assembly.layout.drive.masses
+    masses = assembly.layout.drive.masses
     fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
-    fixed += [_share(mass, 1 - mass.turning) for mass in masses]
+    fixed += [inertia.of_box((1 - each.turning) * mass_g, box.low, box.high) for each, mass_g, box in masses]
     fixed += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.cables if lead.path]
     turning = [assembly.inertial(name) for name in assembly.turning_parts()]
-    turning += [_share(mass, mass.turning) for mass in masses if mass.turning > 0]
+    turning += [
+        inertia.of_box(each.turning * mass_g, box.low, box.high) for each, mass_g, box in masses if each.turning > 0
+    ]
     turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.leads if lead.path]
-    x, y, z = lidar.body_mm
-    base = -lidar.optical_height_mm
-    laser = inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
-    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": laser}
+    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": lidar_body(scanner.lidar)}
+
+
+def lidar_body(lidar: Lidar) -> Inertial:
+    """Return the lidar as a homogeneous box, laser frame."""
+    (x, y, z), base = lidar.body_mm, -lidar.optical_height_mm
+    return inertia.of_box(lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
 
 
 def rotor_of(scanner: Scanner, bodies: Mapping[str, Inertial]) -> Inertial:
-    """All that turns, rotation frame, from the bodies of `link_bodies`."""
+    """Return all that turns, rotation frame, from the bodies of `link_bodies`."""
     return inertia.together([bodies["rot"], bodies["laser"].moved(scanner.angles.T_rot_laser())])
 
 
 def rotor_weight(scanner: Scanner, stack: Hub, bodies: Mapping[str, Inertial]) -> Weight:
-    """Weight of all that turns, from the bodies of `link_bodies`."""
+    """Return the weight of all that turns, from the bodies of `link_bodies`."""
     rotor = rotor_of(scanner, bodies)
     x, y, z = rotor.centre_m
     return weight_of(scanner, rotor.mass_kg, float(z) - stack.horn / 1000, math.hypot(x, y))
 
 
 def off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
-    """How far the rotor's centre of mass may be off across the axis, since that of the lidar is undocumented."""
+    """Return the error of the rotor's centre of mass across the axis: that of the lidar is undocumented."""
     lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
     return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
 
 
 def rotor_moment(scanner: Scanner, assembly: Assembly) -> Array:
-    """Mass times distance from the axis of all that turns, shape (2,) [g mm]."""
+    """Return the mass times distance from the axis of all that turns, shape (2,) [g mm]."""
     rotor = rotor_of(scanner, link_bodies(scanner, assembly))
     return np.asarray(1e6 * rotor.mass_kg * rotor.centre_m[:2])
-
-
-def _share(mass: Mass, share: float) -> Inertial:
-    return inertia.of_box(share * mass.mass_g, mass.box.low, mass.box.high)

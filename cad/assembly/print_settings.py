@@ -1,12 +1,9 @@
-"""How parts are printed, for the slicer and in words: solid, of wide lines in layers of a stated height.
+"""Print settings for the slicer and as text: solid parts of wide lines.
 
-PrusaSlicer and its kin take settings of an object from its 3MF; all others skip them and have to be told. What the
-checks say of bending holds for solid parts, so that nothing is saved inside: time is saved by wide lines, by walls that
-leave no narrow gaps, and by leaving out closed layers above and below, which a solid part has anyway (slicers lay both
-at a quarter of their speed). Temperatures and speeds are the printer's own.
+PrusaSlicer and its derivatives read settings from the 3MF; set them by hand in other slicers. The checks of bending
+hold for solid parts. Time is saved by wide lines and by few closed layers, which slicers print at a quarter of the
+speed.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 
@@ -26,7 +23,7 @@ LINES = ("", "external_perimeter_", "perimeter_", "infill_", "solid_infill_")
 
 
 def slicer_settings(printer: Printer) -> Mapping[str, str]:
-    """Keys and values of PrusaSlicer for every object; none where no filament is laid."""
+    """Return the settings of PrusaSlicer for every object; none for a printer without filament."""
     if printer.layer_mm is None or printer.line_mm is None:
         return {}
     lines = {f"{which}extrusion_width": f"{printer.line_mm:g}" for which in LINES}
@@ -34,7 +31,7 @@ def slicer_settings(printer: Printer) -> Mapping[str, str]:
 
 
 def print_words(printer: Printer) -> str:
-    """The same as the end of a sentence: how to print."""
+    """Return the print settings as the end of a sentence."""
     if printer.layer_mm is None or printer.line_mm is None:
         return "solid"
     return f"solid (100 % fill), in layers of {printer.layer_mm:g} mm and lines {printer.line_mm:g} mm wide"

@@ -3,10 +3,8 @@
 A step works on the scanner, or on the bench, where it assembles what is later put in as one piece.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,27 +20,17 @@ from scanwright.design.arrays import Rotation, Vector
 
 @dataclass(frozen=True, slots=True)
 class StepScene:
-    """One step.
+    """One step."""
 
-    Attributes:
-        thing: part or product that it puts in.
-        step: its text.
-        joints: that it closes, each with its mark in the text; an empty mark if the text has none.
-        there: present bodies, in alphabetical order.
-        comes: new bodies.
-        against: those of them that come from the opposite side.
-        along: unit vector, rotation frame, from which they come; 0 for leads, which are shown where they are laid.
-        R_rot_picture: the frame that is upright on the bench: the lidar's own, or the rotation frame.
-    """
-
-    thing: str
-    step: Step
+    thing: str  # part or product that it adds
+    step: Step  # its text
+    # that it closes, each with its mark in the text; an empty mark if the text has none
     joints: tuple[tuple[Joint, str], ...]
-    there: tuple[str, ...]
-    comes: tuple[str, ...]
-    against: tuple[str, ...]
-    along: Vector
-    R_rot_picture: Rotation
+    there: tuple[str, ...]  # present bodies, in alphabetical order
+    comes: tuple[str, ...]  # new bodies
+    against: tuple[str, ...]  # those of them that come from the opposite side
+    along: Vector  # unit vector, rotation frame, from which they come; 0 for cables, which are shown in place
+    R_rot_picture: Rotation  # the frame that is upright in the picture: the lidar's, or the rotation frame
 
 
 def scenes_of(assembly: Assembly, joints: Sequence[Joint]) -> list[StepScene]:
@@ -98,25 +86,15 @@ def _closed(steps: Sequence[tuple[str, Step]], joints: Sequence[Joint]) -> list[
 
 
 def _scene(
-    assembly: Assembly,
-    thing: str,
-    step: Step,
-    own: tuple[tuple[Joint, str], ...],
-    there: set[str],
-    comes: set[str],
+    assembly: Assembly, thing: str, step: Step, own: tuple[tuple[Joint, str], ...], there: set[str], comes: set[str]
 ) -> StepScene:
-    if not there and comes - {thing}:  # what is brought to the first of all
+    if not there and comes - {thing}:  # the first of all
         there, comes = {thing}, comes - {thing}
     along, R = _from(assembly, thing, there, comes)
-    stand, come = (tuple(sorted(_bodies(things, assembly))) for things in (there, comes))
+    names = sorted((*assembly.made, *assembly.bought))
+    present, come = (tuple(name for name in names if assembly.thing(name) in things) for things in (there, comes))
     against = tuple(name for name in come if name in assembly.bodies and assembly.bodies[name].from_below)
-    return StepScene(thing, step, own, stand, come, against if thing not in comes else (), along, R)
-
-
-def _bodies(things: set[str], assembly: Assembly) -> Iterator[str]:
-    for name in (*assembly.made, *assembly.bought):
-        if assembly.thing(name) in things:
-            yield name
+    return StepScene(thing, step, own, present, come, against if thing not in comes else (), along, R)
 
 
 def _from(assembly: Assembly, thing: str, there: set[str], comes: set[str]) -> tuple[Vector, Rotation]:

@@ -1,7 +1,7 @@
-"""What the parts hide of the fan: rays against their meshes, and the closed form that bounds it from below.
+"""Beams that the parts block: rays against their meshes, and a lower bound in closed form.
 
-A beam is a bundle: its middle and BEAM_RAYS around it, on the rim of what the laser sends out, which widens with the
-distance. A beam counts as hidden if any of the bundle is: what is cut partly answers partly from the own body.
+A beam is a bundle: its middle and BEAM_RAYS on its rim, which widens with the distance. It is hidden if any ray is: a
+beam that is partly blocked also returns from the own body.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 if TYPE_CHECKING:
     from scanwright.cad.assembly.assembly import Assembly
 
-APERTURE_M = 0.003  # radius of the beam where it leaves: assumed, no data sheet at hand gives it
+APERTURE_M = 0.003  # radius of the beam at its exit: assumed, undocumented
 SPREAD_RAD = 0.005  # half of the divergence: assumed likewise
 BEAM_RAYS = 6
 
@@ -38,7 +38,7 @@ class PartsWorkshop:
     _made: dict[str, Assembly] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def bound(self, setting_rad: Array) -> SelfOcclusion | Refused:
-        """The cone that ring, bearing and cage fill in any case."""
+        """Return the cone that ring, bearing and cage always hide."""
         try:
             stack = drive_of(at_setting(self.scanner, setting_rad)).stack
         except BuildError as error:
@@ -56,7 +56,7 @@ class PartsWorkshop:
         return shadow_of(scanner, triangles_of(assembly), assembly.turning())
 
     def assembly(self, scanner: Scanner) -> Assembly:
-        """Parts of these products at the angles of `scanner`; those that were made for a shadow are kept.
+        """Return the parts of these products at the angles of `scanner`; they are made once.
 
         Raises:
             BuildError: a part cannot be made.
@@ -71,19 +71,13 @@ class PartsWorkshop:
 
 
 def triangles_of(assembly: Assembly) -> dict[str, Array]:
-    """Corners [m] of every part that stops a beam, as it looks while it turns, shape (t, 3, 3)."""
+    """Return the corners [m] of every part that blocks beams, swept if it turns about another axis, shape (t, 3, 3)."""
     clear = {name for name, body in assembly.bodies.items() if body.clear}
     return {name: mesh.vertices[mesh.faces] / 1000 for name, mesh in assembly.outlines().items() if name not in clear}
 
 
 def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Container[str]) -> SelfOcclusion:
-    """What the parts of one scanner hide.
-
-    Args:
-        scanner: angles and lidar.
-        triangles_m: of `triangles_of` every part, made and bought, rotation frame at gamma = 0.
-        turning: names of those that turn.
-    """
+    """Return the beams that parts hide; triangles of `triangles_of`, `turning` names the parts that turn."""
     by_motion: dict[bool, list[Array]] = {True: [], False: []}
     for name, triangles in triangles_m.items():
         by_motion[name in turning].append(triangles)
@@ -93,7 +87,7 @@ def shadow_of(scanner: Scanner, triangles_m: Mapping[str, Array], turning: Conta
 
 
 def bundles(scanner: Scanner) -> tuple[Array, Array]:
-    """Starts [m] and directions of the rays of every beam in the rotation frame at gamma = 0, shape (B, rays, 3)."""
+    """Return starts [m] and directions of the rays of every beam, rotation frame at gamma = 0, shape (B, rays, 3)."""
     bearings = scanner.lidar.bearings_rad()
     R = scanner.angles.R_rot_laser()
     along = np.stack([np.cos(bearings), np.sin(bearings), np.zeros_like(bearings)], axis=1) @ R.T
@@ -107,14 +101,14 @@ def bundles(scanner: Scanner) -> tuple[Array, Array]:
 
 
 def beams_in_cone(stack: Hub, bearings_rad: Array) -> Mask:
-    """Beams whose middle lies in the cone about -z that ring, bearing and cage fill at every axis angle."""
+    """Return the beams whose middle is in the cone about -z that ring, bearing and cage always hide."""
     q = stack.R()[2]
     down = -(q[0] * np.cos(bearings_rad) + q[1] * np.sin(bearings_rad))
     return np.asarray(down > math.cos(stack.sure_half_angle))
 
 
 def _stator(triangles_m: Array, origins: Array, directions: Array) -> Mask:
-    """Rays that keep farther from -z than all that stands still can never meet it: only the others are cast."""
+    """Return the beams that fixed parts hide, shape (B, AXIS_STEPS); only rays that can reach these are cast."""
     corners = triangles_m.reshape(-1, 3)
     reach = np.hypot(corners[:, 0], corners[:, 1])
     widest = float(np.arctan2(reach, -corners[:, 2]).max())
@@ -133,13 +127,13 @@ def _stator(triangles_m: Array, origins: Array, directions: Array) -> Mask:
 
 
 def _hidden(solid: ray_caster.Scene, origins: Array, directions: Array) -> Mask:
-    """Whether any ray of each bundle meets the solid, shape (B,)."""
+    """Return whether any ray of each bundle meets the solid, shape (B,)."""
     hits = ray_caster.cast(solid, origins.reshape(-1, 3), directions.reshape(-1, 3))
     return np.asarray(np.isfinite(hits.range_m).reshape(directions.shape[:2]).any(axis=1))
 
 
 def at_setting(scanner: Scanner, setting_rad: Array) -> Scanner:
-    """The scanner at another setting, its angles rounded as those that parts are built from."""
+    """Return the scanner at other angles, rounded as for the parts."""
     names = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
     rounded = {name: round(math.degrees(angle), 2) for name, angle in zip(names, setting_rad, strict=True)}
     angles = scanner.angles.model_copy(

@@ -1,6 +1,4 @@
-"""The steps of putting a scanner together, in the order that always works: those of its parts and of what is bought."""
-
-from __future__ import annotations
+"""Assembly steps of a scanner in order: those of its parts and of bought products."""
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.cable_instructions import cables_text, leads_text
@@ -10,25 +8,25 @@ from scanwright.cad.parts.part_spec import Step
 
 ON_DECK = Step(
     "Servo on the deck",
-    "The axis stands upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
-    f"{screws(SERVO_CASE, DECK)} Leave room for the plugs.",
-    "the horn turns freely, and the case lies flat on the deck",
+    "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
+    f"{screws(SERVO_CASE, DECK)} Leave space for the plugs.",
+    "the horn turns freely, and the case is flat on the deck",
     (SERVO,),
 )
 FRAME_ON_DECK = Step(
     "Frame on the deck",
-    "The axis stands upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
+    "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
     f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame.",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
 LEADS_TITLE = "Leads between lidar and ring"
-LEADS_CHECK = "turned by hand through its whole range, no lead touches what stands still, and none pulls at its ends"
+LEADS_CHECK = "turned by hand through its entire range, no lead touches a fixed part, and none pulls at its ends"
 CABLES_TITLE = "Cables that do not turn"
-CABLES_CHECK = "turned by hand, nothing that turns comes near a cable; a pull on one is not felt at its plug"
+CABLES_CHECK = "turned by hand, nothing comes near a cable; a pull on a cable does not reach its plug"
 
 
 def steps_of(assembly: Assembly) -> list[tuple[str, Step]]:
-    """Part or product that a step puts in, and the step."""
+    """Return each step with the part or product that it adds."""
     layout = assembly.layout
     specs = [assembly.parts[name] for name in assembly.made]
     steps = {spec.name: spec.step for spec in specs if spec.step is not None}

@@ -1,6 +1,4 @@
-"""A lead as a solid: a round section along its path, thicker where its joint sits. Millimetres."""
-
-from __future__ import annotations
+"""A cable as a solid: a round section along its path, thicker at its joint. Millimetres."""
 
 import cadquery as cq
 import numpy as np
@@ -10,7 +8,7 @@ from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.cables import joint
 from scanwright.cad.layout.cables.fixed import FixedCable
 from scanwright.cad.layout.cables.leads import RotorLead
-from scanwright.cad.layout.cables.path import Path, PathPiece
+from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.solids import building
 from scanwright.design.errors import BuildError
@@ -19,7 +17,7 @@ LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not
 
 
 def lead_solid(lead: RotorLead) -> cq.Solid:
-    """The bundle of wires between ring and lidar, with the shrink tube over its joint.
+    """Return the wires between ring and lidar with the shrink tube over their joint.
 
     Raises:
         BuildError: the kernel does not make one valid solid of it, with a closed mesh.
@@ -35,7 +33,7 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
 
 
 def cable_solid(cable: FixedCable) -> cq.Solid:
-    """A cable that does not turn.
+    """Return a cable that does not turn.
 
     Raises:
         BuildError: the kernel does not make one valid solid of it, with a closed mesh.
@@ -52,12 +50,12 @@ def _closed(name: str, solid: cq.Solid) -> cq.Solid:
 
 
 def _tube(path: Path, half: float) -> cq.Shape:
-    pieces, corners = path.pieces(), np.array(path.corners, dtype=float)
-    wire = cq.Wire.assembleEdges([_edge(piece) for piece in pieces])
+    corners = np.array(path.corners, dtype=float)
+    edges = []
+    for piece in path.pieces():
+        start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
+        line = cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)
+        edges.append(line)
+    wire = cq.Wire.assembleEdges(edges)
     ring = cq.Wire.makeCircle(half, solids.vector(corners[0]), solids.vector(corners[1] - corners[0]))
     return cq.Solid.sweep(ring, [], wire)
-
-
-def _edge(piece: PathPiece) -> cq.Edge:
-    start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
-    return cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)

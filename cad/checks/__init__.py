@@ -1,1 +1,1 @@
-"""What a scanner's parts are checked for before anybody prints them; one file per concept."""
+"""Checks of a scanner before its parts are made; one file per subject."""

@@ -1,9 +1,7 @@
-"""Whether a driver reaches every screw in a straight line in the step of assembly that closes its joint: by rays.
+"""Whether a driver reaches every screw in a straight line in the assembly step that needs it, by rays.
 
-A test of solids cannot see it: the driver is no part. What turns may stand at any angle of the axis.
+Bodies that turn may be at any angle of the axis.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
@@ -40,7 +38,7 @@ STEPS = 72  # angles of the axis
 
 @dataclass(frozen=True)
 class Body:
-    """A stiff body that may be in the way; most are never near a driver, and need no tree of their triangles."""
+    """A rigid body that may block a driver; its ray-casting scene is built when needed."""
 
     mesh: TriMesh
 
@@ -55,7 +53,7 @@ class Body:
         return self.mesh.vertices.min(axis=0), self.mesh.vertices.max(axis=0)
 
     def reach_mm(self, starts: Array, directions: Array, length: float) -> Array:
-        """Return how far the nearest ray of each screw gets, infinity beyond a length; shape (..., screws)."""
+        """Return the shortest free length of each screw's rays, infinity beyond a length; shape (..., screws)."""
         rays = np.broadcast_to(directions, starts.shape)
         ends = np.stack([starts, starts + length * rays])
         axes = (0, *range(1, ends.ndim - 1))
@@ -69,7 +67,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Blocked:
-    """A screw that no driver reaches: its number in the joint, the body in the way, and how far that is off [mm]."""
+    """A screw that no driver reaches: its number in the joint, the blocking body, and its distance [mm]."""
 
     screw: int
     body: str
@@ -98,13 +96,7 @@ def access_checks(assembly: Assembly) -> list[Finding]:
 
 
 def blocked_screws(joint: Joint, present: Mapping[str, Body], turning: frozenset[str]) -> list[Blocked]:
-    """Return the screws of a joint that no driver reaches.
-
-    Args:
-        joint: its screws are driven from their heads' side.
-        present: bodies that are there, by name.
-        turning: names of those that turn about the axis.
-    """
+    """Return the screws of a joint that no driver reaches past the present bodies; `turning` names those that turn."""
     starts, back = driver_rays(joint)
     length = KEYS_MM.get(joint.screw.name, BY_HAND_MM)[1]
     moves = joint.part in turning
@@ -140,7 +132,7 @@ def driver_rays(joint: Joint) -> tuple[Array, Array]:
 
 
 def _bodies(assembly: Assembly) -> dict[str, Body]:
-    """Return everything that is stiff, by name: a cable can be held aside."""
+    """Return all rigid bodies by name: a cable can be bent aside."""
     names = (*assembly.made, *assembly.bought)
     soft = {name for name in names if assembly.thing(name) in (ROTOR_LEADS, FIXED_CABLES)}
     soft |= {name for name in names if name.startswith(LIDAR_CABLE)}
@@ -151,6 +143,6 @@ def _error(number: int, scene: StepScene, joint: Joint, blocked: Sequence[Blocke
     first = min(blocked, key=lambda each: each.after_mm)
     message = (
         f"{joint.part} on {joint.onto}: step {number} ({scene.step.title}): no straight line for the key of "
-        f"{len(blocked)} of {joint.count} {joint.screw.name}: {first.body} is in the way, {first.after_mm:.0f} mm away"
+        f"{len(blocked)} of {joint.count} {joint.screw.name}: {first.body} blocks it {first.after_mm:.0f} mm away"
     )
     return Finding("driver_access", "error", joint.part, message, float(len(blocked)), 0.0)

@@ -1,7 +1,5 @@
 """Beams that the parts hide."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 
@@ -21,13 +19,9 @@ from scanwright.design.self_occlusion import SelfOcclusion
 def beam_checks(
     scanner: Scanner, shadow: SelfOcclusion, triangles_m: Mapping[str, Array], carriers: Collection[str]
 ) -> list[Finding]:
-    """Return how many beams are hidden, and how many by the linkage alone.
+    """Return the width of the hidden beams, and of those that the linkage alone hides.
 
-    Args:
-        scanner: angles and lidar.
-        shadow: of all parts.
-        triangles_m: of `shadow.triangles_of`.
-        carriers: names of linkage and sub-plate.
+    `triangles_m` are of `shadow.triangles_of`, `carriers` the names of linkage and sub-plate.
     """
     bearings = scanner.lidar.bearings_rad()
     step = math.degrees(float(bearings[1] - bearings[0]))

@@ -3,8 +3,6 @@
 Clearance and hidden beams are checked with all other bodies, since cables are bodies of the assembly.
 """
 
-from __future__ import annotations
-
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.checks.limits import at_least, note, tidy
 from scanwright.cad.layout.cables import joint
@@ -50,22 +48,15 @@ def _checks(lead: RotorLead, subject: str, seat: TieSeat | None) -> list[Finding
     longest = max((piece.length for piece in joint.straights(lead.path)), default=0.0)
     straight = longest if lead.joint is None else lead.joint.piece.length
     tied = None if seat is None else tied_mm(lead, seat)
-    tie = Finding(
-        "lead_tie",
-        "note",
-        subject,
-        f"{subject}: no slotted tab of the hub is near",
-        hint="tie it to the part next to it",
-    )
+    what, hint = f"{subject}: no slotted tab of the hub is near", "tie it to the part next to it"
+    tie = Finding("lead_tie", "note", subject, what, hint=hint)
     if tied is not None:
         what = f"{subject}: runs {tied:.1f} mm below the slotted tab of the hub that it is tied to"
         tie = Finding("lead_tie", "ok", subject, what, tidy(tied), None, "mm")
     return [
         _bend(subject, lead.path, lead.radius),
         at_least("lead_joint", straight, joint.LENGTH, "mm", subject, "straight piece for its joint"),
-        note(
-            "lead_length", lead.path.length(), "mm", subject, "from the ring's rotor to the jacket of the lidar's cable"
-        ),
+        note("lead_length", lead.path.length(), "mm", subject, "from the ring's rotor to the jacket of the cable"),
         tie,
     ]
 
@@ -75,5 +66,5 @@ def _bend(subject: str, path: Path, radius: float) -> Finding:
 
 
 def _no_path(subject: str, what: str, radius: float, diameter: float, hint: str) -> Finding:
-    message = f"{subject}: {what} has bend radii of {radius:g} mm or more and room for a diameter of {diameter:g} mm"
+    message = f"{subject}: {what} allows bend radii of {radius:g} mm or more and a diameter of {diameter:g} mm"
     return Finding("lead_bend", "warning", subject, message, None, radius, "mm", hint)

@@ -1,7 +1,5 @@
 """`checks.json`: the findings of all checks, written and read, and the lines of those that failed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -48,7 +46,15 @@ def read_checks(path: Path) -> tuple[Finding, ...]:
         BuildError: the file is missing, or no build wrote it.
     """
     try:
-        return tuple(map(_check, json.loads(path.read_text(encoding="utf-8"))["checks"]))
+        return tuple(
+            Finding(
+                entry["kind"],
+                SEVERITY_OF.get(entry["severity"], "error"),
+                entry["where"],
+                *(entry[key] for key in ("message", "value", "limit", "unit")),
+            )
+            for entry in json.loads(path.read_text(encoding="utf-8"))["checks"]
+        )
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise BuildError(f"{path}: not as a build writes it ({error}): build the folder again") from error
 
@@ -60,15 +66,3 @@ def failure_lines(checks: Sequence[Finding]) -> list[str]:
         return []
     count = f"{len(failed)} of {len(checks)} checks failed"
     return [*(f"check failed: {sentence(check)}" for check in failed), f"{count}: do not make these parts"]
-
-
-def _check(entry: dict[str, Any]) -> Finding:
-    return Finding(
-        entry["kind"],
-        SEVERITY_OF.get(entry["severity"], "error"),
-        entry["where"],
-        entry["message"],
-        entry["value"],
-        entry["limit"],
-        entry["unit"],
-    )

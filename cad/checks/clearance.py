@@ -6,8 +6,6 @@ triangle is drawn by its horizontal chords, so that it is right within CHORD_MM.
 intersected as solids.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container, Mapping
 
@@ -38,13 +36,7 @@ def clearance_checks(assembly: Assembly) -> list[Finding]:
 def turning_check(
     meshes: Mapping[str, TriMesh], turning: Container[str], meet: Container[frozenset[str]] = frozenset()
 ) -> Finding:
-    """Check the least distance of turning and fixed bodies over a full turn.
-
-    Args:
-        meshes: of all bodies by name, as they look while they turn.
-        turning: names of those that turn about the axis.
-        meet: pairs that may touch.
-    """
+    """Check the least distance of turning and fixed bodies over a full turn; `meet` are pairs that may touch."""
     rings = {name: _image(mesh) for name, mesh in meshes.items()}
     sides = {turns: [rings[name] for name in rings if (name in turning) == turns] for turns in (True, False)}
     boxes = {turns: shapely.total_bounds(np.concatenate([[], *side])) for turns, side in sides.items()}
@@ -68,7 +60,9 @@ def together_check(meshes: Mapping[str, TriMesh], turning: Container[str]) -> Fi
     names = sorted(meshes)
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
-            if (one in turning) != (other in turning) or _apart(meshes[one], meshes[other]):
+            a, b = meshes[one].vertices, meshes[other].vertices
+            apart = (a.min(axis=0) > b.max(axis=0)).any() or (b.min(axis=0) > a.max(axis=0)).any()
+            if (one in turning) != (other in turning) or apart:
                 continue
             volume = float((bodies[one] ^ bodies[other]).volume())
             if volume > most:
@@ -97,7 +91,7 @@ def _near(rings: Array, box: Array) -> Array:
 
 
 def _image(mesh: TriMesh) -> Array:
-    """Outlines of shapes in the half plane that cover the surface at every axis angle, each once."""
+    """Return outlines of shapes in the half plane that cover the surface at every axis angle, each once."""
     corners = mesh.vertices[mesh.faces]
     radius = np.hypot(corners[:, :, 0], corners[:, :, 1])
     across = np.linalg.norm(np.ptp(corners[:, :, :2], axis=1), axis=1)
@@ -113,7 +107,7 @@ def _image(mesh: TriMesh) -> Array:
 
 
 def _outlines(corners: Array, levels: int) -> Array:
-    """Outlines (r, z) of triangles: at each level from lowest to highest the nearest and furthest point, (m, 2n, 2)."""
+    """Return outlines (r, z) of triangles, at each level the nearest and the furthest point, shape (m, 2 levels, 2)."""
     order = np.argsort(corners[:, :, 2], axis=1, kind="stable")
     low, middle, high = (np.take_along_axis(corners, order[:, i, None, None], axis=1)[:, 0] for i in range(3))
     share = np.linspace(0.0, 1.0, levels)
@@ -133,7 +127,7 @@ def _outlines(corners: Array, levels: int) -> Array:
 
 
 def _on_short_edges(low: Array, middle: Array, high: Array, z: Array) -> Array:
-    """Points at heights z on the path low - middle - high."""
+    """Return points at heights z on the path low - middle - high."""
     below = z <= middle[:, None, 2]
     start = np.where(below[..., None], low[:, None], middle[:, None])
     end = np.where(below[..., None], middle[:, None], high[:, None])
@@ -143,7 +137,7 @@ def _on_short_edges(low: Array, middle: Array, high: Array, z: Array) -> Array:
 
 
 def _flat(corners: Array, levels: int) -> tuple[Array, ...]:
-    """A horizontal triangle is a line in the half plane."""
+    """Return near, far and z of horizontal triangles, which are lines in the half plane."""
     ends = np.roll(corners, -1, axis=1)
     along = ends[..., :2] - corners[..., :2]
     square = np.einsum("mek,mek->me", along, along)
@@ -164,10 +158,3 @@ def _contains(outer: TriMesh, inner: TriMesh) -> bool:
     scene = ray_caster.build_scene(outer.vertices[outer.faces] / 1000)
     (face,) = ray_caster.cast(scene, point / 1000, RAY[None]).triangle
     return bool(face >= 0 and scene.normals[face] @ RAY > 0)
-
-
-def _apart(one: TriMesh, other: TriMesh) -> bool:
-    gap = np.maximum(
-        one.vertices.min(axis=0) - other.vertices.max(axis=0), other.vertices.min(axis=0) - one.vertices.max(axis=0)
-    )
-    return bool(gap.max() > 0)

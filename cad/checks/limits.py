@@ -1,7 +1,5 @@
 """Findings from a value and its limit: the constructors that all checks share."""
 
-from __future__ import annotations
-
 from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
 from scanwright.cad.layout.names import SERVO
 from scanwright.design.arrays import Array

@@ -1,14 +1,9 @@
 """Bed, support, islands, walls and holes of each printed part in its print pose. Millimetres.
 
-An island is a layer that starts in the air, which a slicer must support: an outline of a layer that touches no outline
-of the layer below.
-
-Walls are measured from points on the surface along the normal to the other side, and counted if the other side is
-parallel: every sharp corner is a wedge that thins to nothing, and prints. A thin spot is a note; thin walls on more
-than THIN_SHARE of the surface are an error. The message names the thinnest spot.
+An island is an outline of a layer that touches no outline of the layer below: a slicer must support it. Walls are
+measured from points on the surface along the normal, if the other side is parallel: a wedge prints. A thin spot is a
+note; thin walls on more than THIN_SHARE of the surface are an error.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping
@@ -55,23 +50,16 @@ def printing_checks(
 
 @dataclass(frozen=True, slots=True)
 class ThinWalls:
-    """Parallel walls thinner than a least thickness.
+    """Parallel walls thinner than a least thickness."""
 
-    Attributes:
-        area_mm2: of both of their sides.
-        surface_mm2: of the whole part.
-        thinnest_mm: least thickness; inf if no wall is thin.
-        at: middle of the wall there, shape (3,); NaN if no wall is thin.
-    """
-
-    area_mm2: float
-    surface_mm2: float
-    thinnest_mm: float
-    at: Array
+    area_mm2: float  # of both of their sides
+    surface_mm2: float  # of the entire part
+    thinnest_mm: float  # least thickness; inf if no wall is thin
+    at: Array  # middle of the wall there, shape (3,); NaN if no wall is thin
 
 
 def thin_walls(mesh: TriMesh, least_mm: float) -> ThinWalls:
-    """Measure the walls of a part; of places of one thickness, return the one nearest to their middle."""
+    """Measure the walls of a part; of places of equal thickness, return the one nearest to their middle."""
     points, normals, area = _surface(mesh)
     solid = ray_caster.build_scene(mesh.vertices[mesh.faces] / 1000)
     inside = 1e-6  # m, below the surface

@@ -1,6 +1,4 @@
-"""Unverified values of the products, and required modules that have no place."""
-
-from __future__ import annotations
+"""Unverified values of the products, and required modules that do not fit."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,7 +11,7 @@ from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-# Values of a product that shape no part alone.
+# Values of a product that shape more than one part.
 SHAPING = {
     "lidar.holes": "the screws of the lidar",
     "printer.screw_clearance_mm": "every screw hole",
@@ -24,28 +22,17 @@ SHOWN_CHARS = 60  # of a value in a message; a longer one is cut
 
 
 def module_checks(scanner: Scanner, left_out: Iterable[LeftOut]) -> list[Finding]:
-    """Return an error for each module that the task requires and that has no place in this scanner.
-
-    A module and the part that it adds have the same name.
-    """
+    """Return an error for each required module that does not fit; a module has the name of the part that it adds."""
+    what = "the task requires it (modules.{0} = true), but it does not fit"
     return [
-        Finding(
-            "module",
-            "error",
-            part.what,
-            f"{part.what}: the task requires it (modules.{part.what} = true), but it has no place: {part.why}",
-        )
+        Finding("module", "error", part.what, f"{part.what}: {what.format(part.what)}: {part.why}")
         for part in left_out
         if getattr(scanner.modules, part.what, False)
     ]
 
 
-def unverified(products: Iterable[Product], assembly: Assembly) -> list[Finding]:
-    """Return a warning for each unverified value of a product that shapes a part."""
-    return [warning for product in products for warning in _unverified(product, assembly)]
-
-
-def _unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
+def unverified(product: Product, assembly: Assembly) -> Iterator[Finding]:
+    """Yield a warning for each unverified value of a product that shapes a part."""
     provenance, shaping = product.provenance(), dict(SHAPING)
     for field in product.unverified():
         parts = [part.name for part in assembly.parts.values() if f"{product.kind}.{field}" in part.shaped_by]

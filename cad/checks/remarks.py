@@ -1,12 +1,9 @@
 """Findings for a person to read before the parts are made, and the parts that this scanner does not need."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.layout.deck import USUAL, Deck
-from scanwright.cad.layout.drive import Mounted
+from scanwright.cad.layout.deck import USUAL
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE
 from scanwright.cad.screws import passing_hole
@@ -17,14 +14,29 @@ from scanwright.design.scanner import Scanner
 
 def remarks_of(scanner: Scanner, assembly: Assembly) -> tuple[Finding, ...]:
     """Return the remarks on parts; those on products are checks."""
-    layout = assembly.layout
+    deck, mounted = assembly.layout.deck, assembly.layout.drive.mounted
+    hint = "have it turned from aluminium or steel after its STEP file"
     remarks = [
-        _turn_from_metal(part.name, part.why_metal) for part in assembly.parts.values() if part.process == "turned"
+        Finding("turn_from_metal", "note", part.name, f"{part.name}: {part.why_metal}", hint=hint)
+        for part in assembly.parts.values()
+        if part.process == "turned"
     ]
-    if layout.deck.flat:
-        remarks.append(_screwed_to_deck(scanner, layout.drive.mounted))
+    if deck.flat:
+        hole = passing_hole(mounted.screw, scanner.printer)
+        bottom = f"{scanner.servo.name} by its rear holes"
+        what = bottom if mounted.onto == SERVO_CASE else f"{mounted.onto} by its feet"
+        places = ", ".join(f"({x:g}, {y:g})" for x, y in mounted.holes)
+        message = f"{BASE_MOUNT}: not included, the axis is upright"
+        hint = (
+            f"hold {what} with 4 x {mounted.screw.name} from below through the deck, {hole:g} mm "
+            f"holes at {places} mm from the axis; leave space for the plugs"
+        )
+        remarks.append(Finding("servo_on_deck", "note", BASE_MOUNT, message, hint=hint))
     elif scanner.deck is None:
-        remarks.append(_usual_holes(layout.deck))
+        places = ", ".join(f"({x:g}, {y:g})" for x, y in USUAL.holes())
+        message = f"{BASE_MOUNT}: the deck needs {deck.screw.name} holes at {places} mm"
+        hint = "if your robot has other holes, write them as [deck] in the task, and build again"
+        remarks.append(Finding("usual_deck_holes", "note", BASE_MOUNT, message, hint=hint))
     return tuple(remarks)
 
 
@@ -42,26 +54,3 @@ def without_traps(printer: Printer, joints: Sequence[Joint]) -> list[Finding]:
         for joint in joints
         if joint.thread is not None and not joint.traps
     ]
-
-
-def _turn_from_metal(part: str, why: str) -> Finding:
-    hint = "have it turned from aluminium or steel after its STEP file"
-    return Finding("turn_from_metal", "note", part, f"{part}: {why}", hint=hint)
-
-
-def _usual_holes(deck: Deck) -> Finding:
-    places = ", ".join(f"({x:g}, {y:g})" for x, y in USUAL.holes())
-    message = f"{BASE_MOUNT}: the deck needs {deck.screw.name} holes at {places} mm"
-    hint = "if your robot has other holes, write them as [deck] in the task, and build again"
-    return Finding("usual_deck_holes", "note", BASE_MOUNT, message, hint=hint)
-
-
-def _screwed_to_deck(scanner: Scanner, mounted: Mounted) -> Finding:
-    hole = passing_hole(mounted.screw, scanner.printer)
-    what = f"{scanner.servo.name} by its rear holes" if mounted.onto == SERVO_CASE else f"{mounted.onto} by its feet"
-    places = ", ".join(f"({x:g}, {y:g})" for x, y in mounted.holes)
-    hint = (
-        f"hold {what} with 4 x {mounted.screw.name} from below through the deck, {hole:g} mm "
-        f"holes at {places} mm from the axis; leave room for the plugs"
-    )
-    return Finding("servo_on_deck", "note", BASE_MOUNT, f"{BASE_MOUNT}: not included, the axis is upright", hint=hint)

@@ -1,9 +1,7 @@
 """All checks of one scanner, for its build folder and for the command `check`.
 
-They use the parts without their labels: the wall between two engraved strokes is not a thin wall.
+They use the parts without labels: the wall between two engraved strokes is no thin wall.
 """
-
-from __future__ import annotations
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.make import make_parts
@@ -31,13 +29,7 @@ from scanwright.design.self_occlusion import SelfOcclusion, self_occlusion_bytes
 
 
 def check_files(scanner: Scanner, assembly: Assembly, progress: Progress) -> dict[str, bytes]:
-    """Return `checks.json` and `own_body.npz` of a build.
-
-    Args:
-        scanner: angles and products.
-        assembly: its parts.
-        progress: callback for progress.
-    """
+    """Return `checks.json` and `own_body.npz` of a build."""
     checks, shadow = run_checks(scanner, assembly, progress)
     own_body = self_occlusion_bytes(shadow, scanner.lidar.bearings_rad())
     return {"checks.json": checks_text(checks).encode("utf-8"), "own_body.npz": own_body}
@@ -79,6 +71,6 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
         *([] if linkage is None else vibration_checks(scanner, assembly, bodies, linkage, mount)),
         *printing_checks(scanner.printer, printed, meshes, {name: assembly.print_pose(name) for name in printed}),
         *module_checks(scanner, layout.left_out),
-        *unverified(products, assembly),
+        *(warning for product in products for warning in unverified(product, assembly)),
     ]
     return checks, shadow

@@ -1,9 +1,7 @@
 """The table of all checks: code, subject, limit, and the source of the limit. A page of the docs prints it.
 
-Limits that are constants stand here, with their reason; those that products, printer or layout give are described.
+Constant limits are here, with their reason; limits of products, printer or layout are described.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

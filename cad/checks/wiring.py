@@ -1,7 +1,5 @@
 """The electrical rule check of the wiring, and the values that it lacks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from scanwright.cad.layout.names import RING
@@ -13,7 +11,7 @@ from scanwright.design.scanner import Scanner
 
 
 def wiring_checks(scanner: Scanner) -> list[Finding]:
-    """Return every broken rule of the wiring, or one finding that it keeps them; then the values it lacks."""
+    """Return every broken rule of the wiring, or one finding if none is; then the missing values."""
     network = network_of(scanner)
     summary = (
         f"wiring: all {len(network.wires)} wires end in pins, every pin is used or spare, no circuit, wire, fuse or "

@@ -1,10 +1,8 @@
-"""Dimensions of one view: ordinates from the view's origin, diameters and other call-outs with leaders, angles.
+"""Dimensions of one view: ordinates from the view's origin, leaders with text, angles.
 
-Ordinates are the running dimensions of ISO 129: every value is measured from 0, nothing adds up, and what lies close
-together is spread without crossing. Places are millimetres of paper.
+Ordinates are the running dimensions of ISO 129; close ones are spread without crossing. Places are millimetres of
+paper.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -137,7 +135,7 @@ def angle_between(pen: Pen, at: Point, first: float, second: float, radius: floa
         return at[0] + (reach + wide * abs(c)) * c, at[1] + (reach + tall * abs(s)) * s
 
     middle, half, height = (low + high) / 2, width_of(words) / 2 + 0.8, TEXT_MM / 2 + 0.8
-    narrow = (high - low) * radius < 3 * ARROW_MM[0]  # no room for heads between the arms, nor for the box
+    narrow = (high - low) * radius < 3 * ARROW_MM[0]  # no space for heads between the arms, nor for the box
     x, y = out(middle, radius + (ARMS_MM + 1.5 if narrow else 2.5), half, height)
     ends = {"defpoint2": out(low, radius), "defpoint3": out(high, radius), "defpoint4": at}
     own = pen.dimension(ANGLE, "<>", (x, y), defpoint=out(middle, radius), **ends)

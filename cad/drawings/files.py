@@ -1,7 +1,5 @@
 """`drawings/<part>.pdf`, `.dxf` and `.svg` of every made part."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -23,10 +21,7 @@ AT_M = FAR_MM / 1000  # distance up to which a wrong angle is judged
 
 
 def drawing_files(
-    scanner: Scanner,
-    assembly: Assembly,
-    masses_g: dict[str, float],
-    config_hash: str,
+    scanner: Scanner, assembly: Assembly, masses_g: dict[str, float], config_hash: str
 ) -> dict[str, bytes]:
     """Draw every made part; arguments as for `bom.items_of`."""
     files: dict[str, bytes] = {}
@@ -39,13 +34,7 @@ def drawing_files(
     return files
 
 
-def drawing_of(
-    name: str,
-    scanner: Scanner,
-    assembly: Assembly,
-    mass_g: float,
-    config_hash: str,
-) -> Sheet:
+def drawing_of(name: str, scanner: Scanner, assembly: Assembly, mass_g: float, config_hash: str) -> Sheet:
     """Return the sheet of one part."""
     spec = assembly.parts[name]
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
@@ -79,17 +68,10 @@ def _making(process: Process, printer: Printer, part: Part) -> list[str]:
         finish = "Ra 3.2, faces with a fit Ra 0.8" if part.fits else "Ra 3.2"
         return [f"{finish} (ISO 21920-1). Edges broken 0.2 to 0.4 x 45°{threads}."]
     return [
-        _clearances(printer),
-        "Printed in the pose of its print file. Screw holes drilled to size where they are tight; all else as printed.",
-    ]
-
-
-def _clearances(printer: Printer) -> str:
-    """Return the clearances that the model contains."""
-    return (
         f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
-        f"fits {number(printer.fit_clearance_mm)} on the diameter."
-    )
+        f"fits {number(printer.fit_clearance_mm)} on the diameter.",
+        "Printed in the pose of its print file. Tight screw holes drilled to size; all else as printed.",
+    ]
 
 
 def _notes(scanner: Scanner, part: Part, on_sheet: OnSheet, how: str, making: list[str]) -> list[str]:
@@ -115,21 +97,17 @@ def _notes(scanner: Scanner, part: Part, on_sheet: OnSheet, how: str, making: li
     if part.lidar_axis is not None:
         normal = part.lidar_axis
         tilt = math.degrees(math.acos(min(1.0, float(normal[2]))))
-        limit = noise_deg(scanner)
-        notes.append(
-            f"alpha_laser {angles.alpha_laser:g}°, beta_laser {angles.beta_laser:g}°: tilt {number(tilt)}°"
-            + (
-                f" towards {number(azimuth_deg(normal))}° from +Y, counter-clockwise from above."
-                if tilt > 0.01
-                else "."
-            )
+        towards = (
+            f" towards {number(azimuth_deg(normal))}° from +Y, counter-clockwise from above" if tilt > 0.01 else ""
         )
+        laser = f"alpha_laser {angles.alpha_laser:g}°, beta_laser {angles.beta_laser:g}°"
+        notes.append(f"{laser}: tilt {number(tilt)}°{towards}.")
         seat = -planes_across(part.solid, normal)[0]
         notes.append(f"The largest face across the lidar's axis lies {number(seat)} below the optical centre.")
         if any(item.hole for item in part.axial):
             notes.append(
-                f"Seat to bore within {limit:.2f}°: more moves a point within {AT_M:g} m by the range noise "
-                f"of {scanner.lidar.name}."
+                f"Seat to bore within {noise_deg(scanner):.2f}°: more moves a point within {AT_M:g} m by the range "
+                f"noise of {scanner.lidar.name}."
             )
     elif inclined:
         notes.append(f"alpha_rot {angles.alpha_rot:g}°, beta_rot {angles.beta_rot:g}°: the axis on the deck.")

@@ -1,6 +1,4 @@
-"""What a drawing shows of a part: its solid, holes, cylinders about the axis, and plane faces. Rotation frame, mm."""
-
-from __future__ import annotations
+"""Content of a drawing: solid, holes, cylinders about the axis, and plane faces. Rotation frame, mm."""
 
 import math
 from collections.abc import Sequence
@@ -24,23 +22,14 @@ PLANES = 9  # the largest faces of one direction that get an ordinate: more do n
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a drawing shows of a part.
+    """Content of the drawing of a part."""
 
-    Attributes:
-        solid: rotation frame, moved so that the axis it is measured from is x = y = 0.
-        patterns: its holes off the axis, then its slots.
-        axial: its cylinders about the axis that it is measured from.
-        datum: height of the lowest point.
-        lidar_axis: z of the lidar that it carries; None for other parts.
-        fits: of its cylinders about that axis.
-    """
-
-    solid: cq.Solid
-    patterns: list[Pattern]
-    axial: list[Round]
-    datum: float
-    lidar_axis: Array | None
-    fits: tuple[ToleratedDiameter, ...]
+    solid: cq.Solid  # rotation frame, moved so that the axis of its ordinates is x = y = 0
+    patterns: list[Pattern]  # its holes off the axis, then its slots
+    axial: list[Round]  # its cylinders about that axis
+    datum: float  # height of the lowest point
+    lidar_axis: Array | None  # z of the lidar that it carries; None for other parts
+    fits: tuple[ToleratedDiameter, ...]  # of its cylinders about the axis
 
     def tolerance(self, item: Round) -> str:
         """Return the text behind the diameter of a cylinder about the axis."""

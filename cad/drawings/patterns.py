@@ -1,7 +1,5 @@
 """Holes that belong together, and their call-outs. Millimetres, rotation frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,21 +15,14 @@ IN_LINE_MM = 0.01  # between the axes of two holes, or of a hole and its screw
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """Equal parallel holes, or slots.
+    """Equal parallel holes, or slots."""
 
-    Attributes:
-        holes: all of one diameter, direction and height along it; of slots their width, in their middles.
-        circle: diameter of the circle that they share at equal steps; 0 if none.
-        heads: diameter of the recesses of their screws' heads; 0 if none.
-        holds: the thread in them, in words; empty if none.
-        slot: length of slots; 0 if none.
-    """
-
+    # all of one diameter, direction and height along it; of slots their width, in their middles
     holes: tuple[Round, ...]
-    circle: float
-    heads: float = 0.0
-    holds: str = ""
-    slot: float = 0.0
+    circle: float  # diameter of the circle that they share at equal steps; 0 if none
+    heads: float = 0.0  # diameter of the recesses of their screws' heads; 0 if none
+    holds: str = ""  # text of their thread; empty if none
+    slot: float = 0.0  # length of slots; 0 if none
 
     @property
     def direction(self) -> Array:
@@ -109,23 +100,16 @@ def _drilled(holes: list[Round]) -> list[Round]:
 
 
 def with_threads(patterns: list[Pattern], joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
-    """Add thread, insert or nut to the patterns that hold screws of joints.
-
-    Args:
-        patterns: of a part.
-        joints: whose threads it holds, rotation frame.
-        moved: what the part was moved by.
-    """
+    """Add thread, insert or nut to the patterns of a part, moved by `moved`, that hold screws of its joints."""
     threaded: list[Pattern] = []
     for pattern in patterns:
-        joint = next((joint for joint in joints if all(_of(hole, joint, moved) for hole in pattern.holes)), None)
-        threaded.append(pattern if joint is None else replace(pattern, holds=_thread(joint)))
+        for joint in joints:
+            lines = [(np.array(axis.start) + moved, np.array(axis.along)) for axis in joint.axes]
+            if all(any(_on_line(hole, *line) for line in lines) for hole in pattern.holes):
+                pattern = replace(pattern, holds=_thread(joint))
+                break
+        threaded.append(pattern)
     return threaded
-
-
-def _of(hole: Round, joint: Joint, moved: tuple[float, float, float]) -> bool:
-    """Return whether one of a joint's screws is in a hole of a part that was moved."""
-    return any(_on_line(hole, np.array(axis.start) + moved, np.array(axis.along)) for axis in joint.axes)
 
 
 def _thread(joint: Joint) -> str:
@@ -141,7 +125,8 @@ def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
     """Join wider holes to the screw holes in line with them, as recesses of heads."""
     out: list[Pattern] = []
     for pattern in patterns:  # by diameter, smallest first
-        carrier = next((one for one in out if all(_on_one(hole, one) for hole in pattern.holes)), None)
+        inside = (one for one in out if all(any(_in_line(a, b) for b in one.holes) for a in pattern.holes))
+        carrier = next(inside, None)
         hole = pattern.holes[0]
         if carrier is None:
             out.append(pattern)
@@ -151,10 +136,6 @@ def _with_heads(patterns: list[Pattern]) -> list[Pattern]:
         elif not hole.through:  # else one drill makes both
             out.append(pattern)
     return sorted(out, key=lambda pattern: -len(pattern.holes))
-
-
-def _on_one(hole: Round, pattern: Pattern) -> bool:
-    return any(_in_line(hole, other) for other in pattern.holes)
 
 
 def _in_line(hole: Round, other: Round) -> bool:

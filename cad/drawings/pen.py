@@ -1,4 +1,4 @@
-"""Draws on the modelspace of a DXF document in millimetres of paper: strokes, arcs, texts and dimensions on layers."""
+"""Draw on the modelspace of a DXF document in millimetres of paper: strokes, arcs, texts and dimensions on layers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ANCHORS = {
     "right": (TextEntityAlignment.RIGHT, 1.0),
 }
 CAPITAL = 0.72  # height of capitals and figures over the size of the font (Helvetica)
-GLYPH_WIDTH = 0.6 / CAPITAL  # of the height, on average: what room a text needs
+GLYPH_WIDTH = 0.6 / CAPITAL  # of the height, on average
 TEXT_MM = 2.5  # height of letters, one of ISO 3098-1
 ARROW_MM = (2.2, 0.35)  # length and half width
 TURN_RAD = 2 * math.pi
@@ -49,19 +49,12 @@ def document_at(scale: float) -> Drawing:
 
 @dataclass(frozen=True, slots=True)
 class Pen:
-    """Draws about an origin and remembers how far it came.
+    """Draws about an origin and records the extent."""
 
-    Attributes:
-        space: what it draws on; on None it only measures.
-        scale: paper over model.
-        origin: on the paper.
-        reached: corners of what was drawn, about the origin.
-    """
-
-    space: BaseLayout | None
-    scale: float
-    origin: Point = (0.0, 0.0)
-    reached: list[Point] = field(default_factory=list)
+    space: BaseLayout | None  # to draw on; None to measure only
+    scale: float  # paper over model
+    origin: Point = (0.0, 0.0)  # on the paper
+    reached: list[Point] = field(default_factory=list)  # corners of what was drawn, about the origin
 
     def box(self) -> tuple[float, float, float, float]:
         """Return left, bottom, right and top of what was drawn, about the origin."""
@@ -86,7 +79,7 @@ class Pen:
     def arc(self, layer: Layer, centre: Point, radius: float, start: float = 0.0, end: float = TURN_RAD) -> None:
         """Draw part of a circle, counter-clockwise from start to end [rad]."""
         turns = [start + (end - start) * k / 16 for k in range(17)]
-        self.reached.extend(_polar(centre, radius, turn) for turn in turns)
+        self.reached.extend((centre[0] + radius * math.cos(t), centre[1] + radius * math.sin(t)) for t in turns)
         if self.space is None:
             return
         placed, size = self._model(centre), radius / self.scale
@@ -123,9 +116,9 @@ class Pen:
 
         Args:
             kind: ORDINATE_X, ORDINATE_Y, DIAMETER or ANGLE.
-            words: around `<>`, which stands for what is measured.
+            words: around `<>`, which represents the measured value.
             text_at: middle of the text.
-            points: defpoint, defpoint2, defpoint3, defpoint4: what is measured, as the kind of DIMENSION has them.
+            points: defpoint, defpoint2, defpoint3, defpoint4 of the kind of DIMENSION.
         """
         if self.space is None:
             return self
@@ -144,7 +137,3 @@ class Pen:
 def width_of(words: str, height: float = TEXT_MM) -> float:
     """Return the approximate width of a text."""
     return len(words) * height * GLYPH_WIDTH
-
-
-def _polar(centre: Point, radius: float, angle: float) -> Point:
-    return centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle)

@@ -1,11 +1,8 @@
-"""Lines of a solid seen from one side, hidden ones marked: straight lines, arcs, and chains of points for the rest.
+"""Lines of a solid seen from one side, hidden ones marked: straight lines, arcs, and chains of points. Millimetres.
 
-The kernel's hidden-line removal takes seconds where edges lie exactly behind one another and hundredths where they do
-not (measured: 8.6 s and 0.1 s), so the view is turned by SKEW_RAD; lines that then coincide within TOLERANCE_MM are
-drawn once, and no hidden line is drawn under a visible one. Millimetres.
+The kernel's hidden-line removal takes 8.6 s if edges are exactly behind one another and 0.1 s if not, so the view is
+turned by SKEW_RAD. Lines within TOLERANCE_MM are drawn once, and no hidden line under a visible one.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
@@ -44,7 +41,7 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """A straight piece, by its two ends, or any other curve, by points close together."""
+    """A straight piece by its two ends, or another curve by points close together."""
 
     points: tuple[tuple[float, float], ...]
     hidden: bool
@@ -125,7 +122,7 @@ def _is_straight(points: Array) -> bool:
 
 
 def _circle(points: Array) -> tuple[Array, float, Span] | None:
-    """Return centre, radius and angles of the circle through points; None if there is none."""
+    """Return the centre, radius and angles of the circle through points; None if there is none."""
     system = np.column_stack([2 * points, np.ones(len(points))])
     middle = points.mean(axis=0)
     solved, *_ = np.linalg.lstsq(system - [*(2 * middle), 0.0], ((points - middle) ** 2).sum(axis=1), rcond=None)
@@ -167,11 +164,12 @@ def _lines(pieces: list[tuple[Array, bool]]) -> Iterator[Chain]:
 
 
 def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
-    """Join arcs of one circle in the same way."""
+    """Join arcs of one circle likewise."""
     groups: list[tuple[Array, float, tuple[list[Span], list[Span]]]] = []
     for centre, radius, (low, high), hidden in sorted(pieces, key=lambda piece: (*np.round(piece[0], 2), piece[1])):
-        alike = (i for i, (other, size, _) in enumerate(groups) if _alike(other - centre, size - radius))
-        i = next(alike, len(groups))
+        i = 0
+        while i < len(groups) and np.abs([*(groups[i][0] - centre), groups[i][1] - radius]).max() >= TOLERANCE_MM:
+            i += 1
         if i == len(groups):
             groups.append((centre, radius, ([], [])))
         turns = math.floor(low / (2 * math.pi)) * 2 * math.pi
@@ -181,10 +179,6 @@ def _arcs(pieces: list[tuple[Array, float, Span, bool]]) -> Iterator[Arc]:
             for low, high in _closed(shown):
                 if (high - low) * radius > SHORTEST_MM:
                     yield Arc(_point(centre), round(radius, 3), round(low, 5) + 0.0, round(high, 5) + 0.0, hidden)
-
-
-def _alike(shift: Array, growth: float) -> bool:
-    return abs(growth) < TOLERANCE_MM and float(np.abs(shift).max()) < TOLERANCE_MM
 
 
 def _within_turn(low: float, high: float) -> list[Span]:

@@ -1,7 +1,5 @@
 """A part cut along its axis: the half behind the cut, and the hatching of the cut faces. Millimetres."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -15,7 +13,7 @@ from scanwright.design.arrays import Array, Vector
 HATCH_MM = 2.5  # between two lines
 SLOPE_RAD = math.radians(45.0)  # ISO 128-3
 ON_CUT_MM = 1e-4  # of a face from the plane of the cut: rounding of the kernel
-COARSE_MM = 0.05  # chord and angle of what is hatched: a line ends within a hair of the outline
+COARSE_MM = 0.05  # chord and angle of hatched faces
 
 Line = tuple[tuple[float, float], tuple[float, float]]
 

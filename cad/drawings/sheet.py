@@ -1,9 +1,7 @@
 """A sheet: views in first-angle projection, notes, title block. Paper millimetres.
 
-A3 at full size or larger; else A2 at full size, else what is reduced least.
+A3 at full size or larger; else A2 at full size, else the smallest reduction.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -20,7 +18,7 @@ LEFT_MM, EDGE_MM = 20.0, 10.0  # margins of the frame (ISO 5457)
 STRIP_MM = 46.0  # height of notes and title block
 BLOCK_MM = 180.0  # width of the title block
 NARROWER = 0.83  # than Helvetica: a browser without it shows DejaVu Sans, which is that much wider
-NOTE_MM, LINE_MM = 2.2, 4.2  # height of a note, and from one to the next where there is room
+NOTE_MM, LINE_MM = 2.2, 4.2  # height of a note, and from one to the next if the space allows it
 SCALES = ((5.0, A3), (2.0, A3), (1.0, A3), (1.0, A2), (0.5, A3), (0.5, A2), (0.2, A2), (0.1, A2))
 PAD_MM = 8.0  # between views
 

@@ -1,7 +1,5 @@
 """Dimensions of a view, and the view drawn with them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -34,23 +32,14 @@ CENTRE_GAP_MM = 3.0  # between the optical centre and its name
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Sizes of a view, about its origin, model mm.
+    """Sizes of a view, about its origin, model mm."""
 
-    Attributes:
-        box: left, bottom, right and top of its lines.
-        below: horizontal positions, and the height of what lies there.
-        heights: vertical positions, and the place of what lies there across them.
-        callouts: diameters, holes and slots.
-        holes: what gets a cross: middle and half of its size.
-        circles: that holes lie on: middle and radius.
-    """
-
-    box: tuple[float, float, float, float]
-    below: dict[float, float]
-    heights: dict[float, float]
-    callouts: list[Callout]
-    holes: list[tuple[Point, float]]
-    circles: list[tuple[Point, float]]
+    box: tuple[float, float, float, float]  # left, bottom, right and top of its lines
+    below: dict[float, float]  # horizontal positions, and the height of their features
+    heights: dict[float, float]  # vertical positions, and the place of their features across them
+    callouts: list[Callout]  # diameters, holes and slots
+    holes: list[tuple[Point, float]]  # middle and half of the size of each cross
+    circles: list[tuple[Point, float]]  # middle and radius of circles through holes
 
 
 def sizes_of(view: View, part: Part) -> Sizes:
@@ -130,7 +119,7 @@ def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, flo
 
 
 def _name_centre(pen: Pen, view: View, at: Point) -> None:
-    """Write the name at the optical centre, at the first side of it where it meets no line of the part."""
+    """Write the name at the optical centre, on the first side without a line of the part."""
     words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP_MM
     below = y - 1.0 - TEXT_MM
     choices = [((x - CENTRE_GAP_MM, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP_MM, below), "right")]
@@ -141,7 +130,7 @@ def _name_centre(pen: Pen, view: View, at: Point) -> None:
 
 
 def _points(curve: Curve) -> list[Point]:
-    """Return points that a curve of a view passes."""
+    """Return points on a curve of a view."""
     if not isinstance(curve, Arc):
         return list(curve.points)
     (x, y), radius = curve.centre, curve.radius

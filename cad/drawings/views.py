@@ -1,8 +1,8 @@
-"""Which views a part needs.
+"""Views that a part needs.
 
-Three views along the rotation frame's axes and an isometric; of a part with a fit a section along its axis; a view onto
-every pattern of three holes or more that is inclined to all of them; and, where no view shows the angle of such a
-pattern to the axis in true size, one that does.
+Three views along the rotation frame's axes and an isometric; a section along the axis if a diameter has a fit; a view
+onto every inclined pattern of three holes or more; and one that shows the angle of such a pattern in true size, if no
+other does.
 """
 
 from __future__ import annotations
@@ -24,25 +24,15 @@ Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A view and what it shows.
+    """A view of a part."""
 
-    Attributes:
-        title: above the view.
-        right: unit vector to the right, in the rotation frame.
-        up: unit vector upwards.
-        origin: point whose projection is 0 of the ordinates.
-        curves: lines of the part, model mm.
-        kind: front and top carry ordinates of planes too, angle, section and iso none.
-        hatching: lines over what is cut.
-    """
-
-    title: str
-    right: Array
-    up: Array
-    origin: Array
-    curves: list[Curve]
-    kind: str
-    hatching: tuple[Line, ...] = ()
+    title: str  # above the view
+    right: Array  # unit vector to the right, in the rotation frame
+    up: Array  # unit vector upwards
+    origin: Array  # point whose projection is 0 of the ordinates
+    curves: list[Curve]  # lines of the part, model mm
+    kind: str  # front and top have ordinates of planes too, angle, section and iso none
+    hatching: tuple[Line, ...] = ()  # lines over cut faces
 
     @property
     def towards(self) -> Array:

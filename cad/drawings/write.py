@@ -1,10 +1,8 @@
-"""A sheet as DXF, SVG and PDF: the same bytes for the same sheet, and nothing of this machine's fonts in them.
+"""A sheet as DXF, SVG and PDF: the same bytes for the same sheet, independent of the fonts of the machine.
 
-SVG and PDF are of the DXF's own entities. ezdxf's drawing add-on is not their writer: it makes outlines of texts, so
-no reader can search them, and SVGs 2.5 to 5 times as large, in 0.2 to 0.9 s a sheet more.
+SVG and PDF are written from the DXF's entities. ezdxf's drawing add-on draws texts as outlines, which no reader can
+search, in SVGs 2.5 to 5 times as large and 0.2 to 0.9 s a sheet more.
 """
-
-from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
@@ -95,13 +93,9 @@ def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
 
 
 def pdf_bytes(pages: Sequence[tuple[Sheet, Drawn]]) -> bytes:
-    """Return a file of the same pages in Helvetica, one of the fonts that every reader has.
-
-    Args:
-        pages: one or more sheets, each with what is `drawn_on` it; the file has the name of the first.
-    """
+    """Return a file of sheets, each with what is `drawn_on` it, in Helvetica; its title is the name of the first."""
     file = io.BytesIO()
-    # not compressed: what a compressor makes of it depends on its version
+    # not compressed: the output of a compressor depends on its version
     canvas = Canvas(file, invariant=1, pageCompression=0)
     canvas.setTitle(pages[0][0].name)
     canvas.setCreator("scanwright")
@@ -148,7 +142,7 @@ def dxf_bytes(sheet: Sheet) -> bytes:
 
 @contextmanager
 def _fixed_dates() -> Iterator[None]:
-    """The library's own switch, else dates and GUIDs differ from run to run; it is global, so put back."""
+    """Yield with fixed dates and GUIDs in DXF files: a global switch of the library, restored at the end."""
     before = ezdxf.options.write_fixed_meta_data_for_testing  # type: ignore[attr-defined]
     ezdxf.options.write_fixed_meta_data_for_testing = True  # type: ignore[attr-defined]
     try:

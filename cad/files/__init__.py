@@ -1,1 +1,1 @@
-"""What a build writes of its parts: STEP, STL, 3MF, GLB, URDF, parts list, steps."""
+"""Files of a build: STEP, STL, 3MF, GLB, URDF, parts list, steps."""

@@ -1,10 +1,8 @@
 """`bom.csv`: everything to print, turn and buy for one scanner, with quantities and prices.
 
-Prices are those of the catalogue, each with its source and year. If it has none, a range of `prices.py` stands in
-separate columns, stated as an estimate; the last row adds up both and names the rows that have neither.
+Prices are those of the catalogue, each with its source and year, or a range of `prices.py` in separate columns. The
+last row adds up both and names the rows that have neither.
 """
-
-from __future__ import annotations
 
 import csv
 import io
@@ -39,43 +37,24 @@ WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports an
 
 @dataclass(frozen=True, slots=True)
 class BomItem:
-    """One row; the fields but `estimate` are the columns. Empty texts and None are unknown.
+    """One row; all fields except `estimate` are columns. Empty texts and None are unknown."""
 
-    Attributes:
-        kind: printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total.
-        part: what it is.
-        number: drawing number of a made part, designation of a standard part.
-        quantity: pieces.
-        supplier: maker.
-        supplier_number: what to order there.
-        unit_usd: price of one.
-        total_usd: price of all.
-        low_usd: least that all of them may cost: from the price, or an estimate.
-        high_usd: most.
-        priced: year of the price.
-        mass_g: of one.
-        source: where the price, or the row, comes from.
-        verified: whether that value is verified; empty if there is none.
-        note: for the person who buys.
-        estimate: name in `prices.EACH_USD`; empty if there is none.
-    """
-
-    kind: str
-    part: str
-    number: str = ""
-    quantity: int | None = 1
-    supplier: str = ""
-    supplier_number: str = ""
-    unit_usd: float | None = None
-    total_usd: float | None = None
-    low_usd: float | None = None
-    high_usd: float | None = None
-    priced: str = ""
-    mass_g: float | None = None
-    source: str = ""
-    verified: str = ""
-    note: str = ""
-    estimate: str = ""
+    kind: str  # printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total
+    part: str  # name, or type of product
+    number: str = ""  # drawing number of a made part, designation of a standard part
+    quantity: int | None = 1  # pieces
+    supplier: str = ""  # maker
+    supplier_number: str = ""  # order number
+    unit_usd: float | None = None  # price of one
+    total_usd: float | None = None  # price of all
+    low_usd: float | None = None  # least price of all: from the price, or an estimate
+    high_usd: float | None = None  # largest price of all
+    priced: str = ""  # year of the price
+    mass_g: float | None = None  # of one
+    source: str = ""  # of the price, or of the row
+    verified: str = ""  # whether the price is verified; empty if there is none
+    note: str = ""  # for the buyer
+    estimate: str = ""  # name in `prices.EACH_USD`; empty if there is none
 
 
 COLUMNS = [field.name for field in fields(BomItem)][:-1]
@@ -89,16 +68,7 @@ def items_of(
     config_hash: str,
     plates: Sequence[Sequence[str]] = (),
 ) -> list[BomItem]:
-    """Return all rows; the total last.
-
-    Args:
-        scanner: angles and products.
-        assembly: the solids.
-        joints: of the layout.
-        masses_g: of the made parts.
-        config_hash: of what shapes the parts.
-        plates: parts that are printed together.
-    """
+    """Return all rows, the total last; `masses_g` are of the made parts, `plates` the parts printed together."""
     items = []
     for name in assembly.made:
         part, number = assembly.parts[name], drawing_number(config_hash, name, assembly)
@@ -131,26 +101,24 @@ def bom_text(items: list[BomItem]) -> str:
 
 def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
     for product in products_of(scanner, drive):
-        if isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
-            orders = (station.order for station in drive.stations if station.product == product and station.order)
-            yield _bought(product, max(1, drive.products.count(product)), next(orders, product.name))
-
-
-def _bought(product: Lidar | Servo | SlipRing | Bearing | Belt, quantity: int, number: str) -> BomItem:
-    origin, price = product.provenance().get("price_usd"), product.price_usd
-    return BomItem(
-        kind="bought",
-        part=product.kind.replace("_", " "),
-        number=number,
-        quantity=quantity,
-        supplier=product.maker,
-        supplier_number=number,
-        unit_usd=price,
-        total_usd=None if price is None else quantity * price,
-        mass_g=product.mass_g,
-        source=origin.source if origin is not None else "",
-        verified="" if origin is None else "yes" if origin.verified else "no",
-    )
+        if not isinstance(product, Lidar | Servo | SlipRing | Bearing | Belt):
+            continue
+        orders = (station.order for station in drive.stations if station.product == product and station.order)
+        number, quantity = next(orders, product.name), max(1, drive.products.count(product))
+        origin, price = product.provenance().get("price_usd"), product.price_usd
+        yield BomItem(
+            kind="bought",
+            part=product.kind.replace("_", " "),
+            number=number,
+            quantity=quantity,
+            supplier=product.maker,
+            supplier_number=number,
+            unit_usd=price,
+            total_usd=None if price is None else quantity * price,
+            mass_g=product.mass_g,
+            source=origin.source if origin is not None else "",
+            verified="" if origin is None else "yes" if origin.verified else "no",
+        )
 
 
 def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
@@ -218,7 +186,7 @@ def _ties(assembly: Assembly) -> Iterator[BomItem]:
 
 
 def _servo_wiring(servo: Servo) -> Iterator[BomItem]:
-    """Yield the adapter and the cable of a servo, as the catalogue has them."""
+    """Yield the adapter and the cable of a servo from the catalogue."""
     if servo.adapter is None:
         yield _unknown_wiring(servo)
     for field, price, estimate in (("adapter", servo.adapter_usd, "adapter"), ("cable", None, "servo cable")):
@@ -256,7 +224,7 @@ def _filament(scanner: Scanner, items: list[BomItem], plates: Sequence[Sequence[
 
 
 def _electrics(scanner: Scanner) -> Iterator[BomItem]:
-    """Yield what the wiring needs besides the devices."""
+    """Yield the parts of the wiring other than devices."""
     network = network_of(scanner)
     fuses = Counter(branch.fuse_a for branch in network.branches)
     main = next(box for box in network.boxes if box.name == "switch").lines[0]
@@ -287,9 +255,10 @@ def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomIt
     yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
     sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
     yield BomItem("tool", "hexagon keys", source=JOINTS, note=f"for {sizes}", estimate="hexagon keys")
-    yield BomItem(
-        "tool", f"torque screwdriver{_torques(assembly, joints)}", source=STEPS, estimate="torque screwdriver"
-    )
+    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
+    torques_nm = [hold.torque_nm for hold in holds if hold is not None]
+    torques = f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
+    yield BomItem("tool", f"torque screwdriver{torques}", source=STEPS, estimate="torque screwdriver")
     yield BomItem("tool", "caliper", source=STEPS, note="for the values to measure", estimate="caliper")
     yield BomItem("tool", "multimeter", source=WIRING_TEXT, estimate="multimeter")
     yield from (need for need in needs if need.kind == "tool")
@@ -297,15 +266,8 @@ def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomIt
         yield BomItem("tool", "soldering iron", source=STEPS, note="for the inserts", estimate="soldering iron")
 
 
-def _torques(assembly: Assembly, joints: Sequence[Joint]) -> str:
-    """Return the range of the torques of some joints, as the end of the name of a tool."""
-    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
-    torques_nm = [hold.torque_nm for hold in holds if hold is not None]
-    return f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
-
-
 def _ranged(item: BomItem) -> BomItem:
-    """Return the row with its range: of its price, wider if that is unsure, or of an estimate."""
+    """Return the row with its price range: of its price, wider if that is unverified or old, or of an estimate."""
     if item.low_usd is not None:
         return item
     if item.total_usd is not None:
@@ -329,7 +291,7 @@ def _total(items: list[BomItem]) -> BomItem:
     note = (
         f"sum of {len(known)} known prices, {doubtful} of them not verified; {unknown} rows without a price: the range "
         f"counts them by estimates, tools up to {tools:.0f}; "
-        f"{'not in the range: ' + ', '.join(open_) if open_ else 'nothing is without an estimate'}; no tax, no carriage"
+        f"{'not in the range: ' + ', '.join(open_) if open_ else 'every row has an estimate'}; no tax, no shipping"
     )
     low, high = (
         round(sum(usd for item in items if (usd := getattr(item, end)) is not None)) for end in ("low_usd", "high_usd")

@@ -1,10 +1,7 @@
 """Binary glTF 2.0 from canonical meshes: metres, a tree of named nodes, the same bytes for the same scene.
 
-glTF is y-up and the project z-up: the tree hangs under one node that turns z to y, so every pose below it is the
-project's own. Normals are those of the surface: round where it is round, sharp at its edges.
+glTF is y-up and the project z-up: one root node turns z to y. Normals are smooth on round surfaces and sharp at edges.
 """
-
-from __future__ import annotations
 
 import json
 import struct
@@ -31,23 +28,14 @@ Surface = tuple[Array, Array, NDArray[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One frame or body of the scene.
+    """One frame or body of the scene."""
 
-    Attributes:
-        name: unique.
-        parent: name of the node that it hangs under; empty for the root.
-        T_parent_node: its pose [m], shape (4, 4).
-        mesh: in the frame of the node [mm]; None for a bare frame.
-        colour: sRGB, 0 to 1.
-        metal: whether the surface is bare metal.
-    """
-
-    name: str
-    parent: str
-    T_parent_node: Array
-    mesh: TriMesh | None = None
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    metal: bool = False
+    name: str  # unique
+    parent: str  # name of its parent node; empty for the root
+    T_parent_node: Array  # its pose [m], shape (4, 4)
+    mesh: TriMesh | None = None  # in the frame of the node [mm]; None for a bare frame
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)  # sRGB, 0 to 1
+    metal: bool = False  # whether the surface is bare metal
 
 
 def glb_bytes(
@@ -58,8 +46,8 @@ def glb_bytes(
     Args:
         nodes: parents before children; the first one is the root.
         surfaces: of the nodes with a mesh by name, of `shaded`.
-        extras: values for programs, in `asset.extras`.
-        spin: name of a node that turns about its z, counter-clockwise, and the seconds of one turn.
+        extras: values in `asset.extras`.
+        spin: name of a node that turns counter-clockwise about its z, and the seconds of one turn.
     """
     index = {node.name: i + 1 for i, node in enumerate(nodes)}
     children: dict[str, list[int]] = {}
@@ -141,8 +129,8 @@ def _primitive(buffer: _Buffer, surface: Surface, material: int) -> dict[str, An
 def shaded(mesh: TriMesh) -> Surface:
     """Return vertices (n, 3) [mm], their unit normals (n, 3) and three of them for each face (3 m,).
 
-    A vertex is there once for every normal that it has. The normal at the corner of a face is the mean of those of
-    the faces about it that have no edge towards this one, each as wide as its corner.
+    A vertex is repeated for each of its normals. The normal at a corner is the mean of those of the faces around it
+    without an edge towards this one, weighted by their angles.
     """
     corners = mesh.vertices[mesh.faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

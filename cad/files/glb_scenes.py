@@ -1,12 +1,10 @@
-"""The scanner in 3D: `assembly.glb` in the tree of its frames, and `exploded.glb` pulled apart in build order.
+"""The scanner in 3D: `assembly.glb` in the tree of its frames, and `exploded.glb` in build order.
 
-    y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body hangs under the frame it moves with.
+    y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body is in the frame that it moves with.
 
-Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate leave
-the linkage along the lidar's z, as they are put in, a counterweight along its radius.
+Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate move
+along the lidar's z, a counterweight along its radius.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import replace
@@ -24,20 +22,8 @@ from scanwright.design.scanner import Scanner
 GAP_MM = 15.0  # between the products of the exploded view
 
 
-def product_of(body: str, assembly: Assembly) -> str:
-    """Return the made part, or the bought product that several bodies show."""
-    return body if body in assembly.made else assembly.bodies[body].product
-
-
 def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh], config_hash: str) -> dict[str, bytes]:
-    """Return both files.
-
-    Args:
-        scanner: angles and products.
-        assembly: the solids.
-        meshes: of the made parts, rotation frame; the bought ones are meshed here.
-        config_hash: of what shapes the parts.
-    """
+    """Return both files; `meshes` are of the made parts, rotation frame."""
     T = scanner.angles.T_rot_laser()
     nodes = [
         Node("world", "", np.eye(4)),
@@ -69,7 +55,7 @@ def _exploded(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> list
     for node in nodes:
         if node.mesh is not None:
             shifted = np.eye(4)
-            shifted[:3, 3] = np.round(to_rot[node.parent].T @ lifts[product_of(node.name, assembly)] / 1000, 9) + 0.0
+            shifted[:3, 3] = np.round(to_rot[node.parent].T @ lifts[assembly.thing(node.name)] / 1000, 9) + 0.0
             node = replace(node, T_parent_node=shifted)
         moved.append(node)
     return moved
@@ -83,7 +69,7 @@ def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[st
             cloud = node.mesh.vertices
             if node.parent == "laser":
                 cloud = cloud @ T_rot_laser[:3, :3].T + T_rot_laser[:3, 3] * 1000
-            clouds.setdefault(product_of(node.name, assembly), []).append(cloud)
+            clouds.setdefault(assembly.thing(node.name), []).append(cloud)
     points = {product: np.concatenate(parts) for product, parts in clouds.items()}
     axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
     lifts: dict[str, Array] = {}

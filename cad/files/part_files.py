@@ -1,16 +1,15 @@
-"""Make all parts of one scanner and write them: `parts/*.step`, `parts/*.stl`, `assembly.step`, `scanner.urdf`.
+"""Write all parts of one scanner: `parts/*.step`, `parts/*.stl`, `assembly.step`, `scanner.urdf`.
 
-Importing this module is cheap; the kernel is imported when something is built.
+Importing this module does not load the CAD kernel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scanwright.cad.kernel import require_kernel
+from scanwright.cad.layout.joints import triple
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartReport:
-    """One made part: volume and mass of the solid material, box in the rotation frame."""
+    """One made part: volume and mass, box in the rotation frame."""
 
     name: str
     volume_mm3: float
@@ -36,63 +35,48 @@ class PartReport:
 
 @dataclass(frozen=True, slots=True)
 class PartsResult:
-    """What `build_parts` made.
+    """Results of `build_parts`."""
 
-    Attributes:
-        assembly: the solids.
-        meshes: canonical mesh of each made part, with its label.
-        t_world_rot_mm: optical centre in the world.
-        parts: properties of each made part.
-        findings: remarks for a person.
-        left_out: what this scanner does not need.
-        files: relative to the build folder.
-    """
-
-    assembly: Assembly
-    meshes: dict[str, TriMesh]
-    t_world_rot_mm: tuple[float, float, float]
-    parts: tuple[PartReport, ...]
-    findings: tuple[Finding, ...]
-    left_out: tuple[LeftOut, ...]
-    files: tuple[str, ...]
+    assembly: Assembly  # the solids
+    meshes: dict[str, TriMesh]  # canonical mesh of each made part, with its label
+    parts: tuple[PartReport, ...]  # properties of each made part
+    findings: tuple[Finding, ...]  # remarks for a person
+    left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    files: tuple[str, ...]  # relative to the build folder
 
     def masses_g(self) -> dict[str, float]:
         """Return the masses of the made parts by name."""
         return {report.name: report.mass_g for report in self.parts}
 
 
-def build_parts(
-    scanner: Scanner, folder: Path, progress: Progress, make: Callable[[Scanner], Assembly] | None = None
-) -> PartsResult:
-    """Make every part and write it into a build folder.
+def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Progress) -> PartsResult:
+    """Label every part and write it into a build folder.
 
     Args:
         scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.
+        assembly: its parts.
         folder: the build folder; `parts/` is made in it.
         progress: callback for progress.
-        make: makes the parts, if not `make.make_parts`.
 
     Raises:
-        InstallError: the CAD kernel is not installed.
-        BuildError: a part cannot be made, or the angle set states another place of the optical centre.
+        BuildError: a part has no closed mesh, or the angle set states another place of the optical centre.
     """
     progress("loading the CAD kernel")
-    require_kernel("the making of parts")
     from scanwright.cad.assembly.assembly import alone, as_tree
-    from scanwright.cad.assembly.make import made_from
     from scanwright.cad.assembly.masses import link_bodies
     from scanwright.cad.checks.remarks import remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
     from scanwright.cad.geometry.mesh import checked, stl_bytes
     from scanwright.cad.labels.label import labelled_parts
-    from scanwright.cad.parts.all_parts import laid_out
 
-    progress("making the parts")
-    ready = None if make is None else make(scanner)
-    layout = laid_out(scanner) if ready is None else ready.layout
-    _check_offset(scanner, layout.deck.t_world_rot)  # before seconds go into the solids
-    assembly, digest = ready or made_from(layout), layout.digest
+    layout, digest = assembly.layout, assembly.layout.digest
+    stated, offset = scanner.angles.t_world_rot_mm, layout.deck.t_world_rot
+    if any(stated) and max(abs(a - b) for a, b in zip(stated, offset, strict=True)) > 1e-3:
+        raise BuildError(
+            f"{BASE_MOUNT}: t_world_rot_mm = {list(stated)}: the mount of these angles puts the optical centre at "
+            f"{list(offset)}; build the angle set again, or set it to 0"
+        )
     files: dict[str, bytes] = {}
     reports = []
     meshes_of_parts: dict[str, TriMesh] = {}
@@ -107,7 +91,9 @@ def build_parts(
         text = step_text(alone(name, solid, part.colour), f"{name} config={digest}")
         files[f"parts/{name}.step"] = text.encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
-        reports.append(_report(name, solid.Volume(), part.density_g_cm3(scanner.printer), mesh))
+        volume, mass_g = solid.Volume(), solid.Volume() * part.density_g_cm3(scanner.printer) / 1000
+        box = triple(mesh.vertices.min(axis=0)), triple(mesh.vertices.max(axis=0))
+        reports.append(PartReport(name, round(volume, 3), round(mass_g, 3), box, len(mesh.faces)))
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
     bodies = link_bodies(scanner, assembly)
@@ -117,7 +103,6 @@ def build_parts(
     return PartsResult(
         assembly=assembly,
         meshes=meshes_of_parts,
-        t_world_rot_mm=layout.deck.t_world_rot,
         parts=tuple(reports),
         findings=tuple(remarks_of(scanner, assembly)),
         left_out=(*layout.left_out, *labels.left_out),
@@ -131,18 +116,3 @@ def write_files(folder: Path, files: dict[str, bytes]) -> None:
         path = folder / file
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
-
-
-def _report(name: str, volume: float, density: float, mesh: TriMesh) -> PartReport:
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    box = ((float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])))
-    return PartReport(name, round(volume, 3), round(volume * density / 1000, 3), box, len(mesh.faces))
-
-
-def _check_offset(scanner: Scanner, offset: tuple[float, float, float]) -> None:
-    stated = scanner.angles.t_world_rot_mm
-    if any(stated) and max(abs(a - b) for a, b in zip(stated, offset, strict=True)) > 1e-3:
-        raise BuildError(
-            f"{BASE_MOUNT}: t_world_rot_mm = {list(stated)}: the mount of these angles puts the optical centre at "
-            f"{list(offset)}; build the angle set again, or set it to 0"
-        )

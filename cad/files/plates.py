@@ -3,8 +3,6 @@
 Rows of boxes, the deepest at the back: each part lies in its own pose, moved along the bed only.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
@@ -19,7 +17,7 @@ from scanwright.design.scene.ray_caster import build_scene
 
 Plate = dict[str, TriMesh]
 
-GAP_MM = 8.0  # between two parts: room for a brim on both
+GAP_MM = 8.0  # between two parts, for a brim on both
 EDGE_MM = 5.0  # of the bed, for clips and skirts
 SIZE_PX = 640, 480  # pixels, wide and high
 YAW_RAD, PITCH_RAD = math.radians(-75.0), math.radians(60.0)
@@ -30,12 +28,7 @@ INK, LIGHT, TEXT_PX = (20, 20, 20), (255, 255, 255), 15
 
 
 def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]) -> list[Plate]:
-    """Distribute parts over as few beds as rows of boxes need; a part larger than a bed gets a separate one.
-
-    Args:
-        printed: parts in their print pose.
-        bed_mm: width, depth and height.
-    """
+    """Distribute parts in their print pose over few beds, in rows; a part larger than a bed gets a separate one."""
     sizes = {name: np.ptp(mesh.vertices, axis=0) for name, mesh in printed.items()}
     order = sorted(printed, key=lambda name: (-round(float(sizes[name][1]), 3), -round(float(sizes[name][0]), 3), name))
     rows: list[tuple[float, list[str]]] = []  # width left, and its parts
@@ -60,7 +53,7 @@ def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]
 def plate_files(
     plates: Sequence[Plate], bed_mm: tuple[float, float, float], about: str, settings: Mapping[str, str]
 ) -> dict[str, bytes]:
-    """Return print file and picture of each plate; `about` describes the parts, `settings` are a slicer's."""
+    """Return the print file and picture of each plate; `about` describes the parts, `settings` are a slicer's."""
     files = {}
     for number, plate in enumerate(plates, start=1):
         name = f"plate_{number}"
@@ -93,9 +86,9 @@ def _laid(
 def _picture(plate: Plate, bed_mm: tuple[float, float, float]) -> bytes:
     """Return the PNG of a plate from the front and above, with the names of its parts."""
     scenes = [build_scene(mesh.vertices[mesh.faces] / 1000, name) for name, mesh in plate.items()]
-    bed = build_scene(_slab(bed_mm[0], bed_mm[1]) / 1000)
-    nowhere = np.zeros(3)
-    pieces = [Piece(bed, nowhere, BED), *(Piece(scene, nowhere, PART) for scene in scenes)]
+    corners = np.array([[x, y, -SLAB_MM] for x, y in ((0, 0), (bed_mm[0], 0), bed_mm[:2], (0, bed_mm[1]))])
+    bed, unmoved = build_scene(corners[[[0, 1, 2], [0, 2, 3]]] / 1000), np.zeros(3)
+    pieces = [Piece(bed, unmoved, BED), *(Piece(scene, unmoved, PART) for scene in scenes)]
     corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) for piece in pieces])
     view = view_of(corners, SIZE_PX, YAW_RAD, PITCH_RAD, MARGIN)
     image = painted(view, pieces)
@@ -105,10 +98,3 @@ def _picture(plate: Plate, bed_mm: tuple[float, float, float]) -> bytes:
         at = ((seen[:, 0].min() + seen[:, 0].max()) / 2, seen[:, 1].max() + TEXT_PX)
         pen.text(at, name, fill=INK, font=font, anchor="mm", stroke_width=3, stroke_fill=LIGHT)
     return png_bytes(image)
-
-
-def _slab(wide: float, deep: float) -> np.ndarray:
-    """Return the bed: two triangles, shape (2, 3, 3)."""
-    corners = np.array([[0.0, 0, 0], [wide, 0, 0], [wide, deep, 0], [0, deep, 0]])
-    corners[:, 2] = -SLAB_MM
-    return corners[[[0, 1, 2], [0, 2, 3]]]

@@ -1,16 +1,14 @@
-"""Estimated prices of rows of the parts list for which the catalogue has none.
+"""Estimated prices for rows of the parts list without a price in the catalogue.
 
-The ranges are usual prices in small numbers, without tax and carriage; no shop was asked. A price of the catalogue that
-is unverified or older than RECENT is multiplied by UNSURE.
+The ranges are usual prices in small numbers without tax and shipping, not quotes. A price of the catalogue that is
+unverified or older than RECENT is multiplied by UNSURE.
 """
-
-from __future__ import annotations
 
 import re
 
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
 
-ESTIMATED = "estimate of 2026 of what shops usually ask, none was asked"
+ESTIMATED = "estimate of usual prices in 2026, not a quote"
 FILAMENT_USD_PER_KG = (15.0, 35.0)
 UNSURE = (0.7, 1.5)  # least and most over an unverified or old price: assumed
 RECENT = "2024"  # first year whose prices count as they are

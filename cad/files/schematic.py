@@ -1,12 +1,9 @@
-"""`wiring.svg`: the wiring of a scanner, drawn: boxes in columns from the supply to the lidar, wires between pins.
+"""`wiring.svg`: boxes in columns from the supply to the lidar, and wires between their pins. Lengths in pixels.
 
-A wire leaves a box to the right and enters another from the left: between two columns are first the lanes in which
-wires change their height, one for each, then space for the text on each wire before its end. A wire that passes columns
-does so below all boxes, so no texts overlap, whatever the scanner. A wire between two pins of one box is a bridge on
-its right. Cautions are above all boxes. Lengths in pixels.
+A wire leaves a box at its right and enters another at its left. Each wire between two columns has its own lane to
+change height, then space for its text. Wires that pass a column run below all boxes, so no texts overlap; a wire
+between two pins of a box is at its right.
 """
-
-from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
@@ -18,8 +15,8 @@ from scanwright.design.findings import sentence
 
 ROW_PX = 22.0  # from pin to pin
 LINE_PX = 15.0  # from line to line of text in a box
-CHAR_PX = 6.0  # of a letter of the text, with room for the widest
-PAGE_PX = 1100.0  # cautions are no wider: read without scrolling
+CHAR_PX = 6.0  # of a letter of the text, the widest included
+PAGE_PX = 1100.0  # largest width of cautions: read without scrolling
 BOLD_CHAR_PX = 7.0  # likewise, bold
 LANE_PX = 9.0
 APART_PX = 34.0  # boxes of a column
@@ -72,8 +69,8 @@ class _Placed:
 def schematic_svg(network: Network, title: str) -> str:
     """Return the picture; equal networks give equal text."""
     columns = sorted({box.column for box in network.boxes})
-    place = {column: i for i, column in enumerate(columns)}
-    spans = [_span(network, place, wire) for wire in network.wires]
+    place = {box.name: columns.index(box.column) for box in network.boxes}
+    spans = [(place[wire.start[0]], place[wire.end[0]]) for wire in network.wires]
     width = _right_edge(network, _placed(network, columns, spans, HEAD_PX))
     warnings = _warnings(network, width)
     boxes = _placed(network, columns, spans, HEAD_PX + LINE_PX * len(warnings))
@@ -93,7 +90,8 @@ def schematic_svg(network: Network, title: str) -> str:
             points += [(points[-1][0], low), *entry, (entry[0][0], end[1])]
         else:
             points.append((points[-1][0], end[1]))
-        drawn.append(_wire(wire, [*points, end]))
+        drawn.append(_line(wire, [*points, end]))
+        drawn.append(_text(end[0] - 8.0, end[1] - 4.0, wire.words, ink=_ink(wire), anchor="end"))
     height = floor + 14.0 * far + 34.0
     note = "Wires cross without a joint. A wire without a colour may have any: only its pins count."
     return "\n".join(
@@ -112,13 +110,8 @@ def schematic_svg(network: Network, title: str) -> str:
     )
 
 
-def _span(network: Network, place: dict[int, int], wire: Wire) -> tuple[int, int]:
-    column = {box.name: place[box.column] for box in network.boxes}
-    return column[wire.start[0]], column[wire.end[0]]
-
-
 def _warnings(network: Network, width: float) -> list[str]:
-    """Return the lines of broken rules, as wide as the sheet, and where the cautions are: once in a folder."""
+    """Return the lines of broken rules, as wide as the sheet, and a reference to the cautions."""
     broken = [f"DO NOT BUILD THIS: {sentence(fault)}." for fault in check_network(network)]
     cautions = [f"CAUTION: read the {len(network.cautions)} cautions of wiring.md before you join a wire."]
     return [
@@ -165,11 +158,6 @@ def _turn(boxes: dict[str, _Placed], column: int, lanes: list[int], gap: int, y:
     edge = next(placed.x + placed.width for placed in boxes.values() if placed.box.column == column)
     lanes[gap] += 1
     return [(edge + LANE_PX * (lanes[gap] + 0.5), y)]
-
-
-def _wire(wire: Wire, points: list[tuple[float, float]]) -> str:
-    x, y = points[-1]
-    return _line(wire, points) + "\n" + _text(x - 8.0, y - 4.0, wire.words, ink=_ink(wire), anchor="end")
 
 
 def _bridge(wire: Wire, placed: _Placed) -> str:

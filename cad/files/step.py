@@ -1,11 +1,9 @@
-"""Canonical STEP: the same scanner gives the same bytes, in every process and under every hash seed.
+"""Canonical STEP: the same scanner gives the same bytes in every process.
 
-The kernel's writer stamps the time, counts products per process, and orders colours by memory address. After
-writing, every entity gets the hash of its own text with its references replaced by their hashes (a Merkle
-tree); roots are sorted by hash and everything is renumbered depth first.
+The kernel's writer adds the time, counts products per process, and orders colours by memory address. Every entity gets
+the hash of its own text with its references replaced by their hashes (a Merkle tree); roots are sorted by hash and
+everything is renumbered depth first.
 """
-
-from __future__ import annotations
 
 import hashlib
 import re
@@ -85,7 +83,7 @@ def _entity(body: str) -> Entity:
 
 
 def _filled(entity: Entity, words: dict[int, str]) -> str:
-    """Return the text of an entity with a word for each reference."""
+    """Return the text of an entity with each reference replaced by its word."""
     text, targets = entity
     return text % tuple(map(words.__getitem__, targets))
 

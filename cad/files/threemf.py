@@ -4,8 +4,6 @@ The file also contains the settings of PrusaSlicer (Metadata/Slic3r_PE_model.con
 entries are stored, not deflated, with the zip format's first date: the output of a compressor depends on its version.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -30,14 +28,7 @@ RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str, settings: Mapping[str, str]) -> bytes:
-    """Return the file of parts that are printed together.
-
-    Args:
-        meshes: by name, in the frame of the bed.
-        title: of the file.
-        description: what it was made from.
-        settings: of PrusaSlicer, for each part.
-    """
+    """Return the file of parts in the frame of the bed; `settings` are PrusaSlicer's, for each part."""
     model = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">',

@@ -2,11 +2,9 @@
 
     world --fixed--> servo --spin_joint, about z--> rot --fixed--> laser
 
-The origins of `servo` and `rot` are the optical centre and they coincide at joint position 0, so every mesh, made in
-the rotation frame, has the identity for its pose. Transforms are the angle set's own. SI units.
+The origins of `servo` and `rot` are the optical centre, so every mesh, made in the rotation frame, has the identity as
+its pose. Transforms are those of the angle set. SI units.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -25,11 +23,8 @@ from scanwright.design.scanner import Scanner
 def urdf_text(scanner: Scanner, drive: DriveLayout, bodies: dict[str, Inertial], meshes: dict[str, list[str]]) -> str:
     """Return the text of `scanner.urdf`.
 
-    Args:
-        scanner: angles and products.
-        drive: the layout that the parts were made with.
-        bodies: mass properties of the links servo, rot (rotation frame) and laser (laser frame).
-        meshes: names of the parts whose STL files belong to the links servo and rot.
+    `bodies` are the links servo, rot (rotation frame) and laser (laser frame), `meshes` the parts of the links servo
+    and rot.
     """
     angles = scanner.angles
     shapes = [_fixed_shape(station.shape) for station in drive.stations if station.shape is not None]

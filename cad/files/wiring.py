@@ -1,7 +1,5 @@
 """`wiring.svg` and `wiring.md`: the wiring of a scanner as a drawing and as text, with the load of each wire."""
 
-from __future__ import annotations
-
 from scanwright.cad.files.schematic import schematic_svg
 from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
 from scanwright.design.electrics.network import Network
@@ -24,12 +22,7 @@ Section = tuple[list[str], list[str]]  # items of a list, then paragraphs
 
 
 def wiring_files(scanner: Scanner, digest: str) -> dict[str, bytes]:
-    """Return both files by name.
-
-    Args:
-        scanner: angles and products.
-        digest: of what shapes the parts.
-    """
+    """Return both files by name; `digest` identifies the configuration."""
     network = network_of(scanner)
     title = f"{scanner.angles.task}: wiring ({digest})"
     return {
@@ -47,7 +40,7 @@ def wiring_text(network: Network, title: str) -> str:
         "Slip ring": _ring(network),
         "Wires": _wires(network),
         "Data through the ring": ([], [*network.risks]),
-        "Not known": ([sentence(unknown) for unknown in network.unknown], []),
+        "Unknown": ([sentence(unknown) for unknown in network.unknown], []),
     }
     blocks = [f"# {title}"]
     for heading, (items, paragraphs) in sections.items():
@@ -92,9 +85,9 @@ def _ring(network: Network) -> Section:
             use = f"{circuit.net}, {load if circuit.amps else 'signal'}"
         items.append(f"{circuit.number}: {use}")
     numbers = (
-        "The numbers are ours: the makers of these rings number no circuit. If the leads differ in thickness, the "
-        "thick ones are the circuits with the higher current. Set a multimeter to continuity, find the two ends of "
-        "each circuit, stator and rotor, and write its number on both."
+        "The numbers are assigned here: the makers of these rings number no circuits. If the leads differ in "
+        "thickness, the thick ones are the circuits with the higher current. Set a multimeter to continuity, find the "
+        "two ends of each circuit, stator and rotor, and write its number on both."
     )
     return items, [numbers] if items else []
 

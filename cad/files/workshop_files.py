@@ -1,7 +1,5 @@
 """Files for the workshop besides STEP, STL and drawings: print files, scenes, parts list, wiring, assembly steps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,27 +27,15 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True)
 class Exports:
-    """Written files, relative to the build folder, files not included, and remarks for a person."""
+    """Written files, relative to the build folder, files that are not included, and remarks for a person."""
 
     files: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     findings: tuple[Finding, ...]
 
 
-def export_scanner(
-    scanner: Scanner,
-    made: PartsResult,
-    folder: Path,
-    progress: Progress,
-) -> Exports:
-    """Write all of them into a build folder.
-
-    Args:
-        scanner: angles and products.
-        made: its parts, of `part_files.build_parts`.
-        folder: the build folder.
-        progress: callback for progress.
-    """
+def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: Progress) -> Exports:
+    """Write all of them into a build folder; `made` is the result of `part_files.build_parts`."""
     assembly, masses = made.assembly, made.masses_g()
     digest, joints = assembly.layout.digest, assembly.layout.joints
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"

@@ -1,1 +1,1 @@
-"""Solids measured: meshes, holes, inertia, how a part lies on the bed."""
+"""Measured properties of solids: meshes, holes, inertia, pose on the bed."""

@@ -1,6 +1,4 @@
-"""Round features of a solid, read from its faces: what drawings dimension and screws go through. Millimetres."""
-
-from __future__ import annotations
+"""Cylindrical features of a solid, read from its faces: holes and bosses. Millimetres."""
 
 import math
 from dataclasses import dataclass
@@ -14,29 +12,20 @@ from OCP.TopAbs import TopAbs_REVERSED
 
 from scanwright.design.arrays import Array
 
-LEAST_TURN = math.pi * 1.02  # an arc of less than about half a turn holds no screw and has no diameter to measure
+LEAST_TURN = math.pi * 1.02  # a shorter arc holds no screw and has no measurable diameter
 SAME = 1e-3  # mm, and for directions
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """A hole, or a boss, of one diameter.
+    """A hole, or a boss, of one diameter."""
 
-    Attributes:
-        diameter: of the cylinder.
-        direction: unit vector along the axis; its largest component is positive.
-        low: end of the axis where `direction` starts.
-        high: the other end.
-        hole: whether the material is outside.
-        through: whether both ends of a hole are open.
-    """
-
-    diameter: float
-    direction: tuple[float, float, float]
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
-    hole: bool
-    through: bool
+    diameter: float  # of the cylinder
+    direction: tuple[float, float, float]  # unit vector along the axis; its largest component is positive
+    low: tuple[float, float, float]  # end of the axis where `direction` starts
+    high: tuple[float, float, float]  # the other end
+    hole: bool  # whether the material is outside
+    through: bool  # whether both ends of a hole are open
 
     @property
     def length(self) -> float:
@@ -45,14 +34,14 @@ class Round:
 
 
 class Piercing:
-    """Where straight lines pierce the surface of a solid; the kernel prepares this once per solid."""
+    """Intersections of straight lines with the surface of a solid; the kernel prepares this once per solid."""
 
     def __init__(self, solid: cq.Solid) -> None:
         self._intersector = IntCurvesFace_ShapeIntersector()
         self._intersector.Load(solid.wrapped, 1e-6)
 
     def between(self, start: Array, end: Array) -> bool:
-        """Whether the straight way from start to end meets the surface."""
+        """Return whether the straight line from start to end meets the surface."""
         along = end - start
         line = gp_Lin(gp_Pnt(*start.tolist()), gp_Dir(*along.tolist()))
         self._intersector.Perform(line, 0.0, float(np.linalg.norm(along)))
@@ -60,7 +49,7 @@ class Piercing:
 
 
 def rounds_of(solid: cq.Solid) -> list[Round]:
-    """All cylinders of a solid that go at least half around, in a fixed order."""
+    """Return all cylinders of a solid that go at least half around, in a fixed order."""
     groups: dict[tuple[float, ...], list[tuple[float, float, float]]] = {}
     axes: dict[tuple[float, ...], tuple[Array, Array]] = {}
     for face in solid.Faces():
@@ -95,7 +84,7 @@ def rounds_of(solid: cq.Solid) -> list[Round]:
 
 
 def _joined(pieces: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:
-    """Faces of one cylinder that touch along its axis, as (low, high, turn): the turn of the widest height."""
+    """Return the faces of one cylinder that touch along its axis, as (low, high, turn) of the widest height."""
     joined: list[list[tuple[float, float, float]]] = []
     for piece in sorted(pieces):
         if joined and piece[0] <= max(other[1] for other in joined[-1]) + SAME:
@@ -111,13 +100,13 @@ def _joined(pieces: list[tuple[float, float, float]]) -> list[tuple[float, float
 
 
 def _positive(direction: Array) -> Array:
-    """The direction or its opposite: the largest component is positive, of equal ones the last."""
+    """Return the direction or its opposite: the largest component is positive, of equal ones the last."""
     sizes = np.round(np.abs(direction), 6)
     largest = int(np.flatnonzero(sizes == sizes.max())[-1])
     return direction if direction[largest] > 0 else -direction
 
 
 def triple(values: Array) -> tuple[float, float, float]:
-    """A vector as records hold it, to a millionth and without -0."""
+    """Return a vector as a tuple, rounded to a millionth and without -0."""
     x, y, z = (round(float(v), 6) + 0.0 for v in values)
     return x, y, z

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of bodies, and of several together. SI units; rotation frame unless said."""
+"""Mass, centre of mass and inertia of bodies. SI units; rotation frame unless stated."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Inertial:
     inertia_kg_m2: Array  # (3, 3), about the centre of mass
 
     def moved(self, T: Array) -> Inertial:
-        """The same body in the frame that T maps to."""
+        """Return the body in the frame that T maps to."""
         R = T[:3, :3]
         return Inertial(self.mass_kg, R @ self.centre_m + T[:3, 3], R @ self.inertia_kg_m2 @ R.T)
 
 
 def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
-    """Inertia of a homogeneous solid in mm."""
+    """Return the inertia of a homogeneous solid in mm."""
     kg_per_mm3, properties = density_g_cm3 * 1e-6, GProp_GProps()
     BRepGProp.VolumeProperties_s(solid.wrapped, properties)  # once: the same integral gives all three
     matrix = properties.MatrixOfInertia()
@@ -38,7 +38,7 @@ def of_solid(solid: cq.Solid, density_g_cm3: float) -> Inertial:
 
 
 def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> Inertial:
-    """Inertia of a homogeneous box: bought parts, of which only mass and size are known."""
+    """Return the inertia of a homogeneous box between two corners."""
     low, high = np.array(tuple(low_mm)) / 1000, np.array(tuple(high_mm)) / 1000
     x, y, z = (high - low) ** 2
     mass = mass_g / 1000
@@ -46,7 +46,7 @@ def of_box(mass_g: float, low_mm: Iterable[float], high_mm: Iterable[float]) -> 
 
 
 def of_line(mass_g: float, points_mm: Array) -> Inertial:
-    """Inertia of a thin line of even mass through points (n, 3) no further apart than its bends ask for."""
+    """Return the inertia of a thin homogeneous line through points, shape (n, 3)."""
     points = points_mm / 1000
     middles, lengths = (points[1:] + points[:-1]) / 2, np.linalg.norm(np.diff(points, axis=0), axis=1)
     masses = mass_g / 1000 * lengths / lengths.sum()
@@ -57,7 +57,7 @@ def of_line(mass_g: float, points_mm: Array) -> Inertial:
 
 
 def together(bodies: Iterable[Inertial]) -> Inertial:
-    """Several bodies as one (Steiner)."""
+    """Return several bodies as one (Steiner)."""
     bodies = list(bodies)
     mass = sum(body.mass_kg for body in bodies)
     centre = sum((body.mass_kg * body.centre_m for body in bodies), np.zeros(3)) / mass

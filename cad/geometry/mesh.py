@@ -1,11 +1,8 @@
 """One canonical triangle mesh per solid, and its binary STL. Millimetres, rotation frame.
 
-The kernel's tessellation depends on what was meshed before (it is cached in the shape) and repeats vertices face by
-face. Here: a fresh copy, vertices rounded and merged, triangles without area dropped, everything sorted; so the same
-solid gives the same bytes in every process.
+The kernel's tessellation depends on earlier meshes of the shape and repeats vertices. Here a fresh copy is meshed,
+vertices are rounded and merged, triangles without area dropped, and everything sorted: equal solids give equal bytes.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -33,16 +30,16 @@ class TriMesh:
     faces: NDArray[np.int64]  # (m, 3)
 
     def volume(self) -> float:
-        """Enclosed volume [mm3]."""
+        """Return enclosed volume [mm3]."""
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
     def manifold(self) -> manifold3d.Manifold:
-        """The same for booleans and slices, in single precision."""
+        """Return the mesh for booleans and slices, in single precision."""
         return manifold3d.Manifold(manifold3d.Mesh(self.vertices.astype(np.float32), self.faces.astype(np.uint32)))
 
     def is_closed(self) -> bool:
-        """Whether every edge is shared by exactly two triangles that run it in opposite directions."""
+        """Return whether every edge is shared by exactly two triangles in opposite directions."""
         edges = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
         forth = np.sort(edges[:, 0] * len(self.vertices) + edges[:, 1])
         back = np.sort(edges[:, 1] * len(self.vertices) + edges[:, 0])
@@ -63,7 +60,7 @@ def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: floa
 
 
 def _tessellated(solid: cq.Shape, chord_error: float, chord_angle: float) -> tuple[Array, NDArray[np.int64]]:
-    """Points face by face, shape (n, 3), and triangles, (m, 3), without the vectors that cadquery makes of them."""
+    """Return points face by face, shape (n, 3), and triangles, shape (m, 3)."""
     shape = solid.copy()
     shape.mesh(chord_error, chord_angle)
     points: list[tuple[float, float, float]] = []
@@ -82,7 +79,7 @@ def _tessellated(solid: cq.Shape, chord_error: float, chord_angle: float) -> tup
 
 
 def checked_mesh(solid: cq.Solid, part: str) -> TriMesh:
-    """The mesh of a part, closed and of the right volume.
+    """Return the mesh of a part, closed and of the right volume.
 
     Raises:
         BuildError: the mesh is open, or its volume is off by more than 0.1 %.
@@ -91,7 +88,7 @@ def checked_mesh(solid: cq.Solid, part: str) -> TriMesh:
 
 
 def checked(mesh: TriMesh, solid: cq.Solid, part: str) -> TriMesh:
-    """The same mesh, found closed and of the volume of its solid.
+    """Return the mesh if it is closed and has the volume of its solid.
 
     Raises:
         BuildError: as `checked_mesh`.
@@ -105,7 +102,7 @@ def checked(mesh: TriMesh, solid: cq.Solid, part: str) -> TriMesh:
 
 
 def stl_bytes(mesh: TriMesh, part: str, config_hash: str) -> bytes:
-    """Binary STL; the 80 bytes of its header name the part, the configuration and the unit."""
+    """Return a binary STL; its header names the part, the configuration and the unit."""
     header = f"{part} config={config_hash} unit=mm".encode("ascii")
     corners = mesh.vertices[mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

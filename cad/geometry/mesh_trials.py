@@ -1,7 +1,5 @@
 """Error against run time of the meshes that STL, 3MF and GLB are written from, over the kernel's two tolerances."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
@@ -21,7 +19,7 @@ ANGLES = 0.5, 0.2, CHORD_ANGLE, 0.05  # rad
 
 
 def mesh_trials(solids: Mapping[str, cq.Solid], progress: Callable[[str], None]) -> Iterator[Trial]:
-    """All parts together at each pair of tolerances; the error is the farthest that a triangle is from its surface."""
+    """Yield a trial of all parts for each pair of tolerances; the error is the largest distance to the surface."""
     for angle in ANGLES:
         for chord in CHORDS:
             progress(f"meshes within {chord:g} mm and {angle:g} rad")
@@ -48,7 +46,7 @@ def _all_meshed(solids: list[cq.Solid], chord: float, angle: float) -> list[cq.S
 
 
 def _off(solid: cq.Solid) -> tuple[float, int]:
-    """Largest distance [mm] from the middle of a triangle or of its sides to the surface it stands for; triangles."""
+    """Return the largest distance [mm] of a triangle's middle or sides to its surface, and the number of triangles."""
     worst, count = 0.0, 0
     for face in solid.Faces():
         place = TopLoc_Location()
@@ -56,7 +54,7 @@ def _off(solid: cq.Solid) -> tuple[float, int]:
         count += mesh.NbTriangles()
         if face.geomType() == "PLANE":
             continue
-        surface = BRep_Tool.Surface_s(face.wrapped)  # where it is in space: the place of the face is in it
+        surface = BRep_Tool.Surface_s(face.wrapped)  # in space: the location of the face is included
         nodes = np.array([mesh.Node(i + 1).Transformed(place.Transformation()).Coord() for i in range(mesh.NbNodes())])
         at = np.array([mesh.UVNode(i + 1).Coord() for i in range(mesh.NbNodes())])
         corners = np.array([mesh.Triangle(i + 1).Get() for i in range(mesh.NbTriangles())]) - 1

@@ -1,9 +1,8 @@
-"""How a part lies on the printer's bed: one rule, shared by the print files and the checks. Millimetres.
+"""Pose of a part on the printer's bed, for print files and checks. Millimetres.
 
-Of all poses in which the part lies on one of its larger flats, those that fit the bed; of these the least support,
-counted as the volume of the columns from overhanging faces down to the bed; of equal ones (to a cubic centimetre) the
-larger contact, then the lower pose. A face overhangs where it leans more than 45 deg out of the vertical. About the
-vertical the part is turned so that its smallest rectangle lies along the bed, or aslant where it only fits so.
+Of all poses on a larger flat, those that fit the bed; of these the least support, the volume of the columns below
+overhanging faces (more than 45 deg out of the vertical); of equal ones (to a cubic centimetre) the larger contact, then
+the lower pose. The smallest rectangle around the part is along the bed, or tilted if it only fits so.
 """
 
 from __future__ import annotations
@@ -19,34 +18,25 @@ from scanwright.design.arrays import Array
 from scanwright.design.frames import rigid
 
 OVERHANG_RAD = math.radians(45.0)
-CONTACT_SHARE = 0.25  # of the largest flat on the hull: what is smaller holds badly
+CONTACT_SHARE = 0.25  # of the largest flat on the hull: smaller ones adhere badly
 FLAT = 1e-3  # mm, within which points count as one plane
 SUPPORT_STEP_MM3 = 1000.0  # poses closer than this print alike
 
 
 @dataclass(frozen=True, slots=True)
 class PrintPose:
-    """One part on the bed.
+    """One part on the bed."""
 
-    Attributes:
-        T_bed_part: maps the part's frame to the bed's: origin in a corner of the bed, z up, shape (4, 4).
-        size_mm: box of the part on the bed.
-        contact_mm2: area that lies on the bed.
-        overhang_mm2: area of the faces that need support.
-        support_mm3: volume of the columns under them.
-        fits: whether the box fits the bed.
-    """
-
-    T_bed_part: Array
-    size_mm: tuple[float, float, float]
-    contact_mm2: float
-    overhang_mm2: float
-    support_mm3: float
-    fits: bool
+    T_bed_part: Array  # maps the part's frame to the bed's: origin in a corner of the bed, z up, shape (4, 4)
+    size_mm: tuple[float, float, float]  # box of the part on the bed
+    contact_mm2: float  # area that lies on the bed
+    overhang_mm2: float  # area of the faces that need support
+    support_mm3: float  # volume of the columns under them
+    fits: bool  # whether the box fits the bed
 
 
 def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
-    """The pose in which a part is printed, by the rule at the top of this module."""
+    """Return the pose in which a part is printed, by the rule at the top of this module."""
     faces = _Faces.of(mesh)
     poses = [_pose(mesh, faces, down, bed_mm) for down in _flats(mesh, faces)]
 
@@ -58,7 +48,7 @@ def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
 
 
 def on_bed(mesh: TriMesh, pose: PrintPose) -> TriMesh:
-    """The mesh in the frame of the bed, rounded as every mesh is; nothing is below the bed."""
+    """Return the mesh in the frame of the bed, rounded as every mesh."""
     vertices = np.round(mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3], 5)
     vertices[:, 2] = np.where(np.abs(vertices[:, 2]) < FLAT, 0.0, vertices[:, 2])
     return TriMesh(vertices + 0.0, mesh.faces)
@@ -82,7 +72,7 @@ class _Faces:
 
 
 def _flats(mesh: TriMesh, faces: _Faces) -> Array:
-    """Outward normals of the flats that lie on the convex hull, shape (n, 3), the largest first.
+    """Return the outward normals of the flats that lie on the convex hull, shape (n, 3), the largest first.
 
     A part without one, such as a ball, gets the largest facets of its hull.
     """
@@ -104,7 +94,7 @@ def _flats(mesh: TriMesh, faces: _Faces) -> Array:
 
 
 def _directions(faces: _Faces) -> list[Array]:
-    """Mean normals of the triangles that share a direction, where these are more than 1 % of the largest."""
+    """Return mean normals of triangles with a common direction that have more than 1 % of the largest area."""
     key = np.round(faces.normals, 4) + 0.0
     _, index = np.unique(key, axis=0, return_inverse=True)
     index = index.reshape(-1)
@@ -137,7 +127,7 @@ def _pose(mesh: TriMesh, faces: _Faces, down: Array, bed: tuple[float, float, fl
 
 
 def _upright(up: Array) -> Array:
-    """A rotation whose third row is `up`: it maps that direction to z."""
+    """Return a rotation that maps the direction `up` to z."""
     helper = np.eye(3)[int(np.argmin(np.abs(np.round(up, 6))))]
     x = np.cross(helper, up)
     x /= np.linalg.norm(x)
@@ -145,7 +135,7 @@ def _upright(up: Array) -> Array:
 
 
 def _turned_to_fit(vertices: Array, R: Array, bed: tuple[float, float, float]) -> Array:
-    """R as it is where the part fits the bed so; else turned about z to where it does: across the bed, or aslant."""
+    """Return R if the part fits the bed so, else R turned about z until it does."""
     flat = (vertices @ R.T)[:, :2]
     outline = flat[ConvexHull(flat).vertices]
     for turn in (0.0, math.pi / 2, *np.radians(np.arange(1.0, 180.0))):
@@ -156,7 +146,7 @@ def _turned_to_fit(vertices: Array, R: Array, bed: tuple[float, float, float]) -
 
 
 def _along_bed(vertices: Array, R: Array) -> Array:
-    """R turned about z so that the smallest rectangle around the part lies along x, its longer side first."""
+    """Return R turned about z so that the smallest rectangle around the part is along x, its longer side first."""
     flat = (vertices @ R.T)[:, :2]
     outline = flat[ConvexHull(flat).vertices]
     edges = np.roll(outline, -1, axis=0) - outline

@@ -1,1 +1,1 @@
-"""Engraved labels: which flat can be read on the assembled scanner, the letters, and how they are cut."""
+"""Engraved labels: choice of a face that can be read on the assembled scanner, letters, and grooves."""

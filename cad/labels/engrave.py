@@ -1,9 +1,7 @@
-"""Grooves in a planar face: its own surgery instead of a boolean, which takes seconds for a line of letters.
+"""Grooves in a planar face, made without a boolean, which takes seconds for a line of letters. Millimetres.
 
-The face gets a hole per outline, and each hole walls and a floor; all other faces stay as they are. Millimetres.
+The face gets a hole per outline, and each hole walls and a floor.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,19 +34,13 @@ class Groove:
 
 
 def groove_of(printer: Printer) -> Groove:
-    """What a printer engraves: its walls are three lines wide, a groove is two, and as deep as half a wall."""
+    """Return the groove for a printer: two lines wide, half a wall deep (a wall is three lines wide)."""
     wall = printer.min_wall_mm
     return Groove(float(np.clip(wall * 2 / 3, *WIDTHS)), float(np.clip(wall / 2, *DEPTHS)))
 
 
 def engrave(solid: cq.Solid, grooves: Sequence[tuple[Flat, Sequence[shapely.Polygon]]], depth: float) -> cq.Solid:
-    """The solid with grooves of one depth.
-
-    Args:
-        solid: what is engraved, with a wall behind the grooves.
-        grooves: faces of it, and in the axes of each the outlines of its grooves: inside the face and apart.
-        depth: of the grooves.
-    """
+    """Return the solid with grooves of one depth; outlines are inside their face and apart, in its axes."""
     builder, shell = BRep_Builder(), TopoDS_Shell()
     builder.MakeShell(shell)
     for face in solid.Faces():
@@ -60,9 +52,9 @@ def engrave(solid: cq.Solid, grooves: Sequence[tuple[Flat, Sequence[shapely.Poly
 
 
 def _grooved(face: cq.Face, grooves: Sequence[tuple[Flat, shapely.Polygon]], depth: float) -> list[cq.Face]:
-    """What stands in the place of a face: itself with holes, what the letters leave inside them, walls and floors.
+    """Return the faces that replace a face: itself with holes, the islands of letters, walls and floors.
 
-    Walls and what they meet must share their edges, so nothing here may copy or mend what it gets.
+    Walls must share their edges with their neighbours: nothing here may copy or repair a shape.
     """
     rest = BRepBuilderAPI_MakeFace(face.wrapped)
     pieces: list[cq.Face] = []

@@ -1,13 +1,11 @@
-"""Fit coupon: a plate to print first, in half an hour, which tells the clearances of one printer.
+"""Fit coupon: a plate to print first, in half an hour, that shows the clearances of one printer.
 
-Frame: its own, mm, lying on the bed. A row of bores for the spigot of a turned shaft, one of holes for each screw that
-the scanner's catalogue parts take, one of pockets where the profile traps nuts. The words above a row say what it is
-for and the clearance on the diameter of its first hole, and each hole has a tenth of a millimetre more than the one to
-its left (`M3 .2+`: 0.2, 0.3, 0.4 ...); that of the printer's profile is among them. The bore that slides without play,
-and the hole that the screw just falls through, belong in the profile (`fit_clearance_mm`, `screw_clearance_mm`).
+Frame: its own, mm, on the bed. A row of bores for the spigot of a turned shaft, one of holes for each screw of the
+devices, one of nut pockets if the profile uses nuts. The text above a row names it and the clearance on the diameter of
+its first hole; each further hole has 0.1 mm more (`M3 .2+`: 0.2, 0.3, 0.4 ...). Write the clearance of the bore that
+slides without backlash, and of the hole that the screw just falls through, into the profile (`fit_clearance_mm`,
+`screw_clearance_mm`).
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -64,11 +62,7 @@ class _Row:
 
 
 def fit_coupon(scanner: Scanner, stack: Hub) -> cq.Solid:
-    """Make the coupon of one scanner's printer.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the coupon of one scanner's printer."""
     printer, rows = scanner.printer, _rows(scanner, stack)
     groove, trap = groove_of(printer), trap_of(NUT, printer)
     thickness = max(THICKNESS, 0.0 if trap is None else trap.depth + FLOOR)
@@ -95,9 +89,9 @@ def fit_coupon(scanner: Scanner, stack: Hub) -> cq.Solid:
 
 
 def _laid_out(rows: list[_Row]) -> tuple[float, float, list[tuple[float, float, float]]]:
-    """Width and depth of the plate; left of each row, low of its holes and of its words.
+    """Return the width and depth of the plate; left of each row, low of its holes and of its words.
 
-    Rows stand side by side as far as the widest reaches.
+    Rows are next to each other within the width of the widest.
     """
     widest = max(row.width for row in rows)
     lines: list[list[_Row]] = []
@@ -119,10 +113,10 @@ def _laid_out(rows: list[_Row]) -> tuple[float, float, list[tuple[float, float, 
 
 
 def _rows(scanner: Scanner, stack: Hub) -> list[_Row]:
-    """The first one, of spigots, where the shaft is turned; the last one, of pockets, where the profile traps nuts."""
+    """Return the rows: spigots first if the shaft is turned, nut pockets last if the profile uses nuts."""
     printer = scanner.printer
     fits, screws = _around(printer.fit_clearance_mm), _around(printer.screw_clearance_mm)
-    # a cup is printed, too, and the screws take up its play: bores as wide as that would cost an hour
+    # a cup is printed too, and the screws clamp it: bores as wide as that would take an hour to print
     rows = [] if stack.cup_bore > 0 else [_Row(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
     for name in sorted({scanner.lidar.base.screw, scanner.servo.front.screw}):
         rows.append(_Row(name, SCREWS[name].nominal, screws))
@@ -130,7 +124,7 @@ def _rows(scanner: Scanner, stack: Hub) -> list[_Row]:
 
 
 def _letters(text: str, corner: Array, stroke: float, top: Flat) -> list[shapely.Polygon]:
-    """Outlines of words with their lower left corner on the plate, in the axes of its upper face."""
+    """Return outlines of words from their lower left corner, in the axes of the upper face."""
 
     def put(points: Array) -> Array:
         return top.along(corner + np.column_stack([points, np.zeros(len(points))]))
@@ -139,6 +133,6 @@ def _letters(text: str, corner: Array, stroke: float, top: Flat) -> list[shapely
 
 
 def _around(clearance: float) -> list[float]:
-    """Clearances about that of the profile, or from the least on where it is small."""
+    """Return clearances about that of the profile, none below 0."""
     below = min(COLUMNS // 2, int(clearance / STEP + 1e-9))
     return [round(clearance + (i - below) * STEP, 3) for i in range(COLUMNS)]

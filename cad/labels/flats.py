@@ -1,6 +1,4 @@
-"""Planar faces of a solid as polygons: where there is room on them. Millimetres, rotation frame."""
-
-from __future__ import annotations
+"""Planar faces of a solid as polygons. Millimetres, rotation frame."""
 
 from dataclasses import dataclass
 
@@ -15,43 +13,36 @@ HAIRLINE = 2e-3  # between the triangles of a face
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """A planar face.
+    """A planar face."""
 
-    Attributes:
-        face: of the kernel.
-        frame: its axes as columns, the outward normal the last, the first along its longest straight edge.
-        origin: a point in its plane.
-        outline: of the face along the first two axes, about the origin.
-    """
-
-    face: cq.Face
-    frame: Array
-    origin: Array
-    outline: shapely.Polygon
+    face: cq.Face  # of the kernel
+    frame: Array  # its axes as columns, the outward normal the last, the first along its longest straight edge
+    origin: Array  # a point in its plane
+    outline: shapely.Polygon  # of the face along the first two axes, about the origin
 
     def at(self, points: Array) -> Array:
-        """Points of the plane, shape (n, 2), in the rotation frame, shape (n, 3)."""
+        """Return points of the plane, shape (n, 2), in the rotation frame, shape (n, 3)."""
         return np.asarray(self.origin + points @ self.frame[:, :2].T)
 
     def along(self, points: Array) -> Array:
-        """Points of the rotation frame, shape (n, 3), in the plane, shape (n, 2)."""
+        """Return points of the rotation frame, shape (n, 3), in the plane, shape (n, 2)."""
         return np.asarray((points - self.origin) @ self.frame[:, :2])
 
     def holds(self, point: Array, normal: Array) -> bool:
-        """Whether a point lies in the plane, and a direction is its outward normal."""
+        """Return whether a point is in the plane and a direction is its outward normal."""
         level = float((point - self.origin) @ self.frame[:, 2])
         return bool(self.frame[:, 2] @ normal > 1 - 1e-9 and abs(level) < 1e-6)
 
 
 def flats_of(solid: cq.Solid, most: int, least_mm2: float = 0.0) -> list[Flat]:
-    """The largest planar faces, the largest first: so many at most, and of such an area at least."""
+    """Return the `most` largest planar faces of at least an area, the largest first."""
     faces = [face for face in solid.Faces() if face.geomType() == "PLANE" and face.Area() >= least_mm2]
     places = [(-round(face.Area(), 1), *np.round(face.Center().toTuple(), 3)) for face in faces]
     return [_flat(faces[i]) for i in sorted(range(len(faces)), key=places.__getitem__)[:most]]
 
 
 def flat_at(solid: cq.Solid, point: Array, normal: Array) -> Flat | None:
-    """The planar face with that outward normal that a point lies in."""
+    """Return the planar face with that outward normal that contains a point; None if there is none."""
     for face in solid.Faces():
         if face.geomType() == "PLANE" and np.array(face.normalAt().toTuple()) @ normal > 1 - 1e-9:
             flat = _flat(face)
@@ -74,7 +65,7 @@ def _flat(face: cq.Face) -> Flat:
 
 
 def _along_edge(flat: Flat) -> Flat:
-    """The same face with its first axis along its longest straight edge."""
+    """Return the same face with its first axis along its longest straight edge."""
     corners = np.asarray(shapely.simplify(flat.outline.exterior, 5 * HAIRLINE).coords)
     edges = np.round(np.diff(corners, axis=0), 2)
     along = edges[int(np.argmax(np.round(np.linalg.norm(edges, axis=1), 1)))]

@@ -1,9 +1,7 @@
-"""Engraved lettering of straight strokes, drawn here: no font file, so the same text is the same groove everywhere.
+"""Engraved letters of straight strokes: without a font file, the same text is the same groove on every machine.
 
-A glyph is a list of chains on a grid 4 wide and 6 high; grooves are as wide as the stroke, square at their ends.
+A glyph is a list of chains on a grid 4 wide and 6 high.
 """
-
-from __future__ import annotations
 
 import math
 from itertools import pairwise
@@ -63,12 +61,12 @@ GLYPHS = {
 
 
 def text_width(text: str, height: float) -> float:
-    """Length of a line of text [mm]."""
+    """Return the length of a line of text [mm]."""
     return (len(text) * ADVANCE - (ADVANCE - 4)) * height / 6 if text else 0.0
 
 
 def letters(text: str, height: float, stroke: float) -> list[shapely.Polygon]:
-    """Outlines of one line of text, origin at its lower left corner; strokes that meet are one outline.
+    """Return outlines of one line of text, origin at its lower left corner; strokes that meet are one outline.
 
     Args:
         text: letters, digits and ". - + _ /"; anything else is a blank.

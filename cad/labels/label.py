@@ -1,12 +1,9 @@
 """Engraved label of a printed part: task, angles and configuration; FRONT at the lidar's front. Millimetres.
 
-The label goes to the largest flat face with room for it and a wall behind it, preferably one that can be read on the
-assembled scanner, else one that mates with nothing there. A part with little room gets the configuration alone, and a
-part without room no label. The label is the last cut: drawings, screws and moving parts do not contain it. The
-lettering is our own (`cad/labels/glyphs.py`), so no font and no licence of one is involved.
+The label is on the largest flat face with enough area and a wall behind it, preferably one that can be read on the
+assembled scanner, else one that touches nothing there. A small part gets the configuration alone or no label. Drawings,
+screws and checks use the part without its label.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -23,7 +20,7 @@ from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
 from scanwright.cad.labels.engrave import Groove, engrave, groove_of
 from scanwright.cad.labels.flats import Flat, flat_at, flats_of
 from scanwright.cad.labels.lettering import Lettering, Place
-from scanwright.cad.labels.visibility import RoomBefore, room_before
+from scanwright.cad.labels.visibility import FreeDistance, free_distance
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
@@ -32,14 +29,14 @@ from scanwright.design.scanner import Scanner
 
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
 MARGIN = 1.5  # of a face around its label
-HOLE_MARGIN = 3.0  # around a hole: the head of a screw may come there
-FACES = 12  # that are tried, the largest first
-LEAST_MM2 = 200.0  # of a face: the configuration alone takes more
-READING = 200.0  # before a face: room for a head
-TOUCH = 1.0  # before a face: a nearer body lies on it
-STEP = 2.0  # between the places that are tried on a face, and the points whose room is measured
+HOLE_MARGIN = 3.0  # around a hole: for the head of a screw
+FACES = 12  # to try, the largest first
+LEAST_MM2 = 200.0  # of a face: the configuration alone needs more
+READING = 200.0  # in front of a face, to read it
+TOUCH = 1.0  # in front of a face: a nearer body touches it
+STEP = 2.0  # between tried places on a face, and between points of measured distance
 OVERLAP = 0.01  # of the squares around these points
-PLACES = 5  # of these, the nearest to its middle, whose wall is measured
+PLACES = 5  # of these, the nearest to its middle, with a measured wall
 LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
 FRONT_INSET = 10.0  # of its middle from the edge
@@ -48,17 +45,11 @@ TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (0, 
 
 @dataclass(slots=True)
 class Labelled:
-    """The labels of one scanner.
+    """The labels of one scanner."""
 
-    Attributes:
-        parts: with their labels, by name.
-        meshes: of these.
-        left_out: labels for which there was no room.
-    """
-
-    parts: dict[str, cq.Solid] = field(default_factory=dict)
-    meshes: dict[str, TriMesh] = field(default_factory=dict)
-    left_out: list[LeftOut] = field(default_factory=list)
+    parts: dict[str, cq.Solid] = field(default_factory=dict)  # with their labels, by name
+    meshes: dict[str, TriMesh] = field(default_factory=dict)  # of these
+    left_out: list[LeftOut] = field(default_factory=list)  # labels that did not fit
 
 
 FRONT = Lettering(("FRONT",), HEIGHTS[0])
@@ -66,24 +57,16 @@ FRONT = Lettering(("FRONT",), HEIGHTS[0])
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A part that takes a label.
+    """A part to label."""
 
-    Attributes:
-        flats: faces that it may go to, the largest first.
-        piercing: of the part.
-        groove: of the lettering.
-        wall: that stays behind it.
-        front: place of the word FRONT, if the part has it.
-    """
+    flats: Sequence[Flat]  # possible faces, the largest first
+    piercing: Piercing  # of the part
+    groove: Groove  # of the lettering
+    wall: float  # least wall behind it
+    front: Place | None  # place of the word FRONT, if the part has it
 
-    flats: Sequence[Flat]
-    piercing: Piercing
-    groove: Groove
-    wall: float
-    front: Place | None
-
-    def room(self, flat: Flat) -> shapely.Polygon:
-        """The part of a face that the middle lines of strokes may take."""
+    def area(self, flat: Flat) -> shapely.Polygon:
+        """Return the part of a face that the middle lines of strokes may use."""
         half = self.groove.width / 2
         occupied = [shapely.Polygon(hole).buffer(HOLE_MARGIN + half) for hole in flat.outline.interiors]
         if self.front is not None and flat.face.isSame(self.front.flat.face):
@@ -95,15 +78,15 @@ class Ground:
         return outline.buffer(-MARGIN - half, join_style="mitre").difference(shapely.union_all(occupied))
 
     def is_thick(self, flat: Flat, points: Array) -> bool:
-        """Whether a wall stays behind grooves, at points of a face."""
+        """Return whether a wall remains behind grooves at points of a face."""
         into = -flat.frame[:, 2]
         deep = (self.groove.depth + self.wall) * into
         return not any(self.piercing.between(start + 0.05 * into, start + deep) for start in flat.at(points))
 
 
 def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
-    """Engrave every printed part that has room."""
-    before, done, groove = room_before(assembly), Labelled(), groove_of(scanner.printer)
+    """Engrave every printed part that has enough area."""
+    before, done, groove = free_distance(assembly), Labelled(), groove_of(scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
         if part.metal:
@@ -112,12 +95,12 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
         if part.seat is not None:
             front = _front(assembly, solid, part.seat, groove)
             if front is None:
-                why = "a hole of the seat is in the way of the word; the V in the edge marks the front too"
+                why = "a hole of the seat is in its place; the V in the edge also marks the front"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         ground = Ground(flats_of(solid, FACES, LEAST_MM2), Piercing(solid), groove, scanner.printer.min_wall_mm, front)
         label = label_on(ground, label_texts(scanner, part, config_hash), before)
         if label is None:
-            why = "none of its flat faces that mate with nothing has room for one"
+            why = "no free flat face is large enough"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
         words = [] if front is None else [(front, FRONT)]
         words += [] if label is None else [label]
@@ -130,7 +113,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
 
 
 def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]:
-    """Lines of the label of a part: the task, the angles that shape it, the configuration."""
+    """Return lines of the label of a part: the task, the angles that shape it, the configuration."""
     angles = scanner.angles.angles_deg
     shaped = {
         "none": [],
@@ -140,27 +123,21 @@ def label_texts(scanner: Scanner, part: PartSpec, config_hash: str) -> list[str]
     return [scanner.angles.task[: max(LONGEST)], *shaped, config_hash[:DIGITS]]
 
 
-def label_on(ground: Ground, texts: list[str], before: RoomBefore) -> tuple[Place, Lettering] | None:
-    """Place and lines of a label; None if nothing has room.
-
-    Args:
-        ground: the part.
-        texts: of the label; if they do not fit, the last one alone.
-        before: the room before the faces.
-    """
+def label_on(ground: Ground, texts: list[str], before: FreeDistance) -> tuple[Place, Lettering] | None:
+    """Return place and lines of a label, of the last text alone if all do not fit; None if no face has enough area."""
     for least in (READING, TOUCH):
-        rooms = [(flat, _open(flat, ground.room(flat), before, least)) for flat in ground.flats]
+        areas = [(flat, _open(flat, ground.area(flat), before, least)) for flat in ground.flats]
         for some, longest, height in product((texts, texts[-1:]), LONGEST, HEIGHTS):
             split = tuple(text[i : i + longest] for text in some for i in range(0, len(text), longest))
             lines = Lettering(split, height)
-            for place in _places(rooms, lines.size):
+            for place in _places(areas, lines.size):
                 if ground.is_thick(place.flat, place.put(_grid(lines.size))):
                     return place, lines
     return None
 
 
 def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, TriMesh]:
-    """The part with lettering, and its mesh.
+    """Return the part with lettering, and its mesh.
 
     Raises:
         BuildError: the grooves spoil the part.
@@ -172,7 +149,7 @@ def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: 
 
 
 def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -> Place | None:
-    """Place of FRONT on the plates that carry the lidar: the feet of its letters to the middle, the heads to the V."""
+    """Return the place of FRONT on the plates that carry the lidar, its letters upright towards the V."""
     R = assembly.layout.stack.R()
     width, letter = FRONT.size
     middle = assembly.layout.linkage.half_x - FRONT_INSET
@@ -186,45 +163,45 @@ def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -
     return place if flat.outline.contains(word) else None
 
 
-def _open(flat: Flat, room: shapely.Polygon, before: RoomBefore, least: float) -> shapely.Polygon:
-    """The part of a room, in squares of STEP, before which no body is nearer than `least`."""
+def _open(flat: Flat, area: shapely.Polygon, before: FreeDistance, least: float) -> shapely.Polygon:
+    """Return the part of an area, in squares of STEP, in front of which no body is nearer than `least`."""
     x0, y0, x1, y1 = flat.outline.bounds
     xs, ys = np.arange(x0 + STEP / 2, x1 + STEP / 2, STEP), np.arange(y0 + STEP / 2, y1 + STEP / 2, STEP)
     points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
     points = points[shapely.contains_xy(flat.outline, points[:, 0], points[:, 1])]
     points = points[before(flat, points) > least]
     low, high = points - STEP / 2 - OVERLAP, points + STEP / 2 + OVERLAP
-    return room.intersection(shapely.union_all(shapely.box(*low.T, *high.T)))
+    return area.intersection(shapely.union_all(shapely.box(*low.T, *high.T)))
 
 
-def _places(rooms: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
-    """Places of lettering of a size: in the first room first, there nearest to its middle."""
-    for flat, room in rooms:
+def _places(areas: Sequence[tuple[Flat, shapely.Polygon]], size: tuple[float, float]) -> Iterator[Place]:
+    """Return places of lettering of a size: in the first area first, there nearest to its middle."""
+    for flat, area in areas:
         for turn in TURNS:
-            for x, y in _corners(room, size, turn):
+            for x, y in _corners(area, size, turn):
                 yield Place(flat, x, y, turn)
 
 
-def _corners(room: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:
-    """Lower left corners of boxes that lie in a polygon, the nearest to its middle first."""
-    if room.is_empty:
+def _corners(area: shapely.Polygon, size: tuple[float, float], turn: Array) -> list[tuple[float, float]]:
+    """Return the lower left corners of boxes inside a polygon, the nearest to its middle first."""
+    if area.is_empty:
         return []
-    x0, y0, x1, y1 = room.bounds
+    x0, y0, x1, y1 = area.bounds
     box = np.array([[0, 0], [size[0], 0], size, [0, size[1]]]) @ turn.T
     low, high = box.min(axis=0), box.max(axis=0)
     xs, ys = np.arange(x0 - low[0], x1 - high[0] + 1e-9, STEP), np.arange(y0 - low[1], y1 - high[1] + 1e-9, STEP)
     corners = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=2).reshape(-1, 2)
     if len(corners) == 0:
         return []
-    shapely.prepare(room)
-    fits = shapely.contains(room, shapely.polygons(corners[:, None] + box))
-    middle = np.array(room.centroid.coords[0])
+    shapely.prepare(area)
+    fits = shapely.contains(area, shapely.polygons(corners[:, None] + box))
+    middle = np.array(area.centroid.coords[0])
     away = np.round(np.linalg.norm(corners + box.mean(axis=0) - middle, axis=1), 3)
     order = np.lexsort((*corners.T, away))
     return [(float(x), float(y)) for x, y in corners[order][fits[order]][:PLACES]]
 
 
 def _grid(size: tuple[float, float]) -> Array:
-    """Points all over lettering of a size, shape (n, 2)."""
+    """Return points all over lettering of a size, shape (n, 2)."""
     u, v = np.meshgrid(np.linspace(0.0, size[0], 6), np.linspace(0.0, size[1], 4), indexing="ij")
     return np.column_stack([u.ravel(), v.ravel()])

@@ -1,7 +1,5 @@
 """Lines of lettering, and their place on a face. Millimetres."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,7 @@ class Lettering:
         return width, self.height * (1 + LEADING * (len(self.lines) - 1))
 
     def outlines(self, stroke: float) -> list[shapely.Polygon]:
-        """Outlines of its grooves, about its origin."""
+        """Return outlines of its grooves, about its origin."""
         return [
             shapely.affinity.translate(letter, 0.0, LEADING * self.height * i)
             for i, line in enumerate(reversed(self.lines))
@@ -47,9 +45,9 @@ class Place:
     turn: Array
 
     def put(self, points: Array) -> Array:
-        """Points of the lettering, shape (n, 2), in the axes of the face."""
+        """Return points of the lettering, shape (n, 2), in the axes of the face."""
         return np.asarray(points @ self.turn.T + [self.x, self.y])
 
     def outlines(self, lines: Lettering, stroke: float) -> list[shapely.Polygon]:
-        """Outlines of the grooves of some lines, in the axes of the face."""
+        """Return outlines of the grooves of some lines, in the axes of the face."""
         return [shapely.transform(outline, self.put) for outline in lines.outlines(stroke)]

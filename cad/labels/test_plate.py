@@ -1,9 +1,7 @@
-"""Test plate: the holes of lidar and servo in a thin plate to print first and to screw to both devices.
+"""Test plate: the holes of lidar and servo in a thin plate, to print first and to screw to both devices.
 
-Frame: its own, mm, lying on the bed with its upper side away from the device. The middle of each pattern is open.
+Frame: its own, mm, on the bed with its upper side away from the device. The middle of each pattern is open.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 
@@ -26,11 +24,7 @@ PLAY_MM = 0.6  # on the diameter of the horn's boss
 
 
 def make_test_plate(scanner: Scanner, patterns: Sequence[ScrewPattern]) -> cq.Solid | None:
-    """Make the plate of one scanner; None if nothing is screwed to its lidar or servo.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the plate of one scanner; None if nothing is screwed to its lidar or servo."""
     frames: list[cq.Solid] = []
     holes: list[cq.Solid] = []
     start = 0.0

@@ -1,9 +1,7 @@
-"""How much room there is before the faces of the parts of an assembled scanner. Millimetres.
+"""Free distance in front of the faces of the parts of an assembled scanner. Millimetres.
 
-The scanner stands on an endless deck, and the servo is at joint 0.
+The deck is endless and the servo is at joint 0.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 
@@ -18,12 +16,12 @@ OFF = 0.05  # from the face to the start of the rays
 DECK_HALF = 2000.0
 DECK_BELOW = 0.2  # of its face in this scene: a foot that lies on it then touches it
 
-RoomBefore = Callable[[Flat, Array], Array]
-"""From points of a face, shape (n, 2), straight out to the next body: shape (n,), 0 if it touches, inf if none."""
+FreeDistance = Callable[[Flat, Array], Array]
+"""Distances from points of a face, shape (n, 2), to the next body: shape (n,), 0 if it touches, inf if none."""
 
 
-def room_before(assembly: Assembly) -> RoomBefore:
-    """Measure by rays against all bodies of the assembly and its deck."""
+def free_distance(assembly: Assembly) -> FreeDistance:
+    """Return a measurement by rays against all bodies of the assembly and its deck."""
     corners = [mesh.vertices[mesh.faces] for mesh in assembly.meshes().values()]
     bodies = ray_caster.build_scene(np.concatenate([_deck(assembly), *corners]) / 1000)
 
@@ -31,7 +29,7 @@ def room_before(assembly: Assembly) -> RoomBefore:
         normal = flat.frame[:, 2]
         starts = (flat.at(points) + OFF * normal) / 1000
         hits = ray_caster.cast(bodies, starts, np.broadcast_to(normal, starts.shape))
-        # A body that lies on the face holds the start of the ray, which then meets its surface from within
+        # a body on the face contains the start of the ray, which then meets its surface from within
         within = (hits.triangle >= 0) & (bodies.normals[hits.triangle] @ normal > 0)
         return np.asarray(1000 * np.where(within, 0.0, hits.range_m))
 
@@ -39,7 +37,7 @@ def room_before(assembly: Assembly) -> RoomBefore:
 
 
 def _deck(assembly: Assembly) -> Array:
-    """Two triangles, shape (2, 3, 3)."""
+    """Return the deck as two triangles, shape (2, 3, 3)."""
     axes, centre = assembly.layout.deck.rotation(), np.array(assembly.layout.deck.centre)
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * DECK_HALF
     corners = centre - DECK_BELOW * axes[:, 2] + square @ axes[:, :2].T

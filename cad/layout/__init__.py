@@ -1,1 +1,1 @@
-"""Every number that more than one part needs, for each drive; loads and balance. No kernel."""
+"""Numbers that more than one part needs, for each drive; loads and balance. No kernel."""

@@ -1,12 +1,9 @@
-"""Where the deck is that the scanner is screwed to, below or above it. No kernel: plain numpy.
+"""Pose of the deck that the scanner is screwed to. No kernel.
 
 World frame: origin on the face of the deck, in the centre of the mount's deck holes; z up. The deck is below the
-scanner (face at z = 0, scanner at z > 0), or above it where the axis points down (scanner at z < 0). A tripod's head
-is a deck under a plate of its own. Everything here is expressed in the rotation frame at gamma = 0, mm, unless its name
-says world.
+scanner (face at z = 0, scanner at z > 0), or above it if the axis points down (scanner at z < 0). Everything is in the
+rotation frame at gamma = 0, mm, unless its name contains world.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -27,20 +24,20 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 FOOT_THICKNESS = 6.0
-TIES_HALF = 5.5  # half of the room between two slots of the foot: two leads lie side by side
+TIES_HALF = 5.5  # half of the distance of two slots of the foot: two leads fit side by side
 FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
 BACK_THICKNESS = 8.0
-UNDER_MOUNT_HEAD = 5.0  # of the mount, to what it holds
+UNDER_MOUNT_HEAD = 5.0  # of the mount, to its load
 BACK_MARGIN = 5.0  # of the back plate around the rear holes, at least
 RAIL_INSET = 0.8  # of the ends of a rail from those of the back plate
 RAIL_WALL = 1.3  # of a rail around the heads of its screws, at least
-USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount whose task names none
+USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount, unless the task states some
 PAD_HALF = 26.0  # of the strut on the foot
 STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 HOLE_MARGIN = 10.0  # of the foot around a hole
 FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
-FREE = 5.0  # above the foot, for everything that is not the mount
+FREE = 5.0  # above the foot, for everything except the mount
 SWEEP_MARGIN = 3.0  # around the turning lidar
 
 
@@ -48,22 +45,22 @@ SWEEP_MARGIN = 3.0  # around the turning lidar
 class Deck:
     """The deck in the rotation frame: `T_world_rot` at gamma = 0 is [R_world_rot | t_world_rot]."""
 
-    normal: tuple[float, float, float]  # from the deck into the room
+    normal: tuple[float, float, float]  # from the deck towards the scanner
     along: tuple[float, float, float]  # world x
     centre: tuple[float, float, float]  # of the holes, on the lower face of the mount: world origin but for a plate
-    flat: bool  # the axis points up from a flat deck that names no holes: no mount is needed
+    flat: bool  # the axis points up from a flat deck without stated holes: no mount is needed
     t_world_rot: tuple[float, float, float]
     back_centre: tuple[float, float, float]  # middle of the back plate's front face
     back_half: tuple[float, float]  # x, y
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     tripod: TripodFoot | None  # plate under the mount
-    foot: tuple[float, float, float]  # half extents along world x and y, and what is cut off the corners
+    foot: tuple[float, float, float]  # half extents along world x and y, and cut of the corners
     ties: tuple[TieSeat, ...]  # slots at the sides of the foot, frame of the deck
-    joints: tuple[Joint, ...]  # of what is screwed to a flat deck without a mount
+    joints: tuple[Joint, ...]  # of a servo or frame on a flat deck without a mount
 
     def rotation(self) -> Array:
-        """Axes of the deck as columns: world x, then to the left of it, then from the deck into the room."""
+        """Return axes of the deck as columns: world x, left of it, and from the deck towards the scanner."""
         along, normal = np.array(self.along), np.array(self.normal)
         return np.stack([along, np.cross(normal, along), normal], axis=1)
 
@@ -76,11 +73,11 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     R = np.where(np.abs(R) < 1e-12, 0.0, R)
     hangs = bool(R[2, 2] < -1e-6)
     normal = -R[2] if hangs else R[2]
-    deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # to the left of x, seen from the room
+    deck_holes = tuple((x, -y if hangs else y) for x, y in pattern.holes())  # left of x, seen from the scanner
     along = R[0]
     holes = mounted.holes
     xs, ys = [x for x, _ in holes], [y for _, y in holes]
-    margin = max(BACK_MARGIN, mounted.screw.head_room + rail_wall(scanner.printer) + RAIL_INSET)
+    margin = max(BACK_MARGIN, mounted.screw.driver_radius + rail_wall(scanner.printer) + RAIL_INSET)
     half = (max(xs) + margin, (max(ys) - min(ys)) / 2 + margin)
     back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
     tripod = tripod_foot_of(screw, scanner.printer, FOOT_THICKNESS) if scanner.modules.tripod_foot else None
@@ -92,6 +89,8 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         rotor_radius = drive.envelope.radius(drive.stack.sub_plate)
         height = _height_of_back(rotor_radius, mounted, normal, back, half)
         centre = back - height * normal + _foot_shift(scanner, mounted, deck_holes, back, normal, R[0], height)
+    axes, depth = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0), mounted.thread_mm
+    joints = (Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=depth),)
     foot = _foot(pattern, screw)
     offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
@@ -108,17 +107,12 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         tripod=tripod,
         foot=foot,
         ties=() if flat else _foot_ties(foot, deck_holes),
-        joints=(_on_flat_deck(mounted),) if flat else (),
+        joints=joints if flat else (),
     )
 
 
-def _on_flat_deck(mounted: Mounted) -> Joint:
-    axes = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0)
-    return Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=mounted.thread_mm)
-
-
 def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:
-    """Seats at the middle of each side of the foot, unless a screw is there; the groove is below."""
+    """Return seats at the middle of each side of the foot, unless a screw is there; the groove is below."""
     x, y, _ = foot
     seats = [
         TieSeat(
@@ -143,7 +137,7 @@ def _near_screw(seat: TieSeat, deck_holes: tuple[tuple[float, float], ...]) -> b
 
 
 def strut_corners(deck: Deck) -> Array:
-    """Corners of back plate and a pad in the foot, shape (n, 3): the strut is the part of their hull behind the plate.
+    """Return corners of back plate and a pad in the foot, shape (n, 3): the strut is their hull behind the plate.
 
     No facet coincides with plate or foot.
     """
@@ -158,14 +152,14 @@ def strut_corners(deck: Deck) -> Array:
 
 
 def rail_wall(printer: Printer) -> float:
-    """What is left of a rail around the heads of its screws."""
+    """Return the wall of a rail around the heads of its screws."""
     return max(RAIL_WALL, printer.min_wall_mm)
 
 
 def _height_of_back(
     rotor_radius: float, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
 ) -> float:
-    """Height of the back plate's centre above the deck, so that nothing comes nearer than FREE to the foot."""
+    """Return the height of the back plate's centre above the deck that keeps everything FREE above the foot."""
     plate = [
         (sx * half[0], back[1] + sy * half[1], back[2] - depth)
         for sx in (1, -1)
@@ -188,12 +182,12 @@ def _foot_shift(
     along: Array,
     height: float,
 ) -> Array:
-    """Least shift of the foot in the deck's plane that keeps the drivers of the case screws off the deck screws.
+    """Return the least shift of the foot that keeps the drivers of the case screws off the deck screws.
 
-    The drivers come from behind along z, through strut and perhaps foot, where a deck screw may stand.
+    The drivers come from behind along z, through the strut and sometimes the foot.
     """
     screw = SCREWS[(scanner.deck or USUAL).screw]
-    room = mounted.screw.head_room + screw.head_room
+    apart = mounted.screw.driver_radius + screw.driver_radius
     left = np.cross(normal, along)
     shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
     depths = np.linspace(0.0, FOOT_THICKNESS + screw.head_height, 11)
@@ -202,22 +196,22 @@ def _foot_shift(
         centre = back - height * normal + shift[0] * along + shift[1] * left
         screws = [centre + u * along + v * left + depth * normal for u, v in deck_holes for depth in depths]
         return min(
-            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else room
+            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else apart
             for point in screws
             for x, y in mounted.holes
         )
 
-    a, b = next((shift for shift in shifts if clearance(shift) >= room), (0.0, 0.0))
+    a, b = next((shift for shift in shifts if clearance(shift) >= apart), (0.0, 0.0))
     return a * along + b * left
 
 
 def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, float]:
-    """Half extents of an octagon around all holes and the strut's pad, and what is cut off its corners.
+    """Return the half extents of an octagon around all holes and the strut's pad, and the cut of its corners.
 
     Raises:
         BuildError: a hole lies under the strut, where no driver reaches its screw.
     """
-    least = PAD_HALF + screw.head_room + 1.0
+    least = PAD_HALF + screw.driver_radius + 1.0
     near = [hole for hole in pattern.holes() if max(abs(hole[0]), abs(hole[1])) < least]
     if near:
         raise BuildError(

@@ -1,10 +1,8 @@
-"""How the servo turns the shaft, as data: a list of stations along the axis, and what each kind of drive adds.
+"""How the servo turns the shaft, as data: stations along the axis, and numbers of each kind of drive.
 
-Rotation frame at gamma = 0, mm. Only `drive_of` in `cad/layout/placement.py` knows which drives there are; each fills a
-`DriveLayout` in a separate folder (`direct/`, `belt/`), and all other code reads it.
+Rotation frame at gamma = 0, mm. `drive_of` in `cad/layout/placement.py` selects the drive; each fills a `DriveLayout`
+in its folder (`direct/`, `belt/`), which all other code reads.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
@@ -19,7 +17,7 @@ from scanwright.cad.layout.joints import Fixing
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.layout.tie_seat import TieSeat
-from scanwright.cad.screws import Screw, Thread
+from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
@@ -28,6 +26,7 @@ from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
+HEAD_WALL = 2.0  # of a plate on the servo, next to the recess of a head
 Body = Literal["base", "rotor", "horn"]
 Point = tuple[float, float, float]
 Record = TypeVar("Record")
@@ -50,178 +49,134 @@ class Rod:
     high: float
 
     def cuboid(self) -> Cuboid:
-        """The box around it."""
+        """Return the box around it."""
         r = self.radius
         return Cuboid((-r, -r, self.low), (r, r, self.high))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
-    """A part or a bought product, and its place in the stack from the deck to the linkage.
+    """A part or a bought product, and its place in the stack from the deck to the linkage."""
 
-    Attributes:
-        name: of the part, or of the product.
-        body: what it moves with; of a ring or a bearing the outer half.
-        z_mm: heights of its lower and upper end.
-        radius_mm: of the cylinder or the box around it, from its own axis.
-        product: that it is, if it is bought.
-        box: the homogeneous box that a product's mass is taken for.
-        turning: share of that mass that turns about the axis.
-        shape: simple body of a product that does not move, for the URDF.
-        place: which one it is, if there are two of it; the lower one is put in from below.
-        order: what to order, if that is not the name of the product.
-    """
-
-    name: str
-    body: Body
-    z_mm: tuple[float, float]
-    radius_mm: float
-    product: Servo | SlipRing | Bearing | Belt | None = None
-    box: Cuboid | None = None
-    turning: float = 0.0
-    shape: Cuboid | Rod | None = None
+    name: str  # of the part, or of the product
+    body: Body  # that it moves with; for a ring or a bearing that of the outer half
+    z_mm: tuple[float, float]  # heights of its lower and upper end
+    radius_mm: float  # of the cylinder or the box around it, from its own axis
+    product: Servo | SlipRing | Bearing | Belt | None = None  # if it is bought
+    box: Cuboid | None = None  # homogeneous box with the product's mass
+    turning: float = 0.0  # share of that mass that turns about the axis
+    shape: Cuboid | Rod | None = None  # simple body of a fixed product, for the URDF
+    # which one it is, if there are two; the lower one is inserted from below
     place: Literal["", "_upper", "_lower"] = ""
-    order: str = ""
+    order: str = ""  # order name, if that is not the name of the product
 
 
-@dataclass(frozen=True, slots=True)
-class Mass:
-    """Mass of a bought product, as a homogeneous box; `turning` is the share of it that turns."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ears:
+    """The front holes of a servo that a plate is screwed to, heights above the horn; x and y of the servo's frame."""
 
-    product: str
-    mass_g: float
-    box: Cuboid
-    turning: float
+    front: float  # of the case
+    seats: float  # of the planes around the holes
+    opening: float  # radius, or half width of a fork, around the horn
+    half_x: float  # of the plate
+    screw: Screw
+    hole: float  # diameter
+    holes: tuple[tuple[float, float], ...]
+
+
+def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], ...]) -> Ears:
+    """Return holes in the front of a servo's case with the numbers of a plate on them."""
+    servo, screw = scanner.servo, SCREWS[scanner.servo.front.screw]
+    return Ears(
+        front=servo.case_max_mm[2],
+        seats=servo.front.z_mm,
+        opening=opening,
+        half_x=plate_half_x(servo),
+        screw=screw,
+        hole=passing_hole(screw, scanner.printer),
+        holes=holes,
+    )
+
+
+def plate_half_x(servo: Servo) -> float:
+    """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
+    driver_radius = SCREWS[servo.front.screw].driver_radius
+    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + driver_radius + HEAD_WALL)
 
 
 @dataclass(frozen=True, slots=True)
 class Mounted:
-    """What a base mount carries: the servo's case, or a tower, above the mount's rails.
+    """Load of a base mount: the servo's case or frame, or a tower, above the mount's rails."""
 
-    Attributes:
-        onto: body that its screws end in.
-        rear: height of its face towards the mount.
-        ears: height of the faces around its holes.
-        screw: that goes through the mount into them.
-        holes: x and y of the four.
-        fixing: what the screws hold in: a nut behind the holes, or their thread.
-        corners: of boxes around all that does not turn, shape (n, 3).
-        discs: radius and height of what else must stay clear of the deck, round about the axis.
-        on_flat_deck: whether it may be screwed to a flat deck without a mount if the axis is upright.
-        thread_mm: of thread, or of material before the nut, behind its holes.
-        thread: what a printed one gives the screws to hold on to.
-    """
-
-    onto: str
-    rear: float
-    ears: float
-    screw: Screw
-    holes: tuple[tuple[float, float], ...]
-    fixing: Fixing
-    corners: Array
+    onto: str  # body that its screws end in
+    rear: float  # height of its face towards the mount
+    ears: float  # height of the faces around its holes
+    screw: Screw  # through the mount into them
+    holes: tuple[tuple[float, float], ...]  # x and y of the four
+    fixing: Fixing  # of the screws: a nut behind the holes, or their thread
+    corners: Array  # of boxes around all that does not turn, shape (n, 3)
+    # radius and height of other circles about the axis that must stay clear of the deck
     discs: tuple[tuple[float, float], ...]
-    on_flat_deck: bool
-    thread_mm: float
-    thread: Thread | None = None
+    on_flat_deck: bool  # whether it may be screwed to a flat deck without a mount if the axis is upright
+    thread_mm: float  # of thread, or of material before the nut, behind its holes
+    thread: Thread | None = None  # of a printed one
 
 
-@dataclass(frozen=True, slots=True)
-class LeadExit:
-    """One way out for the leads of the ring's rotor.
-
-    Attributes:
-        tie: that they can be tied to.
-        ends: corners from the ring to where a lead turns outwards, shape (k, 3), and that direction, shape (3,); any
-            of them will do.
-    """
-
-    tie: TieSeat | None
-    ends: tuple[tuple[Array, Array], ...]
+LeadExit = tuple[TieSeat | None, tuple[tuple[Array, Array], ...]]
+"""An exit for the leads of the ring's rotor: its tie, and alternative corners (k, 3) with a direction outwards (3,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Leads of the ring's rotor, one for each cable of the lidar.
+    """Leads of the ring's rotor, one for each cable of the lidar."""
 
-    Attributes:
-        number: of this one.
-        count: of all.
-        half: radius of one.
-        radius: that it may be bent to.
-    """
-
-    number: int
-    count: int
-    half: float
-    radius: float
+    number: int  # of this one
+    count: int  # of all
+    half: float  # radius of one
+    radius: float  # least bend radius
 
 
 @dataclass(frozen=True, slots=True)
 class StatorExit:
-    """Where the leads of the ring's stator leave: by its end, along -z.
+    """Exit of the leads of the ring's stator at its end, along -z."""
 
-    Attributes:
-        start: shape (3,).
-        inside: how far they run inside of what surrounds the ring.
-        stiff: whether they are straight there.
-    """
-
-    start: Array
-    inside: float
-    stiff: bool
+    start: Array  # shape (3,)
+    inside: float  # their length inside of the parts around the ring
+    stiff: bool  # whether they are straight there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveLayout:
-    """One layout of one scanner below its hub.
+    """One layout of one scanner below its hub."""
 
-    Attributes:
-        envelope: of the lidar that it carries.
-        stack: every number along the axis.
-        stations: from the deck to the linkage, in which the exploded view lifts them.
-        records: numbers of its parts, a record for each kind of part.
-        shaft: the part that carries the linkage.
-        bend: of the shaft at the hub.
-        gives: the same with its servo's horn or its bearings' seats, which tilt and move.
-        mounted: what the base mount carries.
-        servo_pose: of the servo's frame in the rotation frame: rotation (3, 3) and origin (3,), on the horn's face.
-        floor: height of all below the rotor that does not turn, or is as wide.
-        ceiling: height below all that turns.
-        lead_exits: ways out for the leads of the ring's rotor, the best first, by the tie of the hub and the azimuth
-            between the cross screws.
-        leads_leave: the same in words.
-        tied_to: what they are tied to if no tie of the hub holds them.
-        no_hub_tie: why the hub has no seat for a tie; empty if it may have one.
-        stator_exit: of the leads of the ring's stator, if the catalogue says.
-        bears: whether the servo bears a counterweight of a mass [g] at a height besides the rotor.
-        built: parts and products in the order in which they are put in; other parts say which one they follow.
-        left_out: parts that this scanner does not need.
-        borne: parts that another one keeps along the axis without a screw, by a bearing or a retaining ring.
-    """
-
-    envelope: Envelope
-    stack: Hub
-    stations: tuple[Station, ...]
-    records: tuple[object, ...]
-    shaft: str
-    bend: ShaftBend
-    gives: ShaftBend
-    mounted: Mounted
+    envelope: Envelope  # of the lidar
+    stack: Hub  # every number along the axis
+    stations: tuple[Station, ...]  # from the deck to the linkage, the order of the exploded view
+    records: tuple[object, ...]  # numbers of its parts, a record for each kind of part
+    shaft: str  # the part that carries the linkage
+    bend: ShaftBend  # of the shaft at the hub
+    gives: ShaftBend  # the same with the compliance of the servo's horn or the bearings' seats
+    mounted: Mounted  # load of the base mount
+    # of the servo's frame in the rotation frame: rotation (3, 3) and origin (3,), on the horn's face
     servo_pose: tuple[Array, Array]
-    floor: float
-    ceiling: float
+    floor: float  # height of all below the rotor that does not turn, or is as wide
+    ceiling: float  # height below all that turns
+    # exits for the leads of the ring's rotor, the best first, by the tie of the hub and the azimuth between the cross
+    # screws
     lead_exits: Callable[[Bundle, TieSeat | None, float], Iterator[LeadExit]]
-    leads_leave: str
-    tied_to: Literal["shaft", "neck"]
-    no_hub_tie: str
-    stator_exit: StatorExit | None
+    leads_leave: str  # the exit as text
+    tied_to: Literal["shaft", "neck"]  # part that they are tied to without a tie of the hub
+    no_hub_tie: str  # why the hub has no seat for a tie; empty if it may have one
+    stator_exit: StatorExit | None  # of the leads of the ring's stator, if the catalogue states it
+    # whether the servo bears a counterweight of a mass [g] at a height in addition to the rotor
     bears: Callable[[float, float], bool]
-    built: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
+    built: tuple[str, ...]  # parts and products in assembly order; other parts state which one they follow
+    left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    # parts that another one fixes along the axis without a screw, by a bearing or a retaining ring
     borne: tuple[tuple[str, str], ...] = ()
 
     def of(self, kind: type[Record]) -> Record | None:
-        """The numbers of one kind of part; None if this drive has none."""
+        """Return the record of one kind of part; None if this drive has none."""
         return next((record for record in self.records if isinstance(record, kind)), None)
 
     @property
@@ -235,17 +190,14 @@ class DriveLayout:
         return tuple(each.product for each in self.stations if isinstance(each.product, Bearing | Belt))
 
     @property
-    def masses(self) -> tuple[Mass, ...]:
-        """Masses of the bought products between mount and linkage."""
-        return tuple(
-            Mass(each.name, each.product.mass_g, each.box, each.turning)
-            for each in self.stations
-            if each.product is not None and each.box is not None
-        )
+    def masses(self) -> tuple[tuple[Station, float, Cuboid], ...]:
+        """Stations of the bought products, with mass [g] and box."""
+        stations = ((each, each.product, each.box) for each in self.stations)
+        return tuple((each, product.mass_g, box) for each, product, box in stations if product and box)
 
 
 def towards(points: Array, azimuth: float) -> tuple[Array, Array]:
-    """Points (n, 3) turned about the axis by an azimuth [rad], and the unit vector at that azimuth."""
+    """Return points (n, 3) turned about the axis by an azimuth [rad], and the unit vector at that azimuth."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), np.array([c, s, 0.0])
 

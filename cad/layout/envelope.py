@@ -1,9 +1,7 @@
-"""What belongs to the lidar, as boxes: they give the height of the hub, and are cut from the linkage. Plain numpy, mm.
+"""Boxes around the lidar: they give the height of the hub, and are cut from the linkage. No kernel, mm.
 
 The same boxes do both, so the two cannot disagree.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -22,8 +20,8 @@ from scanwright.design.task.equivalent_settings import BOUNDS, advice
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
 SUB_PLATE_THICKNESS = 4.0
-SLOT_TRAVEL = 2.0  # to either side of where a screw of the lidar is stated to be, unverified
-SLOT_WALL = 2.0  # that such a slot leaves at the edge of the plate, around a normal hole
+SLOT_TRAVEL = 2.0  # to either side of the unverified place of a screw of the lidar
+SLOT_WALL = 2.0  # of such a slot at the edge of the plate, around a normal hole
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
 EAR_HALF_WIDTH = 10.0
 EAR_SCREW = SCREWS["M3"]
@@ -36,26 +34,20 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What belongs to a lidar, gaps included, as boxes (low corner, high corner) in the laser frame.
+    """A lidar with gaps as boxes (low corner, high corner) in the laser frame."""
 
-    Attributes:
-        lidar: whose it is.
-        body: the lidar.
-        cables: where they leave, straight.
-    """
-
-    lidar: Lidar
-    body: Box
-    cables: tuple[Box, ...]
+    lidar: Lidar  # the product
+    body: Box  # its body
+    cables: tuple[Box, ...]  # their straight pieces
 
     def plate(self, sub_plate: Axis | None) -> Box:
-        """Plate of the linkage, with a sub-plate if there is one."""
+        """Return the plate of the linkage, with a sub-plate if there is one."""
         (x, y), seat = self.lidar.half_mm, -self.lidar.optical_height_mm
         lower = seat - (0.0 if sub_plate is None else SUB_PLATE_THICKNESS) - PLATE_THICKNESS
         return (-x, -y, lower), (x, y, seat)
 
     def under(self, sub_plate: Axis | None) -> Box:
-        """Heads of the lidar's screws below the plate, or the ears of the sub-plate."""
+        """Return heads of the lidar's screws below the plate, or the ears of the sub-plate."""
         (x0, y0, lower), (x1, y1, seat) = self.plate(sub_plate)
         if sub_plate is None:
             return (x0, y0, lower - SCREWS[self.lidar.base.screw].head_height - 0.5), (x1, y1, lower)
@@ -63,13 +55,13 @@ class Envelope:
         return (-x, -y, lower), (x, y, seat)
 
     def radius(self, sub_plate: Axis | None) -> float:
-        """Radius of the sphere about the optical centre that lidar, cables and plate sweep."""
+        """Return the radius of the sphere about the optical centre that lidar, cables and plate sweep."""
         boxes = (self.body, *self.cables, self.plate(sub_plate), self.under(sub_plate))
         return float(max(np.linalg.norm(box_corners(box), axis=1).max() for box in boxes))
 
 
 def lidar_pose(scanner: Scanner) -> Array:
-    """Laser in the rotation frame, shape (3, 3).
+    """Return the laser in the rotation frame, shape (3, 3).
 
     Raises:
         BuildError: the lidar would hang upside down.
@@ -77,34 +69,29 @@ def lidar_pose(scanner: Scanner) -> Array:
     R = exact(scanner.angles.R_rot_laser())
     if R[2, 2] < -1e-9:
         tilt = math.degrees(math.acos(R[2, 2]))
+        setting = {name: (angle, angle) for name, angle in scanner.angles.angles_deg.model_dump().items()}
+        instead = next((text for name in BOUNDS if (text := advice(setting, name))), "")
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: tilt = {tilt:.2f} deg: the lidar would hang upside down over the ring; at most 90"
-            f"{_instead(scanner)}"
+            f"{instead}"
         )
     return R
 
 
-def _instead(scanner: Scanner) -> str:
-    """Words for a setting that sees the same with the lidar upright: an angle of this one is beyond its range."""
-    angles = scanner.angles.angles_deg.model_dump()
-    setting = {name: (angles[name], angles[name]) for name in BOUNDS}
-    return next((text for name in BOUNDS if (text := advice(setting, name))), "")
-
-
 def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:
-    """A matrix (3, 3) as a record holds it."""
+    """Return a matrix (3, 3) as tuples."""
     return tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
 
 
 def leaning_least(R: Array) -> Axis:
-    """The laser's axis along which a sub-plate's ears reach no lower than the lidar's corners."""
+    """Return the laser's axis along which a sub-plate's ears reach no lower than the lidar's corners."""
     return "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
 
 
 def screw_travel_mm(lidar: Lidar) -> float:
-    """How far a screw of the lidar may sit from its place, along the line through the optical axis; 0 for round holes.
+    """Return the travel of a screw of the lidar in its slot, towards the optical axis; 0 for round holes.
 
-    Slots along such lines take another pitch, and still hold the lidar in the middle, unless all are one line.
+    Holes of the lidar that are not verified get slots, unless all are on one line.
     """
     lines = {round(math.atan2(y, x) % math.pi, 2) for x, y in lidar.base.places}
     if "holes" not in lidar.unverified() or len(lines) < 2:
@@ -120,7 +107,7 @@ def screw_travel_mm(lidar: Lidar) -> float:
 
 
 def slot_ends(place: tuple[float, float], travel: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """First and last place of a screw in its slot, seen from the optical axis."""
+    """Return the nearest and the furthest place of a screw in its slot."""
     x, y = place
     away = math.hypot(x, y)
     share = travel / away if away > travel else 0.0  # a screw under the optical axis has no line to it
@@ -128,7 +115,7 @@ def slot_ends(place: tuple[float, float], travel: float) -> tuple[tuple[float, f
 
 
 def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
-    """Which of the lidar's screws (index into `base.places`) the hub hides from a driver below the plate."""
+    """Return the lidar's screws (index into `base.places`) that the hub hides from a driver below the plate."""
     travel = screw_travel_mm(lidar)
     return [
         i
@@ -138,27 +125,27 @@ def covered_screws(lidar: Lidar, stack: Hub) -> list[int]:
 
 
 def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
-    """Whether the driver's way misses hub and journal, or takes no more than the hub's rim."""
-    R, room = stack.R(), SCREWS[lidar.base.screw].head_room
+    """Return whether a driver misses hub and journal, or passes through the hub's rim only."""
+    R, driver = stack.R(), SCREWS[lidar.base.screw].driver_radius
     depth = np.linspace(0.0, 150.0, 601)
     line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
-    reach = np.hypot(line[:, 0], line[:, 1]) - room
-    hub = (line[:, 2] > stack.shoulder - room) & (line[:, 2] < room - stack.h)
-    journal = (line[:, 2] > stack.hub_bottom - room) & (line[:, 2] < stack.hub_bottom + stack.journal)
+    reach = np.hypot(line[:, 0], line[:, 1]) - driver
+    hub = (line[:, 2] > stack.shoulder - driver) & (line[:, 2] < driver - stack.h)
+    journal = (line[:, 2] > stack.hub_bottom - driver) & (line[:, 2] < stack.hub_bottom + stack.journal)
     radius = 0.0 if stack.bearing is None else stack.bearing.bore_mm / 2
     return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
 
 
 def envelope_of(lidar: Lidar) -> Envelope:
-    """The boxes of one lidar (origin at the optical centre)."""
+    """Return the boxes of one lidar (origin at the optical centre)."""
     half_x, half_y = lidar.half_mm
     seat = -lidar.optical_height_mm
-    room = lidar.cable_diameter_mm / 2 + 2.0
+    half = lidar.cable_diameter_mm / 2 + 2.0
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
     cables = tuple(
         (
-            (back, y - room, seat + max(lidar.cable_z_mm - room, 0.5)),
-            (1.0 - half_x, y + room, seat + lidar.cable_z_mm + room),
+            (back, y - half, seat + max(lidar.cable_z_mm - half, 0.5)),
+            (1.0 - half_x, y + half, seat + lidar.cable_z_mm + half),
         )
         for y in lidar.cable_y_mm
     )
@@ -167,7 +154,7 @@ def envelope_of(lidar: Lidar) -> Envelope:
 
 
 def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
-    """Half extents of the strip that holds the two ears of a sub-plate."""
+    """Return the half extents of the strip that holds the two ears of a sub-plate."""
     half_x, half_y = lidar.half_mm
     if sub_plate == "x":
         return half_x + EAR_REACH, EAR_HALF_WIDTH
@@ -175,21 +162,21 @@ def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:
 
 
 def ear_screws(lidar: Lidar, axis: Axis) -> tuple[tuple[float, float], ...]:
-    """Centres of the ears' screws: their heads stand clear of the lidar's body."""
+    """Return centres of the ears' screws: their heads are clear of the lidar's body."""
     half = lidar.half_mm[0 if axis == "x" else 1]
-    away = half + BODY_GAP + EAR_SCREW.head_room + 0.5
+    away = half + BODY_GAP + EAR_SCREW.driver_radius + 0.5
     along = [(sign * away, side * EAR_SCREW_OFFSET) for sign in (1, -1) for side in (1, -1)]
     return tuple(along if axis == "x" else [(y, x) for x, y in along])
 
 
 def box_corners(box: Box) -> Array:
-    """The eight corners, shape (8, 3)."""
+    """Return the eight corners, shape (8, 3)."""
     low, high = box
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
 def around_axis(radius: float, low: float, high: float) -> Array:
-    """Corners around a cylinder about the axis, shape (n, 3)."""
+    """Return corners around a cylinder about the axis, shape (n, 3)."""
     turn = 2 * math.pi * np.arange(SIDES) / SIDES
     around = radius / math.cos(math.pi / SIDES)
     ring = around * np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -197,14 +184,14 @@ def around_axis(radius: float, low: float, high: float) -> Array:
 
 
 def exact(R: Array) -> Array:
-    """Cosines of 90 deg are 6e-17 in floating point: make them 0, so that right angles stay planar in the kernel."""
+    """Return a rotation with cosines of 90 deg as 0, not 6e-17: right angles then stay planar in the kernel."""
     return np.where(np.abs(R) < 1e-12, 0.0, R)
 
 
 def hub_height(
     envelope: Envelope, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None = None
 ) -> float:
-    """h: the hub's top lies at z = -h. The largest of what each thing needs, rounded up to 0.25 mm."""
+    """Return h, rounded up to 0.25 mm: the hub's top is at z = -h."""
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
     plate = float((box_corners(envelope.plate(sub_plate)) @ R[2]).min())
     heads = float((box_corners(envelope.under(sub_plate)) @ R[2]).min())

@@ -1,10 +1,7 @@
-"""The upper end of every scanner: the hub that carries the linkage on its shaft, whatever drives it. Plain numpy.
+"""The hub that carries the linkage on its shaft, for every drive. No kernel.
 
-What is below the hub is a layout of its own: `cad/layout/direct/` with the servo on the axis, `cad/layout/belt/` with
-it beside the axis.
+All below the hub is in `cad/layout/direct/` (servo on the axis) or `cad/layout/belt/` (servo next to the axis).
 """
-
-from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
@@ -36,8 +33,8 @@ Axis = Literal["x", "y"]
 class Hub(ABC):
     """The hub along the axis: radii, lengths and the z of each plane (rotation frame, mm).
 
-    If the hub covers a screw of the lidar, a sub-plate carries the lidar: it is screwed to it on the bench, and
-    to the linkage from the lidar's side by its ears.
+    If the hub covers a screw of the lidar, the lidar is screwed to a sub-plate on the bench, and that to the linkage by
+    its ears, from the lidar's side.
     """
 
     h: float
@@ -59,27 +56,27 @@ class Hub(ABC):
 
     @property
     def neck_radius(self) -> float:
-        """Radius of the linkage's neck where it leaves the hub: over a cup no wider than its rim bears."""
+        """Radius of the linkage's neck at the hub: over a cup no wider than the cup's rim."""
         return self.shaft_diameter / 2 - NECK_ON_RIM if self.cup_bore > 0 else self.hub_radius - 1.0
 
     @property
     def shoulder(self) -> float:
-        """Height of the hub's lower face, which parts what turns from what does not, but for sleeve and shaft."""
+        """Height of the hub's lower face: above it all turns, below it only sleeve and shaft."""
         return -self.h - HUB_HEIGHT
 
     @property
     def journal(self) -> float:
-        """Length of the bearing's sleeve, and of what it is free of the hub."""
+        """Length of the bearing's sleeve below the hub."""
         return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + JOURNAL_END
 
     @property
     def hub_bottom(self) -> float:
-        """Height of the lower end of hub, or of the sleeve below it."""
+        """Height of the lower end of the hub, or of the sleeve below it."""
         return self.shoulder - self.journal
 
     @property
     def leads_corner(self) -> float:
-        """Height at which leads that leave through the sleeve of a bearing turn outwards: above it, clear of it."""
+        """Height at which leads through the sleeve of a bearing turn outwards, clear of the bearing."""
         assert self.bearing is not None
         reach = self.bearing.bore_mm / 2 - BUNDLE_GAP - LEANING * self.lead_diameter / 2
         aside = (self.lead_count - 1) / 2 * (self.lead_diameter + BUNDLE_GAP)  # of the outermost bundle
@@ -89,12 +86,12 @@ class Hub(ABC):
 
     @property
     def leads_radius(self) -> float:
-        """Distance of the leads from the axis where they run up through the sleeve of a bearing."""
+        """Distance of the leads from the axis in the sleeve of a bearing."""
         return self.shaft_diameter / 2 + JOURNAL_WALL + self.lead_diameter / 2 + BUNDLE_GAP
 
     @property
     def leads_half_width(self) -> float:
-        """Half the width of the room of all bundles side by side."""
+        """Half the width of all bundles side by side."""
         return (self.lead_count * (self.lead_diameter + BUNDLE_GAP) + BUNDLE_GAP) / 2
 
     @property
@@ -103,14 +100,9 @@ class Hub(ABC):
         return self.shoulder + CROSS_ABOVE_BOTTOM
 
     @property
-    def spigot(self) -> float:
-        """Length of the shaft inside the hub."""
-        return SPIGOT
-
-    @property
     def spigot_top(self) -> float:
         """Height of the shaft's upper end, which is the floor of the hub's bore."""
-        return self.shoulder + self.spigot
+        return self.shoulder + SPIGOT
 
     @property
     def bearing_top(self) -> float:
@@ -130,7 +122,7 @@ class Hub(ABC):
     @property
     @abstractmethod
     def shadow_half_angle(self) -> float:
-        """Half angle [rad] of the cone about -z that what is below the hub hides from the optical centre."""
+        """Half angle [rad] of the cone about -z that everything below the hub hides from the optical centre."""
 
     @property
     @abstractmethod
@@ -138,5 +130,5 @@ class Hub(ABC):
         """Half angle [rad] of a cone inside it, of round bodies only."""
 
     def R(self) -> Array:
-        """Laser in the rotation frame, shape (3, 3)."""
+        """Return the laser in the rotation frame, shape (3, 3)."""
         return np.array(self.R_rot_laser)

@@ -1,11 +1,8 @@
-"""Joints: what holds what, by which screw, where, and how long that is. Declared here, and read by everybody.
+"""Joints: screws between two bodies, their places and lengths. Rotation frame at gamma = 0, mm.
 
-Each part declares its own (`PartSpec.joints`). Parts list, steps, drawings and findings read them; the parts cut their
-holes from the same numbers of the layout, and a test reads the joints back from the solids. Lengths are the shortest of
-the standards that hold. Rotation frame at gamma = 0, mm.
+Each part declares its own (`PartSpec.joints`); parts list, steps, drawings and checks read them. Lengths are the
+shortest sufficient ones of the standards.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
@@ -31,8 +28,8 @@ LENGTHS = {
     "M5": (6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
     "M6": (8, 10, 12, 16, 20, 25, 30, 35, 40),
 }
-HOLDS = 2.0  # diameters of thread that hold
-NUT = 1.0  # diameters: a nut, 0.8, and the thread that looks out
+HOLDS = 2.0  # diameters of thread that are sufficient
+NUT = 1.0  # diameters: a nut, 0.8, and the protruding thread
 THREAD_FREE = 0.5  # that a screw may not bottom
 DECK_MM = 5.0  # thickness of the robot's deck, assumed
 ALL_SCREWS = "{*}"  # mark for all screws of a step's part
@@ -42,7 +39,7 @@ Fixing = Literal["thread", "trap", "nut", "deck", "grub"]
 
 @dataclass(frozen=True, slots=True)
 class ScrewAxis:
-    """One screw: where its head bears, or its hole begins, and the unit vector from there to what it holds on to."""
+    """One screw: place of its head, or start of its hole, and the unit vector from there to its thread."""
 
     start: tuple[float, float, float]
     along: tuple[float, float, float]
@@ -50,35 +47,23 @@ class ScrewAxis:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """Equal screws between two bodies.
+    """Equal screws between two bodies."""
 
-    Attributes:
-        part: that the screws go through, or sit in if they are grub screws.
-        onto: the body that they hold it to; a deck is that of the robot.
-        fixing: what holds the thread: the body itself, a nut in a trap of the body, a nut, a nut under the deck, or the
-            part (grub screws).
-        screw: the size.
-        axes: of each screw.
-        grip_mm: what the shank passes before it holds.
-        thread_mm: of thread, or of material before the nut.
-        thread: what a printed part gives them to hold on to; None where it is another body, or a nut.
-        slot_mm: width and length of the slots that they may slide in, if not holes.
-        protrudes_mm: how far screws that `part` brings along stand out of it; None where they are bought by length.
-        washer_mm: diameter of the washers under their heads; None without washers.
-        heel_mm: from a lone screw, or the line of a pair, to the edge over which the part tips off; None for others.
-    """
-
-    part: str
-    onto: str
+    part: str  # that the screws go through, or are in if they are grub screws
+    onto: str  # the body that they fix it to; a deck is that of the robot
+    # kind of thread: in the body itself, a nut in a pocket of the body, a nut, a nut under the deck, or in the part
+    # (grub screws)
     fixing: Fixing
-    screw: Screw
-    axes: tuple[ScrewAxis, ...]
-    grip_mm: float
-    thread_mm: float
-    thread: Thread | None = None
-    slot_mm: tuple[float, float] | None = None
+    screw: Screw  # the size
+    axes: tuple[ScrewAxis, ...]  # of each screw
+    grip_mm: float  # length of the shank before its thread engages
+    thread_mm: float  # of thread, or of material before the nut
+    thread: Thread | None = None  # in a printed part; None for another body, or a nut
+    slot_mm: tuple[float, float] | None = None  # width and length of slots; None for holes
+    # length outside of `part` of screws that belong to it; None if they are bought by length
     protrudes_mm: float | None = None
-    washer_mm: float | None = None
+    washer_mm: float | None = None  # diameter of the washers under their heads; None without washers
+    # from a single screw, or the line of a pair, to the edge over which the part tips; None for others
     heel_mm: float | None = None
 
     @property
@@ -117,18 +102,14 @@ class Joint:
 
 
 def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
-    """Shortest standard length that holds; in a shallow thread the longest that does not bottom.
+    """Return the shortest sufficient standard length; in a shallow thread the longest that does not bottom.
 
-    Args:
-        screw: the size.
-        grip: what the shank passes before it holds.
-        fixing: what holds the thread.
-        depth: of the thread, or of the material before the nut.
+    `grip` is the length before the thread, `depth` that of the thread, or of the material before the nut.
     """
     known = LENGTHS[screw.name]
     if fixing == "grub":
         return next((n for n in known if n >= grip - 0.1), known[-1])
-    if fixing == "trap":  # the hole ends at the nut, and behind it there is room
+    if fixing == "trap":  # the hole ends at the nut, and there is space behind it
         return next((n for n in known if n >= grip + depth + screw.nut_height - 0.1), known[-1])
     if fixing == "thread":
         most = [n for n in known if n <= grip + depth - THREAD_FREE + 1e-6]
@@ -138,17 +119,17 @@ def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
 
 
 def fixing_in(thread: Thread) -> Fixing:
-    """How a screw holds in a printed part."""
+    """Return how a screw is fixed in a printed part."""
     return "thread" if thread.trap is None else "trap"
 
 
 def upright_axes(points: Iterable[Sequence[float]], z: float, up: float) -> tuple[ScrewAxis, ...]:
-    """Axes of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
+    """Return axes of screws parallel to the rotation axis that start at a height and go up (1) or down (-1)."""
     return tuple(ScrewAxis((float(x), float(y), z), (0.0, 0.0, up)) for x, y in points)
 
 
 def inward_axes(azimuths: Iterable[float], radius: float, z: float) -> tuple[ScrewAxis, ...]:
-    """Axes of screws towards the rotation axis that start at a radius."""
+    """Return axes of screws towards the rotation axis that start at a radius."""
     outwards = [(math.cos(azimuth), math.sin(azimuth)) for azimuth in azimuths]
     return tuple(ScrewAxis((radius * x, radius * y, z), (-x, -y, 0.0)) for x, y in outwards)
 
@@ -156,47 +137,50 @@ def inward_axes(azimuths: Iterable[float], radius: float, z: float) -> tuple[Scr
 def placed_axes(
     axes: Iterable[ScrewAxis], R: Array, t: Sequence[float] | Array = (0.0, 0.0, 0.0)
 ) -> tuple[ScrewAxis, ...]:
-    """The same in the rotation frame; R is the pose of their frame in it, t its origin."""
+    """Return axes in the rotation frame; R and t are the pose of their frame in it."""
     return tuple(ScrewAxis(triple(R @ axis.start + np.asarray(t)), triple(R @ axis.along)) for axis in axes)
 
 
 def round_wall_mm(inner_radius: float, outer: float, hole: float) -> float:
-    """Length of a radial hole of a diameter between the inside of a tube and a distance from its axis."""
+    """Return the length of a radial hole of a diameter between the inside of a tube and a distance from its axis."""
     return outer - math.sqrt(inner_radius**2 - (hole / 2) ** 2)
 
 
 def screws(onto: str, part: str = "") -> str:
-    """Mark for the screws of a step's part, or of another one, that end in a body."""
+    """Return the mark for the screws of a step's part, or of another one, that end in a body."""
     return f"{{{part}>{onto}}}" if part else f"{{{onto}}}"
 
 
 def lidar_thread_mm(lidar: Lidar) -> float:
-    """Depth of the threads in a lidar's base, as far as they are drawn, or thickness of its ears."""
+    """Return the drawn depth of the threads in a lidar's base, or the thickness of its ears."""
     return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
 
 
 def fixing_of(pattern: HolePattern) -> Fixing:
-    """What holds a screw that goes into the holes of a bought device: their thread, or a nut behind them."""
+    """Return how a screw is fixed in the holes of a bought device: by their thread, or a nut behind them."""
     return "nut" if pattern.kind == "through" else "thread"
 
 
-def horn_thread_mm(servo: Servo) -> float:
-    """Depth of the threads in a servo's horn."""
-    return servo.horn_thread_depth_mm
+def front_joint(
+    servo: Servo, part: str, case: str, axes: tuple[ScrewAxis, ...], grip: float, heel: float | None = None
+) -> Joint:
+    """Return the joint of a part on the front of a servo's case; `heel` as for `Joint`."""
+    fixing, screw = fixing_of(servo.front), SCREWS[servo.front.screw]
+    return Joint(part, case, fixing, screw, axes, grip_mm=grip, thread_mm=servo.front.depth_mm, heel_mm=heel)
 
 
 def horn_centres(servo: Servo) -> Array:
-    """Centres of the horn's holes, servo's frame, shape (n, 2)."""
+    """Return centres of the horn's holes, servo's frame, shape (n, 2)."""
     return polygon(servo.horn_circle_mm / 2, servo.horn_holes, math.radians(90.0 + servo.horn_first_hole_deg))
 
 
 def horn_joint(servo: Servo, part: str, onto: str, heads: float, grip: float) -> Joint:
-    """Joint of what is screwed to a servo's horn, its heads at a height, in the frame of the servo's axis."""
+    """Return the joint of a part on a servo's horn, heads at a height, in the frame of the servo's axis."""
     axes = upright_axes(horn_centres(servo), heads, -1.0)
     screw = SCREWS[servo.horn_screw]
-    return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=horn_thread_mm(servo))
+    return Joint(part, onto, "thread", screw, axes, grip_mm=grip, thread_mm=servo.horn_thread_depth_mm)
 
 
 def triple(v: Array) -> tuple[float, float, float]:
-    """A point or a direction as a record holds it."""
+    """Return a vector as a tuple."""
     return float(v[0]), float(v[1]), float(v[2])

@@ -1,9 +1,7 @@
-"""The layout of one scanner: every number that more than one of its parts needs, worked out once. No kernel.
+"""The layout of one scanner: every number that more than one of its parts needs, computed once. No kernel.
 
-`layout_of` places everything, lets the parts describe themselves, and runs the cables clear of them.
+`layout_of` places everything, collects the descriptions of the parts, and routes the cables around them.
 """
-
-from __future__ import annotations
 
 import hashlib
 import json
@@ -45,29 +43,18 @@ Parts = Callable[[Placement], Sequence[PlacedPart | LeftOut]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout(Placement):
-    """One scanner before its parts are made.
+    """One scanner before its parts are made."""
 
-    Attributes:
-        joints: all joints, in the order of the parts; those with slots last.
-        leads: on the rotor, between ring and lidar.
-        cables: that do not turn.
-        left_out: parts that this scanner does not need.
-        digest: twelve hex digits of everything that shapes the parts: angles, products, the name on the labels; not J.
-    """
-
-    joints: tuple[Joint, ...]
-    leads: tuple[RotorLead, ...]
-    cables: tuple[FixedCable, ...]
-    left_out: tuple[LeftOut, ...]
+    joints: tuple[Joint, ...]  # all joints, in the order of the parts; those with slots last
+    leads: tuple[RotorLead, ...]  # on the rotor, between ring and lidar
+    cables: tuple[FixedCable, ...]  # that do not turn
+    left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    # twelve hex digits of everything that shapes the parts: angles, products, the name on the labels; not J
     digest: str
 
 
 def layout_of(scanner: Scanner, parts_of: Parts) -> Layout:
-    """Lay out one scanner.
-
-    Args:
-        scanner: angles and products.
-        parts_of: the parts that it has, described from where they are, and those that it does not need.
+    """Lay out one scanner; `parts_of` returns its parts, and those that it does not need.
 
     Raises:
         BuildError: it cannot be laid out.

@@ -1,4 +1,4 @@
-"""The weight of the rotor, the give of its shaft, and the rating of a servo's horn. SI units. No kernel."""
+"""Weight of the rotor, compliance of its shaft, and rating of a servo's horn. SI units. No kernel."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the
 HORN_TILTS_RAD = 1e-3  # of a servo's horn at its rated moment: assumed, no maker states it
 RUBS_NM = (5e-3, 5e-3)  # of bearings, and of a ring whose friction is not in the catalogue: assumed
 NEAR_MM = 500.0
-UNRATED_NM = 0.15  # that a horn without a rating is trusted with: half of what MX-28, the weakest rated one, bears
+UNRATED_NM = 0.15  # assumed rating of a horn without one: half of that of MX-28, the weakest rated one
 FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of the ranges
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
@@ -25,19 +25,12 @@ METAL_POISSON = 0.33
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """Weight of what turns, split along and across the axis.
+    """Weight of what turns, split along and across the axis."""
 
-    Attributes:
-        across_n: component of the weight across the axis.
-        along_n: component along the axis.
-        lever_m: height of the centre of mass above the horn.
-        off_axis_m: distance of the centre of mass from the axis.
-    """
-
-    across_n: float
-    along_n: float
-    lever_m: float
-    off_axis_m: float
+    across_n: float  # component of the weight across the axis
+    along_n: float  # component along the axis
+    lever_m: float  # height of the centre of mass above the horn
+    off_axis_m: float  # distance of the centre of mass from the axis
 
     def at_g(self, g: float) -> Weight:
         """Return the same rotor under a multiple of gravity."""
@@ -51,63 +44,57 @@ class Weight:
 
 @dataclass(frozen=True, slots=True)
 class ShaftBend:
-    """What a load at the hub's lower end does to it. A force along x bends it about y, and so all around.
+    """Compliance of the shaft at the hub's lower end, equal in all directions across the axis."""
 
-    Attributes:
-        compliance: (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m].
-        twist_rad_per_nm: about the axis.
-        stretch_m_per_n: along the axis.
-    """
-
-    compliance: Array
-    twist_rad_per_nm: float
-    stretch_m_per_n: float
+    compliance: Array  # (sideways, slope) of (force, moment), shape (2, 2) [m, rad per N, N m]
+    twist_rad_per_nm: float  # about the axis
+    stretch_m_per_n: float  # along the axis
 
     def rotation_of(self, force_n: Array, moment_nm: Array) -> Array:
-        """Rotation of the hub [rad], rotation frame; force and moment act on it at the height of its lower end."""
+        """Return the rotation of the hub [rad] by force and moment at its lower end, rotation frame."""
         along = np.array([-force_n[1], force_n[0], 0.0])  # z x force
         bend = self.compliance[1, 0] * along + self.compliance[1, 1] * np.array([*moment_nm[:2], 0.0])
         return bend + np.array([0.0, 0.0, self.twist_rad_per_nm * moment_nm[2]])
 
     def shift_of(self, force_n: Array, moment_nm: Array) -> Array:
-        """Displacement of the hub's lower end [m]."""
+        """Return the displacement of the hub's lower end [m]."""
         across = np.array([moment_nm[1], -moment_nm[0], 0.0])  # moment x z
         bend = self.compliance[0, 0] * np.array([*force_n[:2], 0.0]) + self.compliance[0, 1] * across
         return bend + np.array([0.0, 0.0, self.stretch_m_per_n * force_n[2]])
 
 
 def tilt_sine(scanner: Scanner) -> float:
-    """Sine of the angle between the rotation axis and the vertical."""
+    """Return the sine of the angle between the rotation axis and the vertical."""
     up = scanner.angles.T_world_rot(0.0)[2, :3]
     return math.hypot(float(up[0]), float(up[1]))
 
 
 def weight_of(scanner: Scanner, mass_kg: float, lever_m: float, off_axis_m: float) -> Weight:
-    """Weight of a rotor whose centre of mass is known."""
+    """Return the weight of a rotor whose centre of mass is known."""
     sine = tilt_sine(scanner)
     weight = mass_kg * STANDARD_GRAVITY_M_S2
     return Weight(weight * sine, weight * math.sqrt(1.0 - min(1.0, sine**2)), lever_m, off_axis_m)
 
 
 def rated_moment_nm(scanner: Scanner) -> float | None:
-    """Tilt moment that the horn is rated for; None where the maker gives no radial load."""
+    """Return the rated tilt moment of the horn; None if the maker states no radial load."""
     rated = scanner.servo.radial_load_n
     return None if rated is None else rated * RATED_AT_MM / 1000
 
 
 def trusted_moment_nm(scanner: Scanner) -> float:
-    """Return the tilt moment that the horn is trusted with, rated or not."""
+    """Return the tilt moment allowed on the horn: its rating, or UNRATED_NM."""
     rated = rated_moment_nm(scanner)
     return UNRATED_NM if rated is None else rated
 
 
 def friction_nm(scanner: Scanner) -> tuple[float, float]:
-    """Least and most torque that ring and bearings rub with."""
+    """Return the least and largest friction torque of ring and bearings."""
     ring = scanner.slip_ring
     return RUBS_NM if ring is None or ring.friction_nm is None else ring.friction_nm
 
 
 def noise_deg(scanner: Scanner) -> float:
-    """Largest angle that moves no point within FAR_MM by more than the noise of the lidar's ranges."""
+    """Return the largest angle that moves no point within FAR_MM by more than the lidar's range noise."""
     range_mm = np.linspace(NEAR_MM, FAR_MM, 96)
     return math.degrees(math.atan(float((scanner.lidar.sigma_mm(range_mm) / range_mm).min())))

@@ -1,6 +1,4 @@
-"""The names of parts, of bought products and of the bodies that draw these: in files, lists and words."""
-
-from __future__ import annotations
+"""Names of parts, bought products and their bodies, in files, lists and texts."""
 
 # made parts
 ALIGNMENT_LINKAGE = "alignment_linkage"
@@ -48,5 +46,5 @@ ROTOR_LEAD = "rotor_lead"
 SERVO_CABLE = "servo_cable"
 SERVO_CASE = "servo_case"
 SERVO_HORN = "servo_horn"
-SERVO_OUTPUT = "servo_output"  # the horn beside the axis
+SERVO_OUTPUT = "servo_output"  # the horn next to the axis
 STATOR_LEADS = "stator_leads"

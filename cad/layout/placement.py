@@ -1,8 +1,6 @@
-"""Where everything of one scanner is, step by step: each step is a function of the records before it. No kernel."""
+"""Places of everything of one scanner; each step is a function of earlier records. No kernel."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scanwright.cad.layout.belt.drive import belt_drive
 from scanwright.cad.layout.deck import Deck, deck_of
@@ -20,25 +18,15 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Placement:
-    """Where everything is: what the parts are described from.
+    """Where everything is: the input for the descriptions of parts."""
 
-    Attributes:
-        scanner: angles and products.
-        drive: all below the hub.
-        deck: that the scanner is screwed to.
-        linkage: between hub and lidar, with ear and seats of cable ties.
-        neck: corners of its neck, shape (n, 3).
-        counterweight: the bar as long as the estimate of the rotor needs, or why there is none.
-        ties_left_out: seats of cable ties that have no place.
-    """
-
-    scanner: Scanner
-    drive: DriveLayout
-    deck: Deck
-    linkage: AlignmentLinkage
-    neck: Array
-    counterweight: Counterweight | LeftOut
-    ties_left_out: tuple[LeftOut, ...]
+    scanner: Scanner  # angles and products
+    drive: DriveLayout  # all below the hub
+    deck: Deck  # that the scanner is screwed to
+    linkage: AlignmentLinkage  # between hub and lidar
+    neck: Array  # corners of its neck, shape (n, 3)
+    counterweight: Counterweight | LeftOut  # the bar with its estimated length, or why there is none
+    ties_left_out: tuple[LeftOut, ...]  # seats of cable ties that have no place
 
     @property
     def stack(self) -> Hub:
@@ -65,7 +53,7 @@ def placement_of(scanner: Scanner) -> Placement:
         scanner=scanner,
         drive=drive,
         deck=deck,
-        linkage=AlignmentLinkage.on(body, ear, None if isinstance(hub, LeftOut) else hub, plate_ties),
+        linkage=replace(body, ear=ear, hub_tie=None if isinstance(hub, LeftOut) else hub, plate_ties=plate_ties),
         neck=neck,
         counterweight=bar,
         ties_left_out=tuple(tie for tie in (hub, plate) if isinstance(tie, LeftOut)),
@@ -73,7 +61,7 @@ def placement_of(scanner: Scanner) -> Placement:
 
 
 def drive_of(scanner: Scanner) -> DriveLayout:
-    """The drive of one scanner: a belt if the ring is a capsule, else the servo on the axis.
+    """Return the drive of one scanner: a belt if the ring is a capsule, else the servo on the axis.
 
     Raises:
         BuildError: it cannot be laid out.

@@ -1,7 +1,5 @@
 """Hole patterns of bought devices and of the deck that the joints use, as seen on the device. Millimetres."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,30 +15,17 @@ DEVICES = (LIDAR_BODY, SERVO_HORN, SERVO_OUTPUT, SERVO_CASE, RING_STATOR, DECK)
 
 @dataclass(frozen=True, slots=True)
 class ScrewPattern:
-    """Equal screws in one face of a device.
+    """Equal screws in one face of a device."""
 
-    Attributes:
-        device: body that has the holes.
-        part: that is screwed to it.
-        screw: the size.
-        places: middle of each hole for a viewer who looks at the face, about the origin.
-        origin: what (0, 0) is, in words.
-    """
-
-    device: str
-    part: str
-    screw: Screw
-    places: tuple[tuple[float, float], ...]
-    origin: str
+    device: str  # body that has the holes
+    part: str  # that is screwed to it
+    screw: Screw  # the size
+    places: tuple[tuple[float, float], ...]  # middle of each hole for a viewer who looks at the face, about the origin
+    origin: str  # what (0, 0) is, in words
 
 
 def screw_patterns(joints: Sequence[Joint], R_rot_lidar: Array) -> list[ScrewPattern]:
-    """Return the patterns in the order of `DEVICES`, each once.
-
-    Args:
-        joints: of the scanner.
-        R_rot_lidar: pose of the lidar in the rotation frame, shape (3, 3).
-    """
+    """Return the patterns in the order of `DEVICES`, each once; R_rot_lidar has shape (3, 3)."""
     patterns: dict[ScrewPattern, None] = {}
     for device in DEVICES:
         for joint in joints:

@@ -1,6 +1,4 @@
-"""A seat of a cable tie: a tongue with a slot on either side of what is tied to it. Millimetres."""
-
-from __future__ import annotations
+"""A slotted tab for a cable tie. Millimetres."""
 
 import math
 from dataclasses import dataclass
@@ -11,34 +9,22 @@ from scanwright.design.arrays import Array
 
 SLOT_ALONG, SLOT_ACROSS = 3.2, 1.8  # for a tie 2.5 wide and 1.1 thick
 SLOT_WALL = 2.0  # outside a slot
-GROOVE = 1.6  # depth of the tie's way where something lies on the tongue
+GROOVE = 1.6  # depth of the tie's groove if something is on the tab
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TieSeat:
-    """A tongue along a direction square to z, which what is tied follows.
+    """A tab with a slot on either side of the cable, along a direction across z."""
 
-    Attributes:
-        azimuth: of the direction [rad].
-        aside: distance of its middle line from the z axis, counter-clockwise from the direction.
-        inner: where it begins, inside of what carries it.
-        first: where the slots begin.
-        low: its lower face.
-        high: its upper face.
-        half: of the room between the slots.
-        grooved: whether a groove takes the tie: of its upper face, or of the lower one where `below`.
-        below: see `grooved`.
-    """
-
-    azimuth: float
-    aside: float = 0.0
-    inner: float
-    first: float
-    low: float
-    high: float
-    half: float
-    grooved: bool = False
-    below: bool = False
+    azimuth: float  # of the direction [rad]
+    aside: float = 0.0  # distance of its middle line from the z axis, counter-clockwise from the direction
+    inner: float  # its start, inside of the part that carries it
+    first: float  # start of the slots
+    low: float  # its lower face
+    high: float  # its upper face
+    half: float  # half distance of the slots
+    grooved: bool = False  # whether the tie is in a groove of its upper face, or of the lower one if `below`
+    below: bool = False  # see `grooved`
 
     @property
     def last(self) -> float:
@@ -52,20 +38,20 @@ class TieSeat:
 
     @property
     def half_width(self) -> float:
-        """Half the width of the whole tongue."""
+        """Half the width of the entire tab."""
         return self.half + SLOT_ACROSS + SLOT_WALL
 
     def direction(self) -> Array:
-        """Outwards, shape (3,)."""
+        """Return the unit vector outwards, shape (3,)."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), 0.0])
 
     def points(self, along: Array, across: Array, z: Array) -> Array:
-        """Points at all of some places along, across and over it, shape (n, 3)."""
+        """Return the grid of points at places along, across and above it, shape (n, 3)."""
         x, y, height = (each.ravel() for each in np.meshgrid(along, across + self.aside, z, indexing="ij"))
         out = self.direction()
         return x[:, None] * out + y[:, None] * [-out[1], out[0], 0.0] + height[:, None] * [0.0, 0.0, 1.0]
 
     def corners(self, inner: float) -> Array:
-        """Corners of the tongue from a place outwards, shape (8, 3)."""
+        """Return corners of the tab from a place outwards, shape (8, 3)."""
         across = np.array([-self.half_width, self.half_width])
         return self.points(np.array([inner, self.end]), across, np.array([self.low, self.high]))

@@ -1,10 +1,8 @@
-"""What the screws of a joint can bear, how they are tightened, and what loosens them. No kernel: plain numbers.
+"""Strength, tightening torque and loosening of the screws of a joint. No kernel.
 
-Forces in N, stresses in MPa, lengths in mm, torques in N m. Screws are of stainless steel A2-70 (ISO 3506-1), nuts as
-strong as they. Friction counts for nothing: what is here holds with every screw loose in its thread.
+Forces in N, stresses in MPa, lengths in mm, torques in N m. Screws are stainless steel A2-70 (ISO 3506-1), with nuts as
+strong. Friction is neglected.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -16,33 +14,23 @@ PROOF_MPA = 450.0  # 0.2 % proof stress of A2-70, ISO 3506-1
 SHEARED = 0.577  # of a tension, von Mises
 PRELOAD = 0.5  # of the proof load, between metals
 NUT_FACTOR = 0.2  # torque over preload and diameter, dry: the usual estimate
-FLANKS = (
-    0.5  # of the cylinder at the nominal diameter that a thread shears off: cautious, makers' tables say 0.5 to 0.8
-)
+FLANKS = 0.5  # of the cylinder at the nominal diameter that a thread shears off: makers' tables state 0.5 to 0.8
 INSERT_N = 300.0  # pull-out of a heat-set insert: half of what its sellers measure for M3 in PLA, assumed
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """What a screw bears on, or holds on to.
+    """Material below a head or around a thread."""
 
-    Attributes:
-        name: in words.
-        strength_mpa: in tension, and under a head or behind a shank, for the moment of a shock.
-        pressure_mpa: under a head, that it keeps up for years.
-        plastic: whether it creeps.
-        source: of both numbers.
-    """
-
-    name: str
-    strength_mpa: float
-    pressure_mpa: float
-    plastic: bool
-    source: str
+    name: str  # for messages
+    strength_mpa: float  # in tension, and under a head or behind a shank, during a shock
+    pressure_mpa: float  # under a head, continuous
+    plastic: bool  # whether it creeps
+    source: str  # of both numbers
 
 
 PRINTED = Material(
-    "printed plastic", 40.0, 20.0, True, "PLA and PETG, makers' 45 to 60 MPa; what creep leaves of it, warm; assumed"
+    "printed plastic", 40.0, 20.0, True, "PLA and PETG, makers' 45 to 60 MPa; after creep, warm; assumed"
 )
 ALUMINIUM = Material("aluminium 6082-T6", 290.0, 200.0, False, "EN 755-2; pressure under heads, VDI 2230")
 STEEL = Material("steel", 360.0, 235.0, False, "S235, EN 10025-2")
@@ -55,38 +43,23 @@ MOULDED = Material(
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """One screw of a joint: how it is tightened, and what it bears before anything yields.
+    """Tightening and strength of one screw of a joint."""
 
-    Attributes:
-        engaged_mm: thread that holds.
-        needed_mm: thread that carries its preload one and a half times over; 0 if a nut or an insert holds it.
-        preload_n: that it is tightened to.
-        torque_nm: that tightens it.
-        pull_n: along its axis.
-        pull_by: what yields first.
-        push_n: across its axis.
-        push_by: what yields first.
-        loosens: what loosens it, and what to do about that.
-    """
-
-    engaged_mm: float
-    needed_mm: float
-    preload_n: float
-    torque_nm: float
-    pull_n: float
-    pull_by: str
-    push_n: float
-    push_by: str
-    loosens: str
+    engaged_mm: float  # engaged thread
+    needed_mm: float  # thread that carries 1.5 times its preload; 0 for a nut or an insert
+    preload_n: float  # of the tightened screw
+    torque_nm: float  # for this preload
+    pull_n: float  # strength along its axis
+    pull_by: str  # part that yields first
+    push_n: float  # strength across its axis
+    push_by: str  # part that yields first
+    loosens: str  # cause of loosening, and remedy
 
 
 def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
-    """One of a joint's screws; None for grub screws, which hold by friction.
+    """Return the strength of one of a joint's screws; None for grub screws, which hold by friction.
 
-    Args:
-        joint: the joint.
-        under: what its heads bear on.
-        into: what holds its threads; where that is a nut or an insert, what carries these.
+    `under` is the material below its heads, `into` that of its threads, or of the body that carries nuts or inserts.
     """
     if joint.fixing == "grub":
         return None
@@ -112,13 +85,14 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
     lasting = min(head * under.pressure_mpa, nut * into.pressure_mpa if joint.fixing == "trap" else math.inf)
     preload = min(PRELOAD * proof, lasting, min(pulls.values()) / 1.5)
     needed = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
-    pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": _wall(joint, under)}
+    behind = screw.nominal * joint.grip_mm * under.strength_mpa
+    pushes = {"the screw's shank": SHEARED * proof, f"{under.name} behind the shank": behind}
     pull_by, push_by = min(pulls, key=pulls.__getitem__), min(pushes, key=pushes.__getitem__)
     return Hold(
         engaged_mm=engaged,
         needed_mm=needed,
         preload_n=preload,
-        torque_nm=_two_digits(NUT_FACTOR * preload * screw.nominal / 1000),
+        torque_nm=float(f"{NUT_FACTOR * preload * screw.nominal / 1000:.2g}"),
         pull_n=pulls[pull_by],
         pull_by=pull_by,
         push_n=pushes[push_by],
@@ -128,7 +102,7 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
 
 
 def _under_head_mm2(joint: Joint, hole: float) -> float:
-    """What a head or its washer bears on: less the hole, or the strip of a slot that is longer than the head."""
+    """Return the contact area of a head or washer, less the hole or the slot."""
     head = joint.washer_mm or joint.screw.head_diameter
     disc = math.pi / 4 * head**2
     if joint.slot_mm is None:
@@ -138,22 +112,18 @@ def _under_head_mm2(joint: Joint, hole: float) -> float:
 
 
 def stress_area_mm2(screw: Screw) -> float:
-    """Stress area of its thread (ISO 898-1); the pitch of a coarse thread is what its core hole is smaller."""
+    """Return the stress area of a coarse thread (ISO 898-1)."""
     return math.pi / 4 * (screw.nominal - 0.9382 * (screw.nominal - screw.core)) ** 2
 
 
 def _strips(screw: Screw, engaged: float, into: Material) -> float:
-    """Pull that shears the thread off what holds it."""
+    """Return the pull that strips the thread."""
     return FLANKS * math.pi * screw.nominal * engaged * SHEARED * into.strength_mpa
-
-
-def _wall(joint: Joint, under: Material) -> float:
-    return joint.screw.nominal * joint.grip_mm * under.strength_mpa
 
 
 def _loosens(joint: Joint, under: Material, into: Material) -> str:
     if joint.protrudes_mm is not None:
-        return f"it is tightened by hand, and nothing but that holds it: look at the {joint.part} each time"
+        return f"it is only tightened by hand: check the {joint.part} before each use"
     creeps = "the plastic creeps: tighten once more after a day" if under.plastic or into.plastic else "vibration"
     if joint.inserts:
         return f"{creeps}; no threadlocker, it attacks plastics"
@@ -162,7 +132,3 @@ def _loosens(joint: Joint, under: Material, into: Material) -> str:
     if into.plastic:
         return f"{creeps}; no threadlocker, it attacks plastics"
     return f"{creeps}; a drop of medium threadlocker in the thread of the metal"
-
-
-def _two_digits(value: float) -> float:
-    return float(f"{value:.2g}")

@@ -1,1 +1,1 @@
-"""What a maker's model of a device gives for its product file: holes, body, window, horn; all of it unverified."""
+"""Values of a maker's model for a product file: holes, body, window, horn; all unverified."""

@@ -1,6 +1,4 @@
-"""Holes of a device: the walls of one axis joined, where they open, how deep they are, what screw fits. Millimetres."""
-
-from __future__ import annotations
+"""Holes of a device: walls of one axis joined, with mouth, depth and likely screw. Millimetres."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,10 +11,10 @@ from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
 from scanwright.design.scene.ray_caster import Scene, build_scene, cast
 
-CLOSED = 0.95  # share of the turn from which on a wall is a hole
-TIP = 0.6  # times the diameter: a surface as near beyond the wall is the hole's bottom (a drill's tip is 0.3)
-RIM_MM = 0.8  # beyond the wall, where the face about the mouth is looked for
-CHAMFER = 1.2  # times the diameter: as far a face can be from the end of the wall
+CLOSED = 0.95  # share of the full turn: least of the wall of a hole
+TIP = 0.6  # times the diameter: a surface so near beyond the wall is the hole's bottom (a drill's tip is 0.3)
+RIM_MM = 0.8  # beyond the wall, for detecting the face about the mouth
+CHAMFER = 1.2  # times the diameter: largest distance of that face from the end of the wall
 CORE_SHARE, CORE_MM = 0.02, 0.07  # of a modelled core from ISO 2306
 MODELLED_MM = 0.07  # of a thread that is modelled with its outer diameter
 PASSING = (0.07, 0.1, 0.2)  # a hole that a screw passes is wider by at least a, at most b + c times the screw
@@ -24,32 +22,21 @@ PASSING = (0.07, 0.1, 0.2)  # a hole that a screw passes is wider by at least a,
 
 @dataclass(frozen=True, slots=True)
 class Bore:
-    """A hole that opens to the outside.
+    """A hole that opens to the outside."""
 
-    Attributes:
-        mouth: middle of its mouth, in the face about it.
-        out: unit vector out of the device.
-        diameter: of its narrowest wall.
-        depth: from the face to the end of that wall.
-        free: height beyond the other end of a hole that goes through, inf if it opens to the outside; 0 if it is blind.
-        slot: length of a slot, 0 for a round hole.
-    """
-
-    mouth: tuple[float, float, float]
-    out: tuple[float, float, float]
-    diameter: float
-    depth: float
+    mouth: tuple[float, float, float]  # middle of its mouth, in the face about it
+    out: tuple[float, float, float]  # unit vector out of the device
+    diameter: float  # of its narrowest wall
+    depth: float  # from the face to the end of that wall
+    # height beyond the other end of a hole that goes through, inf if it opens to the outside; 0 if it is blind
     free: float
-    slot: float
+    slot: float  # length of a slot, 0 for a round hole
 
 
 def bores_of(triangles: Array, walls: Iterable[Wall], preferred: Sequence[float] = (0.0, 0.0, -1.0)) -> list[Bore]:
-    """Return the holes that open to the outside, in a fixed order.
+    """Return the holes that open to the outside, in a fixed order; corners of shape (t, 3, 3).
 
-    Args:
-        triangles: corners, shape (t, 3, 3).
-        walls: of the same mesh.
-        preferred: side that a hole through the device belongs to if both sides are alike.
+    A hole through the device opens on the side `preferred` if both sides are alike.
     """
     scene = build_scene(triangles)
     groups: dict[tuple[int, ...], list[Wall]] = {}
@@ -66,7 +53,7 @@ def _along_one_axis(scene: Scene, walls: list[Wall], preferred: Array) -> list[B
     walls = sorted(walls, key=lambda wall: wall.low + wall.high)
     axis = np.asarray(walls[0].axis)
     middles = np.array([wall.at((wall.low + wall.high) / 2) for wall in walls])
-    up, down = (cast(scene, middles, np.broadcast_to(way, middles.shape)).range_m for way in (axis, -axis))
+    up, down = (cast(scene, middles, np.broadcast_to(along, middles.shape)).range_m for along in (axis, -axis))
     runs: list[list[int]] = []
     for i, wall in enumerate(walls):
         below = walls[i - 1]
@@ -130,10 +117,10 @@ def _face(scene: Scene, wall: Wall, sign: int) -> float:
 
 
 def likely_screws(bore: Bore) -> list[tuple[str, str]]:
-    """Return kind of hole and size of screw, the likelier first; none if no screw fits.
+    """Return the kind of hole and size of screw, the likelier first; none if no screw fits.
 
-    A blind hole is taken for a thread, modelled by its core (ISO 2306) or by its outer diameter; an open one may also
-    pass a screw.
+    A blind hole is assumed to be a thread, modelled by its core (ISO 2306) or its outer diameter; a through hole may
+    also be a clearance hole.
     """
     d = bore.diameter
     sizes = [(s.core, s.name) for s in SCREWS.values() if abs(d - s.core) < CORE_MM + CORE_SHARE * s.nominal]

@@ -1,7 +1,5 @@
 """The files of a measured model: a proposal for a product file, and its picture."""
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 from dataclasses import dataclass
@@ -18,7 +16,7 @@ from scanwright.design.progress import Progress, no_progress
 
 @dataclass(frozen=True, slots=True)
 class MeasuredFiles:
-    """What was measured, and where it was written."""
+    """The proposal and its files."""
 
     proposal: Proposal
     toml: Path
@@ -43,7 +41,7 @@ def measure_files(
     unit: str | None = None,
     progress: Progress = no_progress,
 ) -> MeasuredFiles:
-    """Measure a maker's model; write the proposal and the picture.
+    """Measure a maker's model, and write the proposal and the picture.
 
     Args:
         model: STEP or STL file.

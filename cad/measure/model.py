@@ -1,12 +1,11 @@
 """A maker's model as triangles in the frame of its device. Millimetres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cadquery as cq
 import numpy as np
 
+from scanwright.cad.drawings.devices.outline import AXES
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.design.arrays import Array
 from scanwright.design.errors import SceneError
@@ -16,7 +15,6 @@ STEP_SUFFIXES = (".step", ".stp")
 CHORD_ERROR, CHORD_ANGLE = 0.05, 0.15  # mm, rad: 42 sides to a hole, their corners on the true circle
 SMALLEST_MM, LARGEST_MM = 5.0, 1000.0  # of a device
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
-FACES = {f"{sign}{axis}": (1 if sign == "+" else -1) * np.eye(3)[i] for i, axis in enumerate("xyz") for sign in "+-"}
 
 
 def read_model(path: Path, unit: str | None = None) -> Array:
@@ -76,5 +74,5 @@ def turned(triangles: Array, up: str, front: str) -> Array:
     """
     if up[1] == front[1]:
         raise SceneError(f"up = {up}, front = {front}: two different axes of the model")
-    z, x = FACES[up], FACES[front]
+    z, x = AXES[up], AXES[front]
     return np.asarray(triangles @ np.stack([x, np.cross(z, x), z], axis=1))

@@ -1,6 +1,4 @@
-"""The picture beside a proposal: silhouettes of the model with the proposed holes."""
-
-from __future__ import annotations
+"""The picture of a proposal: silhouettes of the model with the proposed holes."""
 
 from functools import cache
 

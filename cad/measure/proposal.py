@@ -1,6 +1,4 @@
-"""Values of a product file that a maker's model gives. All are unverified: a person compares them with the device."""
-
-from __future__ import annotations
+"""Values of a product file from a maker's model. All are unverified: a person compares them with the device."""
 
 import json
 import math
@@ -18,27 +16,20 @@ from scanwright.design.catalogue.catalogue import KINDS
 from scanwright.design.catalogue.holes import Hole
 from scanwright.design.errors import SceneError
 
-DEEP = 8.0  # times the diameter: a hole as deep is that of a screw that closes the case
+DEEP = 8.0  # times the diameter: such a deep hole is that of a case screw
 LEAST_TURN = 0.9  # of the wall of a horn
-OVERHANG_MM = 1.0  # from which on what is off centre is an ear of the body
+OVERHANG_MM = 1.0  # least overhang of an ear of the body
 SAME_MM = 0.1  # between holes of one pattern
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Values for a product file.
+    """Values for a product file."""
 
-    Attributes:
-        kind: of product.
-        values: by field.
-        notes: remarks for a person: other screws that a hole may be for, what was left out.
-        triangles: of the model in the frame of the device, corners [mm], shape (t, 3, 3).
-    """
-
-    kind: Literal["lidar", "servo"]
-    values: dict[str, Any]
-    notes: tuple[str, ...]
-    triangles: Array
+    kind: Literal["lidar", "servo"]  # of product
+    values: dict[str, Any]  # by field
+    notes: tuple[str, ...]  # remarks for a person: alternative screws of a hole, dropped holes
+    triangles: Array  # of the model in the frame of the device, corners [mm], shape (t, 3, 3)
 
     @property
     def holes(self) -> list[Hole]:
@@ -74,7 +65,7 @@ def propose(triangles: Array, kind: Literal["lidar", "servo"], origin: Sequence[
             notes += [note] if note else []
     values["holes"] = holes
     if dropped:
-        notes.append(f"left out, no screw M1.6 to M6 fits: {'; '.join(dropped)}")
+        notes.append(f"dropped, no screw M1.6 to M6 fits: {'; '.join(dropped)}")
     return Proposal(kind, values, tuple(dict.fromkeys(notes)), triangles - at)
 
 
@@ -112,14 +103,14 @@ def _face(out: tuple[float, float, float]) -> Any:
 
 
 _Measured = tuple[Array, dict[str, Any], list[str], list[Bore]]
-"""Origin of the device's frame, values, notes, and the holes that other values state."""
+"""Origin of the device's frame, values, notes, and the holes described by other values."""
 
 
 def _lidar(triangles: Array, _walls: list[Wall], _bores: list[Bore], origin: Array | None) -> _Measured:
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     window, notes = window_of(triangles), []
     if origin is None:
-        notes.append("the origin is below the middle of the window, on the lowest point: is that the base?")
+        notes.append("the origin is below the middle of the window, on the lowest point: check that this is the base")
         middle = (low + high)[:2] / 2 if window is None else np.asarray(window.axis)
         origin = np.array([*middle, low[2]])
     values: dict[str, Any] = {}
@@ -168,10 +159,8 @@ def _servo(triangles: Array, walls: list[Wall], bores: list[Bore], origin: Array
     points = triangles.reshape(-1, 3) - origin
     case_top = _case_top(triangles - origin, top - origin[2])
     case = points[points[:, 2] <= case_top + SAME_MM]
-    values["case_min_mm"], values["case_max_mm"] = (
-        _rounded(case.min(axis=0)),
-        _rounded([*case.max(axis=0)[:2], case_top]),
-    )
+    values["case_min_mm"] = _rounded(case.min(axis=0))
+    values["case_max_mm"] = _rounded([*case.max(axis=0)[:2], case_top])
     away = np.array([bore.mouth[:2] for bore in circle]) - origin[:2]
     turns = np.degrees(np.arctan2(-away[:, 0], away[:, 1])) % 360  # from +y, counter-clockwise from above
     step = 360 / len(circle)
@@ -217,7 +206,7 @@ def _circle_of_holes(bores: list[Bore], axis: Array, wall: Wall) -> list[Bore]:
         if bore.out[2] > 1 - 1e-4 and inside:
             key = (round(radius, 1), round(bore.mouth[2], 1), round(bore.diameter, 1))
             groups.setdefault(key, []).append(bore)
-    # of equally many the narrower ones: threads beside plain holes for the same screw
+    # of equally many the narrower ones: threads next to plain holes for the same screw
     return max(groups.values(), key=lambda group: (len(group), -group[0].diameter), default=[])
 
 
@@ -237,13 +226,7 @@ def _rounded(values: Sequence[float] | Array) -> list[float]:
 
 
 def toml_text(proposal: Proposal, model: str, digest: str) -> str:
-    """Return the lines for a product file; comments state what a person decides.
-
-    Args:
-        proposal: what was measured.
-        model: name of the file.
-        digest: SHA-256 of the file.
-    """
+    """Return the lines for a product file; `model` is the name of the file, `digest` its SHA-256."""
     source = f"measured by scanwright in {model} (sha256 {digest[:12]})"
     record = KINDS[proposal.kind]
     missing = [

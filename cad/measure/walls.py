@@ -1,4 +1,4 @@
-"""Cylinders in a mesh: walls of holes and of bosses, as far around as the mesh has them. Millimetres."""
+"""Cylinders in a mesh: walls of holes and bosses. Millimetres."""
 
 from __future__ import annotations
 
@@ -23,31 +23,21 @@ SECTORS = 72
 SAME_MM = 0.03  # between axes, radii and ends of one cylinder
 CORNER_MM = 1e-3  # between corners that are one
 LEAST_RADIUS_MM = 0.4  # of a screw's hole
-LEAST_PLANE = 0.005  # of the surface: directions of smaller planes are no axes
+LEAST_PLANE = 0.005  # of the surface: least plane whose normal is an axis
 
 
 @dataclass(frozen=True, slots=True)
 class Wall:
-    """A cylinder, or a slot with straight sides and two round ends.
+    """A cylinder, or a slot with straight sides and two round ends."""
 
-    Attributes:
-        axis: unit vector along it.
-        middle: point of its axis at height 0 along `axis`.
-        radius: of the cylinder, or of a slot's ends.
-        low: height of its lower end along `axis`.
-        high: of its upper end.
-        hole: whether the material is outside.
-        around: share of the full turn that the mesh has.
-        stretch: half the way between the middles of a slot's ends, as a vector; zero for a cylinder.
-    """
-
-    axis: tuple[float, float, float]
-    middle: tuple[float, float, float]
-    radius: float
-    low: float
-    high: float
-    hole: bool
-    around: float
+    axis: tuple[float, float, float]  # unit vector along it
+    middle: tuple[float, float, float]  # point of its axis at height 0 along `axis`
+    radius: float  # of the cylinder, or of a slot's ends
+    low: float  # height of its lower end along `axis`
+    high: float  # of its upper end
+    hole: bool  # whether the material is outside
+    around: float  # share of the full turn in the mesh
+    # half the vector between the middles of a slot's ends; zero for a cylinder
     stretch: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def at(self, height: float) -> Array:
@@ -84,11 +74,7 @@ class _Piece:
 
 
 def walls_of(triangles: Array) -> list[Wall]:
-    """Return the cylinders of a mesh along x, y, z and across its larger planes.
-
-    Args:
-        triangles: corners [mm], shape (t, 3, 3).
-    """
+    """Return the cylinders of a mesh along x, y, z and across its larger planes; corners [mm], shape (t, 3, 3)."""
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     twice_area = np.linalg.norm(across, axis=1)
     triangles, across, twice_area = (each[twice_area > 1e-9] for each in (triangles, across, twice_area))
@@ -98,7 +84,7 @@ def walls_of(triangles: Array) -> list[Wall]:
 
 
 def _axes(normals: Array, weights: Array) -> list[Array]:
-    """Return x, y, z, and the normals of larger planes that are none of them, opposite ones once."""
+    """Return x, y, z, and the other normals of larger planes, opposite ones once."""
     axes = list(np.eye(3))
     index = np.unique(np.round(normals, 2), axis=0, return_inverse=True)[1]
     shares = np.bincount(index.reshape(-1), weights) / weights.sum()
@@ -133,7 +119,7 @@ def _walls_along(triangles: Array, normals: Array, corners: NDArray[np.int64], a
 
 
 def _neighbours(corners: NDArray[np.int64], normals: Array) -> NDArray[np.int64]:
-    """Return pairs of facets that share an edge and go on smoothly."""
+    """Return pairs of facets that share a smooth edge."""
     edges = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     owner = np.repeat(np.arange(len(corners)), 3)
     order = np.lexsort(edges.T)

@@ -1,20 +1,18 @@
 """The window or head of a lidar in a mesh: its surfaces of revolution about an upright axis. Millimetres."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
 from scanwright.design.arrays import Array
 
-PLANE_SHARE = 0.03  # of the surface: facets in one plane as large are no part of a round window
-STEEP = 0.6  # most that the normal of a window rises
-ABOVE = 0.3  # share of the height that the middle of a window is above
-CELL_MM = 0.5  # in which meeting points are counted
-ON_AXIS_MM = 0.1  # that the normal of a facet misses the axis by
-TRIES = 4000  # pairs of normals; the axis is where most of the surface meets
-LEAST_SHARE = 0.01  # of the surface, that is round about the axis
+PLANE_SHARE = 0.03  # of the surface: facets in such a large plane are no part of a round window
+STEEP = 0.6  # largest z of the normal of a window
+ABOVE = 0.3  # of the height: least middle of a window
+CELL_MM = 0.5  # of the histogram of intersections
+ON_AXIS_MM = 0.1  # between the normal of a facet and the axis
+TRIES = 4000  # pairs of normals; most of them intersect at the axis
+LEAST_SHARE = 0.01  # of the surface, round about the axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +28,7 @@ class ScanWindow:
 def window_of(triangles: Array) -> ScanWindow | None:
     """Return the largest band that is round about an upright axis, in the upper part; None if there is none.
 
-    Args:
-        triangles: corners with z up [mm], shape (t, 3, 3).
+    Corners with z up [mm], shape (t, 3, 3).
     """
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
     area = np.linalg.norm(across, axis=1)

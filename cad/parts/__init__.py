@@ -1,1 +1,4 @@
-"""One file per printed or turned part: its shape and what is to know of it. Rotation frame, millimetres."""
+"""One file per printed or turned part: its shape and description. Rotation frame, millimetres.
+
+Functions that make a solid raise BuildError if a step does not give one valid solid.
+"""

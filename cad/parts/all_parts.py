@@ -1,7 +1,5 @@
 """Every part that a scanner may have, in the order of their drawing numbers: a new part is listed here."""
 
-from __future__ import annotations
-
 from scanwright.cad.layout.layout import Layout, layout_of
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.linkage.alignment_linkage import linkage_spec
@@ -49,7 +47,7 @@ SPECS = (
 
 
 def parts_of(place: Placement) -> list[PartSpec | LeftOut]:
-    """The parts that one scanner needs, and those that it does not, with the reason."""
+    """Return the parts that one scanner needs, and those that it does not, with the reason."""
     return [part for spec_of in SPECS if (part := spec_of(place)) is not None]
 
 

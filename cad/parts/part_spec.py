@@ -1,7 +1,5 @@
 """The description of a made part: its shape, joints, space, steps, rows of lists, and what shapes it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -29,57 +27,37 @@ HORN = (
     "servo.horn_first_hole_deg",
     "servo.horn_screw",
 )
-ON_CASE = (
-    "servo.case_max_mm",
-    "servo.holes",
-    "servo.horn_diameter_mm",
-    "servo.horn_thickness_mm",
-)
-SEATED = "the hub sits on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
+ON_CASE = ("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm", "servo.horn_thickness_mm")
+SEATED = "the hub is on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 TURNED_FROM = "aluminium EN AW-6082-T6"
 
 
 def to_centre(servo: Servo) -> str:
     """Return the sentence of a step that turns the servo to the centre of its encoder."""
     counts = 2 ** round(math.log2(servo.position_feedback_deg / servo.position_step_deg))
-    where = f"position {counts // 2} of {counts}"
-    return f"Connect the servo and turn it to its centre ({where}) with `scanwright servo-setup PORT --centre`."
+    centre = f"position {counts // 2} of {counts}"
+    return f"Connect the servo and turn it to its centre ({centre}) with `scanwright servo-setup PORT --centre`."
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step of putting a scanner together.
-
-    Attributes:
-        title: of it.
-        words: with marks of `cad/layout/joints.py` for screws.
-        check: what must be so before one goes on.
-        brings: bought products without a step of their own that come with it.
-    """
+    """One assembly step."""
 
     title: str
-    words: str
-    check: str = ""
-    brings: tuple[str, ...] = ()
+    words: str  # with marks of `cad/layout/joints.py` for screws
+    check: str = ""  # condition to check before the next step
+    brings: tuple[str, ...] = ()  # bought products without a step of their own that come with it
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of the parts list.
-
-    Attributes:
-        kind: of the row.
-        estimate: name of its price in `cad/files/prices.py`.
-        part: what it is, with its size.
-        source: of the row.
-        note: on it.
-    """
+    """One row of the parts list."""
 
     kind: Literal["consumable", "wiring", "tool"]
-    estimate: str
-    part: str
+    estimate: str  # name of its price in `cad/files/prices.py`
+    part: str  # name and size
     source: str
-    note: str = ""
+    note: str = ""  # for the buyer
 
 
 CRIMPS = Row("tool", "crimping pliers", "crimping pliers", "assembly.md", "for the leads")
@@ -87,50 +65,30 @@ CRIMPS = Row("tool", "crimping pliers", "crimping pliers", "assembly.md", "for t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartSpec:
-    """One part of one scanner, described before it is made: `make` alone needs the kernel.
+    """One part of one scanner, described before it is made: `make` alone needs the kernel."""
 
-    Attributes:
-        name: of `cad/layout/names.py`.
-        turns: whether it turns about the rotation axis, or stands still.
-        make: its solid, rotation frame at gamma = 0, mm; raises BuildError.
-        step: that puts it in; None if that of what it sits on does.
-        after: part or product whose step it follows, unless the drive lists it in `built`.
-        process: how it is made.
-        material: what it is made from, where that is not what the printer prints.
-        work: what else is done to it.
-        why_metal: why no printer makes it.
-        sheet: what its drawing says beyond its shape.
-        shaped_by: fields of products, as "kind.field", that shape it.
-        shapes: fields that shape something else, and what, in words: these go before any part.
-        angles: those that shape it and stand on its label.
-        seat: height in the laser frame of its face towards the lidar; None where it does not carry the lidar.
-        lifted: along what the exploded view moves it.
-        sweep: what it fills if it turns about another axis.
-        joints: what it is screwed to.
-        avoid: convex shapes that cables must stay clear of.
-        rows: small things that it needs, for the parts list.
-        steps: of products that are put in with it, and of parts that sit on it: these go before their own.
-    """
-
-    name: str
-    turns: bool
-    make: Callable[[], cq.Solid]
-    step: Step | None = None
-    after: str = ""
-    process: Process = "printed"
-    material: str = ""
-    work: str = ""
-    why_metal: str = ""
-    sheet: OnSheet = field(default_factory=OnSheet)
-    shaped_by: tuple[str, ...] = ()
+    name: str  # of `cad/layout/names.py`
+    turns: bool  # whether it turns about the rotation axis
+    make: Callable[[], cq.Solid]  # its solid, rotation frame at gamma = 0, mm; raises BuildError
+    step: Step | None = None  # that adds it; None if another part has its step
+    after: str = ""  # part or product whose step it follows, unless the drive lists it in `built`
+    process: Process = "printed"  # of making it
+    material: str = ""  # if it is not printed
+    work: str = ""  # further work
+    why_metal: str = ""  # why it is not printed
+    sheet: OnSheet = field(default_factory=OnSheet)  # further data of its drawing
+    shaped_by: tuple[str, ...] = ()  # fields of products, as "kind.field", that shape it
+    # fields that shape something else, with its description; they precede `shaped_by` of any part
     shapes: Mapping[str, str] = field(default_factory=dict)
-    angles: Literal["none", "rot", "laser"] = "none"
+    angles: Literal["none", "rot", "laser"] = "none"  # those that shape it and are on its label
+    # height in the laser frame of its face towards the lidar; None if it does not carry the lidar
     seat: float | None = None
-    lifted: Literal["axis", "radius", "lidar", "deck"] = "axis"
-    sweep: Callable[[], cq.Solid] | None = None
-    joints: tuple[Joint, ...] = ()
-    avoid: tuple[Shape, ...] = ()
-    rows: tuple[Row, ...] = ()
+    lifted: Literal["axis", "radius", "lidar", "deck"] = "axis"  # direction of its motion in the exploded view
+    sweep: Callable[[], cq.Solid] | None = None  # its swept solid if it turns about another axis
+    joints: tuple[Joint, ...] = ()  # its screws
+    avoid: tuple[Shape, ...] = ()  # convex shapes that cables must stay clear of
+    rows: tuple[Row, ...] = ()  # small parts and tools, for the parts list
+    # of products inserted with it, and of parts on it: these precede their own
     steps: Mapping[str, Step] = field(default_factory=dict)
 
     @property
@@ -140,20 +98,20 @@ class PartSpec:
 
     @property
     def frame(self) -> Literal["servo", "rot"]:
-        """That it moves with."""
+        """Frame that it moves with."""
         return "rot" if self.turns else "servo"
 
     @property
     def metal(self) -> bool:
-        """Whether no printer makes it."""
+        """Whether it is of metal, not printed."""
         return self.process != "printed"
 
     def values_of(self, product: Product) -> tuple[str, ...]:
-        """Return the fields of a product that shape this part, or something that comes with it."""
+        """Return the fields of a product that shape this part, or one that it states in `shapes`."""
         kind = f"{product.kind}."
         return tuple(field.removeprefix(kind) for field in (*self.shaped_by, *self.shapes) if field.startswith(kind))
 
     def density_g_cm3(self, printer: Printer) -> float:
-        """Density of its material."""
+        """Return the density of its material."""
         densities = {"printed": printer.density_g_cm3, "turned": ALUMINIUM_G_CM3, "sawn": STEEL_G_CM3}
         return densities[self.process]

@@ -1,1 +1,1 @@
-"""How far parts bend under their load: finite elements for the printed parts, beam elements for the shaft."""
+"""Deformation of parts under load: finite elements for the printed parts, beam elements for the shaft."""

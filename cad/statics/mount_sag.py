@@ -1,10 +1,8 @@
-"""How far a mount gives way under all that it carries: finite elements on two grids, as `sag` has them.
+"""Deformation of a mount under its load: finite elements on two grids, as in `sag`.
 
-The deck is taken for rigid, and holds the foot under the washers of its screws alone: that it lies on the deck beside
-them makes it stiffer, by an unknown amount. Grids lie along the deck, whose face is a face of theirs.
+The deck is rigid and holds the foot under the washers of its screws alone; contact elsewhere makes it stiffer, by an
+unknown amount. A face of the grid is on the deck.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -29,38 +27,22 @@ INSIDE = 0.05  # mm below a face: points on it are in cells of the part
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What a mount carries, and where.
+    """What a mount carries, and where."""
 
-    Attributes:
-        mass_kg: of all of it.
-        centre_m: of all of it, rotation frame.
-        down: unit vector of gravity, rotation frame.
-        seat_mm: radius of the faces around the holes that it lies on.
-        washer_mm: radius of the washers under the heads of the deck's screws.
-    """
-
-    mass_kg: float
-    centre_m: Array
-    down: Array
-    seat_mm: float
-    washer_mm: float
+    mass_kg: float  # of all of it
+    centre_m: Array  # of all of it, rotation frame
+    down: Array  # unit vector of gravity, rotation frame
+    seat_mm: float  # radius of the faces around the holes that it lies on
+    washer_mm: float  # radius of the washers under the heads of the deck's screws
 
 
 def mount_sag(
     mesh: TriMesh, deck: Deck, mounted: Mounted, carried: Carried, modulus_mpa: float, density_g_cm3: float
 ) -> tuple[Array, Array, Spring]:
-    """Return how the mount gives way under what it holds.
+    """Return the deformation of the mount, a mesh in the rotation frame [mm], under its load.
 
-    Rotation [rad] on the finer grid, and what finer ones would add, rotation frame, shapes (3,); the mount as a spring
-    between deck and servo.
-
-    Args:
-        mesh: of the mount, rotation frame [mm].
-        deck: where it lies.
-        mounted: what it holds.
-        carried: the load.
-        modulus_mpa: of the material.
-        density_g_cm3: of the material.
+    Rotation [rad] on the finer grid, and its error, rotation frame, shapes (3,); the mount as a spring between deck and
+    servo.
 
     Raises:
         RuntimeError: nothing holds the mount.
@@ -95,7 +77,7 @@ def _on_grid(
 
 
 def _grid(triangles: Array, edge: float) -> Grid:
-    """Grid around all triangles, with a face at the deck's height."""
+    """Return a grid around all triangles, with a face at the deck's height."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     middle = (low + high) / 2
     cells = np.maximum(np.ceil((high - low) / edge), 1).astype(int)
@@ -105,7 +87,7 @@ def _grid(triangles: Array, edge: float) -> Grid:
 
 
 def _discs(holes: Array, height: float, radius: float, hole: float) -> Array:
-    """Points of rings around some holes, shape (n, 3)."""
+    """Return points of rings around some holes, shape (n, 3)."""
     along = np.arange(-radius + STEP / 2, radius, STEP)
     x, y = (each.ravel() for each in np.meshgrid(along, along, indexing="ij"))
     ring = (np.hypot(x, y) < radius) & (np.hypot(x, y) > hole)

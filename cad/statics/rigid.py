@@ -1,6 +1,4 @@
-"""Forces on many points as one, and one rotation of many points: a rigid body lies on them."""
-
-from __future__ import annotations
+"""Forces of a rigid body on many points, and the rigid motion that fits many points."""
 
 import numpy as np
 
@@ -16,7 +14,7 @@ def shared(points: Array, force: Array, moment: Array) -> Array:
 
 
 def rigid(points: Array, moved: Array) -> tuple[Array, Array]:
-    """Displacement of the origin and rotation (3, cases) that fit the moved points best."""
+    """Return the displacement of the origin and rotation (3, cases) that fit the moved points best."""
     middle = points.mean(axis=0)
     arms = points - middle
     turned = np.cross(arms[:, None], moved.transpose(0, 2, 1), axis=2).sum(axis=0).T
@@ -25,5 +23,5 @@ def rigid(points: Array, moved: Array) -> tuple[Array, Array]:
 
 
 def _second_moments(arms: Array) -> Array:
-    """Second moments of unit masses, shape (3, 3)."""
+    """Return the second moments of unit masses, shape (3, 3)."""
     return np.asarray((arms**2).sum() * np.eye(3) - arms.T @ arms)

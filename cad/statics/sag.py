@@ -1,12 +1,10 @@
-"""How far gravity moves and turns the lidar against the horn, for gravity along each axis of the rotation frame.
+"""Displacement of the lidar by gravity along each axis of the rotation frame.
 
-The printed parts between shaft and lidar by finite elements on two grids, the shaft as a beam. Linkage and
-sub-plate are one body, bonded to the spigot all around; the lidar lies on its seat and stiffens nothing. Grids lie
-along the laser frame: its seat is a face of theirs. Where a gap is narrower than a cell, the cell bridges it: the two
-grids then differ much, and the error says so.
+The printed parts between shaft and lidar by finite elements on two grids, the shaft as a beam. Linkage and sub-plate
+are one body, bonded to the spigot; the lidar rests on its seat without stiffening it. Grids are along the laser frame:
+the seat is a face of theirs. A cell bridges gaps narrower than itself; the two grids then differ, and the error
+includes it.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +13,7 @@ import numpy as np
 
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.hub import SPIGOT, Hub
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.rigid import rigid, shared
@@ -32,44 +30,30 @@ STEP = 1.0  # mm, between points of seat and spigot
 
 @dataclass(frozen=True, slots=True)
 class Sag:
-    """Columns belong to gravity along x, y and z of the rotation frame, shape (3, 3) each.
+    """Columns belong to gravity along x, y and z of the rotation frame, shape (3, 3) each."""
 
-    Attributes:
-        rotation_rad: of the lidar, rotation vectors.
-        shift_m: of the optical centre.
-        rotation_error_rad: of the finite elements, with its sign.
-        shift_error_m: likewise.
-        spring: the same parts as a spring between hub and lidar.
-    """
-
-    rotation_rad: Array
-    shift_m: Array
-    rotation_error_rad: Array
-    shift_error_m: Array
-    spring: Spring
+    rotation_rad: Array  # of the lidar, rotation vectors
+    shift_m: Array  # of the optical centre
+    rotation_error_rad: Array  # of the finite elements, with its sign
+    shift_error_m: Array  # likewise
+    spring: Spring  # the same parts as a spring between hub and lidar
 
 
 def linkage_sag(
     stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus_mpa: float, density_g_cm3: float
 ) -> Sag:
-    """Sag of the printed parts alone.
+    """Return the sag of linkage and sub-plate, meshes in the rotation frame [mm].
 
-    Args:
-        stack: the layout.
-        meshes: linkage, and sub-plate where there is one; rotation frame [mm].
-        seat: half width, half depth and height of the lidar's seat, laser frame [mm].
-        lidar: in the laser frame.
-        modulus_mpa: of the material.
-        density_g_cm3: of the material.
+    `seat` is half width, half depth and height of the lidar's seat [mm], `lidar` its body, both in the laser frame.
     """
     coarse, fine = (_on_grid(edge, stack, meshes, seat, lidar, modulus_mpa, density_g_cm3) for edge in EDGES)
-    # what is left of an error that falls with the edge: the elements gain more, corners and edges no less
+    # remaining error if it falls linearly with the edge: that of the elements falls faster, of corners as fast
     errors = [(b - a) / (EDGES[0] / EDGES[1] - 1) for a, b in zip(coarse[:2], fine[:2], strict=True)]
     return Sag(fine[0], fine[1], errors[0], errors[1], fine[2])
 
 
 def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
-    """Sag of linkage and shaft, which the whole rotor bends."""
+    """Return the sag of linkage and shaft, which the entire rotor bends."""
     end = np.array([0.0, 0.0, stack.hub_bottom / 1000])
     turned, shifted = [], []
     for along in np.eye(3):
@@ -86,13 +70,7 @@ def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
 
 
 def _on_grid(
-    edge: float,
-    stack: Hub,
-    meshes: Sequence[TriMesh],
-    seat: Array,
-    lidar: Inertial,
-    modulus: float,
-    density: float,
+    edge: float, stack: Hub, meshes: Sequence[TriMesh], seat: Array, lidar: Inertial, modulus: float, density: float
 ) -> tuple[Array, Array, Spring]:
     """Return rotation [rad] and shift [m] of one grid, and the spring, rotation frame."""
     R = stack.R()
@@ -117,7 +95,7 @@ def _on_grid(
 
 
 def _grid(triangles: Array, edge: float, seat: float) -> Grid:
-    """Grid around all triangles, with a face at the seat's height, symmetric about the lidar's axis."""
+    """Return a grid around all triangles, with a face at the seat's height, symmetric about the lidar's axis."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     start = np.array([0.0, 0.0, seat])
     before, beyond = (np.ceil((start - low) / edge), np.ceil((high - start) / edge))
@@ -126,8 +104,8 @@ def _grid(triangles: Array, edge: float, seat: float) -> Grid:
 
 
 def _spigot(stack: Hub) -> tuple[Array, float]:
-    """Points all around the shaft in the hub, and the area, rotation frame."""
-    radius, length = stack.shaft_diameter / 2, stack.spigot
+    """Return points all around the shaft in the hub, rotation frame, and the area."""
+    radius, length = stack.shaft_diameter / 2, SPIGOT
     rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))
     z = stack.shoulder + (np.arange(rows) + 0.5) / rows * length
     angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, z)
@@ -136,7 +114,7 @@ def _spigot(stack: Hub) -> tuple[Array, float]:
 
 
 def _seat(grid: Grid, body: Array, seat: Array) -> tuple[Array, Array]:
-    """Middles of the cubes' faces at the seat's height, and which of them the lidar lies on."""
+    """Return middles of the cubes' faces at the seat's height, and which of them support the lidar."""
     level = round((float(seat[2]) - float(grid.low[2])) / grid.edge) * grid.parts
     x, y = np.meshgrid(grid.middles(0), grid.middles(1), indexing="ij")
     lies = (body[:, :, level - 1] > 0.5) & (np.abs(x) < seat[0]) & (np.abs(y) < seat[1])

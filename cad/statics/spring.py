@@ -1,10 +1,8 @@
-"""A printed part between two rigid bodies as one spring with a mass: six displacements, by finite elements.
+"""A printed part between two rigid bodies as a spring with a mass: six displacements, by finite elements.
 
 Displacements and loads are six numbers at the origin of the rotation frame: a rotation [rad] before a shift [m], a
-moment [N m] before a force [N]. One origin for all springs: compliances of springs in a row simply add up.
+moment [N m] before a force [N]. With one origin, compliances of springs in a row add up.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
@@ -20,22 +18,16 @@ MOMENT_FIRST, FORCE_LAST = np.eye(6)[:3], np.eye(6)[3:]  # of six unit loads, sh
 
 @dataclass(frozen=True, slots=True)
 class Spring:
-    """What lies between two rigid bodies.
+    """A spring between two rigid bodies.
 
     With q the displacement of the first body and e that of the second one against it, the kinetic energy of the spring
     is that of the mass matrix ((rigid, coupled), (coupled.T, own)) for the speeds of (q, e): Guyan's reduction.
-
-    Attributes:
-        compliance: displacement of the second body against the first one by a load on it, shape (6, 6).
-        rigid: mass matrix if it moves as a rigid body, shape (6, 6).
-        coupled: of rigid movement and deformation, shape (6, 6).
-        own: of its deformation, shape (6, 6).
     """
 
-    compliance: Array
-    rigid: Array
-    coupled: Array
-    own: Array
+    compliance: Array  # displacement of the second body against the first one by a load on it, shape (6, 6)
+    rigid: Array  # mass matrix if it moves as a rigid body, shape (6, 6)
+    coupled: Array  # of rigid movement and deformation, shape (6, 6)
+    own: Array  # of its deformation, shape (6, 6)
 
 
 def of_shaft(bend: ShaftBend, end_mm: float) -> Spring:

@@ -1,10 +1,8 @@
-"""Vibration of rigid bodies in a row on springs: natural frequencies, and the answer to a force that turns.
+"""Vibration of rigid bodies in a row on springs: natural frequencies, and the response to a rotating force.
 
-The bodies are numbered from the deck; body i lies on spring i, which lies on body i - 1 or on the deck. The unknowns
-are the springs' deformations, six each (`spring.py`): the stiffness is block-diagonal, and nothing is inverted twice.
+The bodies are numbered from the deck; body i is on spring i, which is on body i - 1 or on the deck. The unknowns are
+the springs' deformations, six each (`spring.py`): the stiffness is block-diagonal.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass

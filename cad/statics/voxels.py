@@ -1,6 +1,4 @@
-"""How much of each small cube of a grid a closed mesh fills: rays along z, in and out by the surface's normals."""
-
-from __future__ import annotations
+"""Filled share of each small cube of a grid in a closed mesh: rays along z, in and out by the surface's normals."""
 
 from dataclasses import dataclass
 
@@ -16,22 +14,15 @@ PAST_M = 1e-7  # beyond a surface that was hit
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Cubic cells, each of `parts` cubes along an edge.
+    """Cubic cells, each of `parts` cubes along an edge."""
 
-    Attributes:
-        low: corner of the first cell [mm], shape (3,).
-        edge: of a cell [mm].
-        shape: cells along x, y, z.
-        parts: cubes along the edge of a cell.
-    """
-
-    low: Array
-    edge: float
-    shape: tuple[int, int, int]
-    parts: int
+    low: Array  # corner of the first cell [mm], shape (3,)
+    edge: float  # of a cell [mm]
+    shape: tuple[int, int, int]  # cells along x, y, z
+    parts: int  # cubes along the edge of a cell
 
     def middles(self, axis: int) -> Array:
-        """Middles of the cubes along one axis [mm]."""
+        """Return middles of the cubes along one axis [mm]."""
         return self.low[axis] + self.edge * (np.arange(self.shape[axis] * self.parts) + 0.5) / self.parts
 
 

@@ -281,7 +281,7 @@ def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -
 
 def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progress: Progress) -> PartsMade:
     """Write the parts with their labels into the folder."""
-    parts = build_parts(scanner, folder, progress, lambda _: assembly.open())
+    parts = build_parts(scanner, assembly.open(), folder, progress)
     return PartsMade(parts.parts, parts.findings, parts.left_out, Packed.of(parts))
 
 

@@ -21,7 +21,7 @@ def built_once(once, parts_of):
 
     def build(scanner):
         def made(folder):
-            return folder, build_parts(scanner, folder, no_progress, anywhere)
+            return folder, build_parts(scanner, anywhere(scanner), folder, no_progress)
 
         return once(f"files of parts {scanner}", made)
 

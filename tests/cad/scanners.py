@@ -5,7 +5,7 @@ from dataclasses import replace
 from scanwright.cad.layout import layout
 from scanwright.cad.layout.deck import deck_of
 from scanwright.cad.layout.placement import drive_of
-from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, linkage_body_of
+from scanwright.cad.layout.rotor.linkage import linkage_body_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import NO_MODULES, scanner_of
@@ -55,7 +55,7 @@ def mount_offset_mm(scanner):
 def bare_linkage(scanner):
     """The linkage without ear and seats of cable ties."""
     drive = drive_of(scanner)
-    return AlignmentLinkage.on(linkage_body_of(scanner, drive.envelope, drive.stack))
+    return linkage_body_of(scanner, drive.envelope, drive.stack)
 
 
 def avoided(parts, *, turns):

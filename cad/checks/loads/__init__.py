@@ -1,1 +1,1 @@
-"""What each drive bears, as checks."""
+"""Loads on each drive, as checks."""

@@ -1,6 +1,4 @@
-"""Whether the mount holds its angle about the axis: friction of its clamp, and what a slip could change at most."""
-
-from __future__ import annotations
+"""Whether the mount keeps its angle about the axis: friction of its clamp, and the largest slip."""
 
 import math
 
@@ -26,8 +24,8 @@ FRICTION = 0.15  # of plastic on metal or plastic, dry: the low end of what is m
 def angle_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
     """Check the friction of hub on shaft against HELD_G on the imbalance and the drag of the ring.
 
-    The screws pull the hub's bore against the shaft, with a preload that the plastic keeps up for years, also when it
-    is warm (`tightening.PRINTED`). What their heads rub on the hub counts for nothing: a screw bends before it slips.
+    The screws press the hub's bore onto the shaft, with the preload that creep leaves (`tightening.PRINTED`). Friction
+    under their heads is neglected.
     """
     layout = assembly.layout
     joint = next(each for each in layout.joints if (each.part, each.onto) == (ALIGNMENT_LINKAGE, layout.drive.shaft))
@@ -47,7 +45,7 @@ def angle_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
 
 
 def slip_deg(linkage: AlignmentLinkage, joint: Joint) -> float:
-    """Return how far the hub turns on its shaft before the flat or a screw's shank stops it, from one end to the other.
+    """Return the backlash of the hub on its shaft [deg], limited by the flat or by the shanks of the screws.
 
     The flat's edges meet the wall of the bore, or the shanks that of their holes.
     """

@@ -1,7 +1,5 @@
 """Loads on bearings, belt and servo horn of the belt drive against their ratings, and the angle error of the belt."""
 
-from __future__ import annotations
-
 import math
 
 from scanwright.cad.checks.limits import at_most, horn_check, note, tidy
@@ -17,14 +15,7 @@ from scanwright.design.scanner import Scanner
 
 
 def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float) -> list[Finding]:
-    """Check bearings, belt, horn, and the angle between servo and axis; no finding without a belt.
-
-    Args:
-        layout: of the scanner.
-        rotor: all that turns.
-        weight: of it.
-        torque: largest torque of the servo in operation [N m].
-    """
+    """Check bearings, belt, horn and angle at the largest torque of the servo [N m]; no finding without a belt."""
     scanner, stack = layout.scanner, layout.drive.of(BeltStack)
     if stack is None:
         return []

@@ -6,8 +6,6 @@ mount), a part that is constant in the world (an error of the axis), and a rest 
 and deck are rigid here: the lean of the mount is in `mount`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -45,13 +43,7 @@ def deflection_checks(
 ) -> tuple[list[Finding], Spring | None]:
     """Check the constant part, which a calibration estimates, and the part that changes over a turn.
 
-    Also returns what lies between hub and lidar as a spring, if it supports the lidar.
-
-    Args:
-        scanner: angles and products.
-        assembly: its parts.
-        bodies: of `masses.link_bodies`.
-        meshes: of all parts.
+    Also returns the parts between hub and lidar as a spring, if they support the lidar; bodies of `masses.link_bodies`.
     """
     down = -scanner.angles.T_world_rot(0.0)[2, :3]
     limit = noise_deg(scanner)

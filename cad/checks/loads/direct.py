@@ -4,8 +4,6 @@ The shaft bends as a beam; the cage is a spring whose stiffness is known within 
 The bend of the linkage is in `deflection.py`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -43,7 +41,7 @@ def _forces(
 
 
 def _axial(scanner: Scanner, weight: Weight) -> Finding:
-    """Check the load along the servo's axis: at work the weight, in a shock along the axis SHOCK_G times all of it."""
+    """Check the load along the servo's axis: the weight in operation, SHOCK_G times it in a shock."""
     servo, shock_n = scanner.servo, SHOCK_G * math.hypot(weight.across_n, weight.along_n)
     what = f"load along the axis of {servo.name}, {figures(shock_n)} N in a shock of {SHOCK_G:g} g along it"
     check = rated("axial_load", weight.along_n, servo.axial_load_n, "N", SERVO, what)
@@ -54,7 +52,7 @@ def _axial(scanner: Scanner, weight: Weight) -> Finding:
 
 
 def _horn(scanner: Scanner, cage: BearingCage | None, weight: Weight, shared: Supported) -> Finding:
-    """Check the horn: without a bearing under the weight alone, with one also under every misalignment."""
+    """Check the horn under the weight, and with a bearing also under every misalignment."""
     servo, rating = scanner.servo, rated_moment_nm(scanner)
     if cage is None:
         hint = "support the shaft with a bearing near the hub; none of the catalogue fits it"

@@ -1,6 +1,4 @@
-"""Torques that the weight of all that turns requires of the servo, and the backlash of its gears. SI units."""
-
-from __future__ import annotations
+"""Torques that the rotor's weight requires of the servo, and the backlash of its gears. SI units."""
 
 import math
 from collections.abc import Mapping
@@ -23,12 +21,7 @@ BALANCE_AT_MM = 50.0  # from the axis, for which the message states a counterwei
 
 
 def mechanics_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Finding]:
-    """Check torques, backlash and loads.
-
-    Args:
-        layout: of the scanner.
-        bodies: of `masses.link_bodies`.
-    """
+    """Check torques, backlash and loads; bodies of `masses.link_bodies`."""
     scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
     error_m = off_axis_error_m(bodies)
@@ -67,9 +60,9 @@ def spin_up_nm(scanner: Scanner, rotor: Inertial, weight: Weight) -> float:
 
 
 def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, error_m: float) -> Finding:
-    """Check whether gravity moves the load from one flank of the gears to the other, through their backlash.
+    """Check whether gravity moves the load from one flank of the gears to the other.
 
-    The friction of ring and bearing keeps one flank: the least that the catalogue states.
+    The least friction of ring and bearing that the catalogue states keeps the flank.
     """
     rubs = friction_nm(scanner)[0]
     servo, torque, error = scanner.servo, weight.across_n * weight.off_axis_m, weight.across_n * error_m

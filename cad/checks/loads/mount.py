@@ -1,10 +1,7 @@
-"""Lean of the mount under all that it carries: an error of the scanner's pose that no cloud shows by itself.
+"""Lean of the mount under its load: an error of the scanner's pose that no cloud shows.
 
-It is the same in every position of the servo (to 0.0001 deg, `benchmarks.cad.elements`), so it changes no cloud's
-shape.
+It is the same in every position of the servo (to 0.0001 deg, `benchmarks.cad.elements`).
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping

@@ -1,13 +1,10 @@
 """Strength of every joint between lidar and deck. SI units.
 
-Each joint is removed in turn: the bodies that then have no path to the deck hang on it. They load it with SHOCK_G times
-their weight, in the direction that is worst for each screw; friction and preload carry nothing. Screws share a force
-equally and carry a moment as a group of equal springs; radial screws of a hub or a boss carry no moment, their fit
-does; a single screw keeps a foot from tipping over its edge. A joint that yields fails; a margin below LEAST_MARGIN is
-a warning.
+Each joint is removed in turn: the bodies that then have no path to the deck load it with SHOCK_G times their weight, in
+the worst direction for each screw; friction and preload are neglected. Screws share a force equally and carry a moment
+as a group of equal springs; radial screws of a hub or a boss carry no moment, their fit does; a single screw keeps a
+foot from tipping over its edge. A joint that yields fails; a margin below LEAST_MARGIN is a warning.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.masses import lidar_body
 from scanwright.cad.checks.limits import at_least, tidy
 from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
 from scanwright.cad.geometry import inertia
@@ -51,7 +49,7 @@ def material_of(assembly: Assembly, body: str) -> Material:
 
 
 def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
-    """Return the parts and products that have no path to the deck but through a joint."""
+    """Return the parts and products whose only path to the deck is a joint."""
     layout = assembly.layout
     links = [(assembly.thing(other.part), assembly.thing(other.onto)) for other in layout.joints if other != joint]
     links += layout.drive.borne
@@ -64,7 +62,8 @@ def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
 
 
 def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Finding]:
-    both, subject, hanging = f"{joint.part} on {joint.onto}", _subject(joint), hanging_on(assembly, joint)
+    both, hanging = f"{joint.part} on {joint.onto}", hanging_on(assembly, joint)
+    subject = f"{joint.part} and {joint.onto}"  # as the pictures of a report name them
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     carries = LIDAR in hanging
     if hold is None:
@@ -76,12 +75,7 @@ def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Fi
         message = f"{both}: the lidar hangs on threads in bare plastic, which creeps"
         yield Finding("retention", "error", subject, message, hint="use nuts or inserts")
     yield _margin(scanner, assembly, joint, hold, hanging)
-    yield _screws(joint, hold)
-
-
-def _subject(joint: Joint) -> str:
-    """Return both sides of a joint, as the pictures of a report name them."""
-    return f"{joint.part} and {joint.onto}"
+    yield _screws(joint, hold, subject)
 
 
 def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Finding:
@@ -99,7 +93,7 @@ def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hang
     return replace(check, severity="warning") if 1 <= margins[first] < LEAST_MARGIN else check
 
 
-def _screws(joint: Joint, hold: Hold) -> Finding:
+def _screws(joint: Joint, hold: Hold, subject: str) -> Finding:
     message = (
         f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {hold.engaged_mm:.1f} mm of "
         f"{'thread' if hold.needed_mm else 'nut or insert'} (at least {hold.needed_mm:.1f}), tightened with "
@@ -107,20 +101,17 @@ def _screws(joint: Joint, hold: Hold) -> Finding:
     )
     engaged = hold.engaged_mm >= hold.needed_mm - ROUNDING_MM
     value, limit = tidy(hold.engaged_mm), tidy(hold.needed_mm)
-    return Finding("screw", "ok" if engaged else "error", _subject(joint), message, value, limit, "mm")
+    return Finding("screw", "ok" if engaged else "error", subject, message, value, limit, "mm")
 
 
 def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:
     """Return parts and products as one body; a product of which half turns counts in full on either side."""
     bodies = [assembly.inertial(name) for name in sorted(names & assembly.made.keys())]
-    for mass in assembly.layout.drive.masses:
-        if mass.product in names or (mass.turning > 0 and assembly.layout.drive.shaft in names):
-            bodies.append(inertia.of_box(mass.mass_g, mass.box.low, mass.box.high))
+    for each, mass_g, box in assembly.layout.drive.masses:
+        if each.name in names or (each.turning > 0 and assembly.layout.drive.shaft in names):
+            bodies.append(inertia.of_box(mass_g, box.low, box.high))
     if LIDAR in names:
-        x, y, z = scanner.lidar.body_mm
-        base = -scanner.lidar.optical_height_mm
-        lidar = inertia.of_box(scanner.lidar.mass_g, (-x / 2, -y / 2, base), (x / 2, y / 2, base + z))
-        bodies.append(lidar.moved(scanner.angles.T_rot_laser()))
+        bodies.append(lidar_body(scanner.lidar).moved(scanner.angles.T_rot_laser()))
     return inertia.together(bodies)
 
 

@@ -1,12 +1,9 @@
-"""First natural frequency of all that carries the lidar, and how far its mirror shakes a beam.
+"""First natural frequency of all that carries the lidar, and the motion of a beam by the lidar's mirror.
 
-A row of rigid bodies on springs: servo and what stands still on the mount, hub on the shaft, lidar on the linkage.
-Linkage and mount are finite elements, the shaft is a beam, horn or bearing seats are springs. The deck is rigid and
-holds the mount by its screws alone; servo frame, tower and tripod foot are rigid; the servo keeps its position: about
-the axis only shaft and belt give way.
+A row of rigid bodies on springs: servo and fixed parts on the mount, hub on the shaft, lidar on the linkage. Linkage
+and mount are finite elements, the shaft is a beam, horn or bearing seats are springs. The deck is rigid and holds the
+mount by its screws alone; servo frame, tower and tripod foot are rigid; the servo keeps its position.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 
@@ -33,15 +30,7 @@ MIRROR_SHARE = 0.05  # of the lidar's mass that turns in it: assumed
 def vibration_checks(
     scanner: Scanner, assembly: Assembly, bodies: Mapping[str, Inertial], linkage: Spring, mount: Spring | None
 ) -> list[Finding]:
-    """Check the first natural frequency against the frequency of the lidar's mirror.
-
-    Args:
-        scanner: angles and products.
-        assembly: its parts.
-        bodies: of `masses.link_bodies`.
-        linkage: from hub to lidar.
-        mount: from deck to servo, if there is one.
-    """
+    """Check the first natural frequency; `linkage` is from hub to lidar, `mount` from deck to servo."""
     lidar = scanner.lidar
     row = row_of_scanner(scanner, assembly, bodies, linkage, mount)
     first, mirror = float(row.frequencies_hz()[0]), lidar.scan_rate_hz
@@ -77,13 +66,13 @@ def row_of_scanner(
     springs = [of_shaft(assembly.layout.drive.gives, assembly.layout.stack.hub_bottom), linkage]
     masses = [shaft, mass_matrix(bodies["laser"].moved(scanner.angles.T_rot_laser()))]
     if mount is not None:
-        stands = mass_matrix(bodies["servo"]) - mass_matrix(assembly.inertial(BASE_MOUNT))
-        springs, masses = [mount, *springs], [stands + shaft, *masses]
+        fixed = mass_matrix(bodies["servo"]) - mass_matrix(assembly.inertial(BASE_MOUNT))
+        springs, masses = [mount, *springs], [fixed + shaft, *masses]
     return row_of(springs, masses)
 
 
 def amplitude_m(row: SpringRow, scanner: Scanner) -> float:
-    """Return how far the mirror moves a beam at AT_M, at worst within the error of the frequency."""
+    """Return the amplitude of a beam at AT_M by the mirror, the largest within the error of the frequency."""
     lidar, R = scanner.lidar, scanner.angles.R_rot_laser()
     kg, hz = MIRROR_SHARE * lidar.mass_g / 1000, lidar.scan_rate_hz
     turns = R @ np.array([1.0, -1.0j, 0.0])  # in the scan plane

@@ -1,19 +1,18 @@
 """A dimensioned sketch of a device: a view onto each face that has holes, one from above and one from the side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from scanwright.cad import outlines
-from scanwright.cad.drawings.devices.outline import BoxBody, DeviceOutline, Spot, Upright, outline_of
+from scanwright.cad.drawings.devices.outline import DeviceOutline, Spot, outline_of
 from scanwright.cad.drawings.dimensions import Callout, callouts_right, centre_mark, ordinates
 from scanwright.cad.drawings.patterns import counted, number
 from scanwright.cad.drawings.pen import Pen, Point, document_at
 from scanwright.cad.drawings.sheet import Sheet
 from scanwright.cad.drawings.write import drawn_on, svg_bytes
+from scanwright.cad.layout.drive import Cuboid, Rod
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.product_base import Product
 
@@ -38,7 +37,7 @@ Draw = Callable[[Array, Array], list[Array]]
 
 @dataclass(slots=True)
 class SketchView:
-    """A view in its own plane, millimetres of the device; `signs` are -1 if the frame's axis points to the left."""
+    """A view in its own plane, millimetres of the device; `sign` is -1 if the frame's axis points to the left."""
 
     title: str
     sign: float
@@ -59,33 +58,31 @@ def sketch_svg(product: Product) -> bytes:
     notes = ["Millimetres, frame of the catalogue."]
     if outline.unverified:
         notes.append(f"Not verified, measure yours: {', '.join(outline.unverified)}.")
-    heights = [z for solid in outline.solids for z in _ends(solid)] + list(outline.heights)
+    heights = [*outline.heights]
+    for solid in outline.solids:
+        heights += (solid.low, solid.high) if isinstance(solid, Rod) else (solid.low[2], solid.high[2])
     views = views_of(outline.spots, lambda right, up: _polygons(outline, right, up), heights)
     for solid in outline.solids:
-        if isinstance(solid, Upright):
+        if isinstance(solid, Rod):
             aside = float(solid.radius * np.sqrt(0.5))
             views[0].callouts.append(Callout((aside, aside), f"Ø{number(2 * solid.radius)}"))
     return sketch_of(f"{product.name} ({product.maker})", views, notes)
 
 
 def views_of(spots: Sequence[Spot], draw: Draw, heights: Sequence[float] = ()) -> list[SketchView]:
-    """Return the views that a device needs, with its holes and dimensions.
-
-    Args:
-        spots: its holes.
-        draw: its outline in a view.
-        heights: z that get a dimension as well.
-    """
+    """Return the views of a device with holes and dimensions; `heights` are z that get a dimension as well."""
     views = []
-    for title, right, up in _shown(spots):
+    for i, (title, right, up) in enumerate(VIEWS):
         r, u = np.asarray(right, dtype=float), np.asarray(up, dtype=float)
+        facing = [spot for spot in spots if np.asarray(spot.out) @ np.cross(r, u) > ALONG]
+        if i not in ALWAYS and not facing:
+            continue
         view = SketchView(title, float(r.sum()), draw(r, u))
         corners = np.concatenate(view.polygons)
         for x in (corners[:, 0].min(), corners[:, 0].max()):
             view.below[round(float(x), 3)] = float(corners[:, 1].min())
         for y in (corners[:, 1].min(), corners[:, 1].max(), *(heights if up[2] else ())):
             view.heights[round(float(y), 3)] = float(corners[:, 0].min())
-        facing = [spot for spot in spots if np.asarray(spot.out) @ np.cross(r, u) > ALONG]
         groups: dict[str, list[Spot]] = {}
         for spot in facing:
             x, y = float(np.asarray(spot.at) @ r), float(np.asarray(spot.at) @ u)
@@ -148,27 +145,13 @@ def _draw(pen: Pen, view: SketchView) -> None:
     pen.text(((left + right) / 2, pen.box()[3] + 2.5), view.title, anchor="middle")
 
 
-def _shown(spots: Sequence[Spot]) -> list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]:
-    """Return the views that a device needs: title, right and up."""
-
-    def faced(right: Sequence[float], up: Sequence[float]) -> bool:
-        return any(np.asarray(spot.out) @ np.cross(right, up) > ALONG for spot in spots)
-
-    return [view for i, view in enumerate(VIEWS) if i in ALWAYS or faced(view[1], view[2])]
-
-
-def _ends(solid: BoxBody | Upright) -> tuple[float, float]:
-    """Return the heights of its lower and upper end."""
-    return (solid.low, solid.high) if isinstance(solid, Upright) else (solid.low[2], solid.high[2])
-
-
 def _polygons(outline: DeviceOutline, right: Array, up: Array) -> list[Array]:
     """Return the outlines of bodies in a view; from below a box covers the cylinders on it."""
     towards = float(np.cross(right, up)[2])
-    boxed = any(isinstance(solid, BoxBody) for solid in outline.solids)
+    boxed = any(isinstance(solid, Cuboid) for solid in outline.solids)
     polygons = []
     for solid in outline.solids:
-        if isinstance(solid, BoxBody):
+        if isinstance(solid, Cuboid):
             corners = np.array([[np.asarray(c) @ right, np.asarray(c) @ up] for c in (solid.low, solid.high)])
         elif abs(towards) < ALONG:
             corners = np.array([[-solid.radius, solid.low], [solid.radius, solid.high]])

@@ -1,7 +1,5 @@
 """`template.pdf`: every hole pattern that a scanner uses at 1:1, with a scale to check the printer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,1 +1,1 @@
-"""Putting a scanner together, step by step: what each step brings, its picture, and `assembly.md`."""
+"""Assembly instructions: steps, their pictures, and `assembly.md`."""

@@ -1,7 +1,5 @@
 """`assembly.md`: how to assemble one scanner, with its screws and a picture of each step."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 
@@ -26,8 +24,8 @@ NUTS = (
 )
 LOCKED = (
     "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
-    "which then cracks. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
-    "creeps. `checks.json` lists under `retention` and `screw` the margin of each joint."
+    "which can crack. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
+    "creeps. `checks.json` lists the margin of each joint under `retention` and `screw`."
 )
 LOOK = "Look, then wire"
 HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")
@@ -38,21 +36,9 @@ IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then jo
 
 
 def instructions_text(
-    scanner: Scanner,
-    assembly: Assembly,
-    scenes: Sequence[StepScene],
-    plates: Sequence[Sequence[str]],
-    config_hash: str,
+    scanner: Scanner, assembly: Assembly, scenes: Sequence[StepScene], plates: Sequence[Sequence[str]], config_hash: str
 ) -> str:
-    """Return the Markdown file.
-
-    Args:
-        scanner: angles and products.
-        assembly: the solids.
-        scenes: the steps, of `scenes.scenes_of`.
-        plates: parts that are printed together, of each `print/plate_<number>`.
-        config_hash: of what shapes the parts.
-    """
+    """Return the Markdown file; scenes of `scenes.scenes_of`, `plates` are the parts printed together."""
     joints = [joint for scene in scenes for joint, _ in scene.joints]
     angles = scanner.angles.angles_deg
     lines = [
@@ -102,7 +88,7 @@ def instructions_text(
 
 
 def _joined(assembly: Assembly) -> str:
-    """Return what to connect when all parts are together: leads with a path are connected in their own step."""
+    """Return which cables to connect at the end; cables with a path are connected in their own step."""
     scanner, leads = assembly.layout.scanner, assembly.layout.leads
     laid = leads and all(lead.path is not None for lead in leads)
     words = IN_A_LOOP if scanner.slip_ring is None else TO_COMPUTER if laid else THROUGH_RING
@@ -158,16 +144,7 @@ def step_files(
     plates: Sequence[Sequence[str]],
     config_hash: str,
 ) -> dict[str, bytes]:
-    """Return `assembly.md` and the picture of each step.
-
-    Args:
-        scanner: angles and products.
-        assembly: the solids.
-        meshes: of the made parts, with their labels.
-        joints: all of them.
-        plates: parts that are printed together.
-        config_hash: of what shapes the parts.
-    """
+    """Return `assembly.md` and the picture of each step; `meshes` of the made parts have their labels."""
     scenes = scenes_of(assembly, joints)
     pictures = StepPictures(assembly.meshes() | meshes, frozenset(assembly.made))
     files = {"assembly.md": instructions_text(scanner, assembly, scenes, plates, config_hash).encode("utf-8")}
@@ -187,7 +164,7 @@ def _words(assembly: Assembly, scene: StepScene) -> str:
 
 
 def _to_measure(assembly: Assembly) -> Iterator[str]:
-    """Yield what to measure before any part is printed: values that no source verifies."""
+    """Yield the unverified values to measure before any part is printed."""
     for product in products_of(assembly.layout.scanner, assembly.layout.drive):
         fields = {field for name in assembly.made for field in assembly.parts[name].values_of(product)}
         if sentence := measure_first(product, *fields, "holes", *HORN_FIELDS):

@@ -3,8 +3,6 @@
 `design/scene/parallel_view.py` casts the pixels, as for the pictures of the checks in the report.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Sequence
@@ -24,17 +22,11 @@ COLOURS = 48
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Something to draw.
+    """Something to draw."""
 
-    Attributes:
-        scene: its triangles.
-        moved_m: where it is moved to.
-        colour: sRGB, 0 to 255.
-    """
-
-    scene: Scene
-    moved_m: Vector
-    colour: Array
+    scene: Scene  # its triangles
+    moved_m: Vector  # where it is moved to
+    colour: Array  # sRGB, 0 to 255
 
 
 def painted(view: ParallelView, pieces: Sequence[Piece]) -> Image.Image:

@@ -1,11 +1,8 @@
 """The picture of each step: present bodies in grey, new ones in colour before they are moved into place, screws named.
 
-The rotation axis is upright, on the bench the lidar's axis. The view shows the heads of the screws: the best of eight
-sides, from above and below; without screws the first. New bodies are drawn where nothing hides them, away from their
-place along the path of their motion, with their screws and nuts. The same scanner gives the same bytes.
+The rotation axis is upright, on the bench the lidar's axis. Of eight sides, from above and below, the view is the one
+that shows the heads of the screws best; without screws it is the first.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -43,12 +40,6 @@ class StepPictures:
     """Pictures of the steps of one scanner; a body is prepared once for all of them."""
 
     def __init__(self, meshes: dict[str, TriMesh], made: frozenset[str]) -> None:
-        """Keep the bodies.
-
-        Args:
-            meshes: of all bodies, rotation frame [mm].
-            made: names of those that are made, not bought.
-        """
         self._meshes, self._made = meshes, made
         self._scenes: dict[str, Scene] = {}
 
@@ -101,7 +92,7 @@ class StepPictures:
 
 
 def _side(scene: StepScene) -> tuple[float, float]:
-    """Return yaw and pitch [rad] of the view that shows most of the heads, preferably from above."""
+    """Return the yaw and pitch [rad] of the view that shows most of the heads, preferably from above."""
     heads = [-np.array(axis.along) @ scene.R_rot_picture for joint, _ in scene.joints for axis in joint.axes]
 
     def seen(yaw: float, pitch: float) -> float:
@@ -158,7 +149,7 @@ def _call_out(
         heads = []
         for axis in joint.axes:
             start, along = np.array(axis.start) / 1000, np.array(axis.along)
-            straight = float(np.linalg.norm(np.cross(moved, along))) < 1e-6  # else it bends where the part has come
+            straight = float(np.linalg.norm(np.cross(moved, along))) < 1e-6  # else it bends at the part's final place
             end = start + (0 if straight else moved)
             heads.append(view.at(start - _out(joint) / 1000 * along + moved))
             pen.line([*view.at(start - OUT_MM / 1000 * along + moved), *view.at(end)], fill=INK, width=1)

@@ -1,1 +1,1 @@
-"""The servo beside the axis, for capsule rings: hollow shaft in two bearings, and a belt."""
+"""The servo next to the axis, for capsule rings: hollow shaft in two bearings, and a belt."""

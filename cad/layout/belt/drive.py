@@ -1,6 +1,4 @@
-"""The servo beside the axis, for capsule rings, as a `DriveLayout`: belt, hollow shaft, tower."""
-
-from __future__ import annotations
+"""The servo next to the axis, for capsule rings, as a `DriveLayout`: belt, hollow shaft, tower."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -25,7 +23,7 @@ from scanwright.cad.layout.belt.stack import (
     case_corners,
     drive_corners,
 )
-from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, BearingTower, tower_of
+from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, tower_foot_of
 from scanwright.cad.layout.drive import (
     Body,
     Bundle,
@@ -40,6 +38,7 @@ from scanwright.cad.layout.drive import (
 from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
 from scanwright.cad.layout.tie_seat import TieSeat
+from scanwright.cad.screws import Thread
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
@@ -65,20 +64,19 @@ BUILT = (
 
 
 def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """The drive of a scanner with a capsule ring.
+    """Return the drive of a scanner with a capsule ring.
 
     Raises:
         BuildError: it cannot be laid out.
     """
     stack, ring = belt_stack(scanner, envelope), scanner.slip_ring
     assert ring is not None
-    tower, plate = tower_of(scanner, stack), plate_of(scanner, stack)
-    mounted = _mounted(stack, tower)
+    plate, mounted = plate_of(scanner), _mounted(stack, tower_foot_of(scanner.printer, stack))
     return DriveLayout(
         envelope=envelope,
         stack=stack,
         stations=tuple(_stations(stack, ring)),
-        records=(stack, tower, plate),
+        records=(stack, plate),
         shaft=names.MAIN_SHAFT,
         bend=belt_shaft_bend(stack),
         gives=belt_shaft_bend(stack, 1 / SEAT_N_PER_M),
@@ -99,7 +97,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
 
 
 def _bears(_bar_g: float, _bar_z: float) -> bool:
-    """The bearings carry a counterweight, not the horn."""
+    """Return the bearings carry a counterweight, not the horn."""
     return True
 
 
@@ -167,8 +165,7 @@ def _stations(stack: BeltStack, ring: SlipRing) -> Iterator[Station]:
     yield round_one(names.ALIGNMENT_LINKAGE, "rotor", stack.hub_radius, stack.shoulder, -stack.h)
 
 
-def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
-    """The tower."""
+def _mounted(stack: BeltStack, thread: Thread) -> Mounted:
     foot = [(x, y, stack.tower_bottom) for x in (-FOOT_HALF, FOOT_HALF) for y in (-FOOT_HALF, FOOT_HALF)]
     return Mounted(
         onto=names.BEARING_TOWER,
@@ -180,19 +177,19 @@ def _mounted(stack: BeltStack, tower: BearingTower) -> Mounted:
         corners=np.concatenate([drive_corners(stack), np.array(foot)]),
         discs=((stack.wide_radius, stack.tower_bottom), (stack.wide_radius, stack.tower_top)),
         on_flat_deck=False,
-        thread_mm=FOOT - 1.0 if tower.foot.trap is None else UNDER_FOOT_NUT,
-        thread=tower.foot,
+        thread_mm=FOOT - 1.0 if thread.trap is None else UNDER_FOOT_NUT,
+        thread=thread,
     )
 
 
 def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth: float) -> Iterator[LeadExit]:
-    """Paths of the leads up the bore and out by its two windows."""
+    """Yield the path of the leads up the bore and out by its two windows."""
     low, middle = stack.ring_top + stack.rotor.length_mm, stack.hub_bottom - WINDOW_BELOW
     ends = []
     for sign in (1.0, -1.0) if bundle.count == 1 else (1.0 - 2.0 * (bundle.number % 2),):
         side = sign * (bundle.half + BUNDLE_GAP)
         ends.append((np.array([[side, 0.0, low], [side, 0.0, middle]]), np.array([sign, 0.0, 0.0])))
-    yield LeadExit(tie, tuple(ends))
+    yield tie, tuple(ends)
 
 
 def _around_belt(stack: BeltStack) -> Cuboid:

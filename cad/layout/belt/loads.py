@@ -1,9 +1,7 @@
-"""What the belt layout carries: two bearings the rotor, the horn the pull of the belt. No kernel: plain numpy.
+"""Loads of the belt drive: rotor on two bearings, belt on the horn. SI units; the stack is in mm. No kernel.
 
 SI units; lengths of the stack are millimetres.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -13,30 +11,23 @@ import numpy as np
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, Weight
 
-PRELOAD_N = 10.0  # least, of each strand: what a small belt needs to sit in its grooves; assumed
+PRELOAD_N = 10.0  # least, of each strand: assumed for the seat of a small belt in its grooves
 SEAT_N_PER_M = 10e6  # sideways stiffness of a bearing in a printed seat: assumed
 PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack strand tight
 
 
 @dataclass(frozen=True, slots=True)
 class BeltPull:
-    """Forces of the belt.
+    """Forces of the belt."""
 
-    Attributes:
-        working_n: largest pull beyond the pre-load.
-        strand_n: pre-load of each strand.
-        shaft_n: what both strands pull shaft and horn together with.
-        horn_nm: moment that this puts on the horn.
-    """
-
-    working_n: float
-    strand_n: float
-    shaft_n: float
-    horn_nm: float
+    working_n: float  # largest pull beyond the pre-load
+    strand_n: float  # pre-load of each strand
+    shaft_n: float  # force of both strands between shaft and horn
+    horn_nm: float  # its moment on the horn
 
 
 def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
-    """Forces of the belt at the largest torque of the servo's work."""
+    """Return the forces of the belt at the largest torque of the servo in operation."""
     working = torque_nm / (stack.pitch_radius / 1000)
     strand = max(PRELOAD_N, PRELOAD_SHARE * working)
     lever = (stack.belt_middle - stack.horn) / 1000
@@ -44,13 +35,9 @@ def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
 
 
 def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: float) -> tuple[float, float]:
-    """Force across the upper and the lower bearing [N] in the worst position: weight and belt pull the same way.
+    """Return the force across the upper and the lower bearing [N] if weight and belt pull in the same direction.
 
-    Args:
-        stack: its layout.
-        weight: of all that turns.
-        centre_mm: height of its centre of mass, rotation frame.
-        pull_n: of both strands.
+    `centre_mm` is the height of the rotor's centre of mass, rotation frame, `pull_n` the pull of both strands.
     """
     span = stack.upper_middle - stack.lower_middle
     moment = 1000 * weight.along_n * weight.off_axis_m  # N mm
@@ -61,20 +48,18 @@ def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: f
 
 
 def belt_nm_per_rad(stack: BeltStack) -> float:
-    """Stiffness of both strands about the axis, the servo held."""
+    """Return the stiffness of both strands about the axis, with the servo fixed."""
     return 2 * stack.belt.stiffness_n / (stack.centre / 1000) * (stack.pitch_radius / 1000) ** 2
 
 
 def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
-    """Return how far the shaft gives way at the hub.
+    """Return the compliance of the shaft at the hub; `seat_m_per_n` is that of each support.
 
     A tube on two supports, its hub beyond the upper one; the belt is two springs against turning.
-
-    Args:
-        stack: its lengths and radii.
-        seat_m_per_n: how far a force moves each support.
     """
-    EI = ALUMINIUM_PA * _second_moment(stack)
+    second_moment = math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12  # m4
+    EI, shear_pa = ALUMINIUM_PA * second_moment, ALUMINIUM_PA / (2 + 2 * METAL_POISSON)
+    twist = (stack.hub_bottom - stack.belt_middle) / 1000 / (shear_pa * 2 * second_moment)
     span = (stack.upper_middle - stack.lower_middle) / 1000
     over = (stack.hub_bottom - stack.upper_middle) / 1000
     coupled = over * span / (3 * EI) + over**2 / (2 * EI)
@@ -88,27 +73,17 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
             ]
         )
         + seat_m_per_n * carried @ carried.T,
-        twist_rad_per_nm=1 / belt_nm_per_rad(stack) + _twist(stack),
+        twist_rad_per_nm=1 / belt_nm_per_rad(stack) + twist,
         stretch_m_per_n=over / (ALUMINIUM_PA * area),
     )
 
 
-def _second_moment(stack: BeltStack) -> float:
-    """Second moment of the tube [m4]."""
-    return math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12
-
-
-def _twist(stack: BeltStack) -> float:
-    shear = ALUMINIUM_PA / (2 + 2 * METAL_POISSON)
-    return (stack.hub_bottom - stack.belt_middle) / 1000 / (shear * 2 * _second_moment(stack))
-
-
 def run_out_rad(stack: BeltStack, fit_mm: float) -> float:
-    """Amplitude of the angle's error, once per turn: each pulley stands off its axis by half the play of its fit."""
+    """Return the amplitude of the angle error, once per turn: each pulley is off its axis by half of its fit."""
     off = 2 * fit_mm / 4
     return off / stack.pitch_radius
 
 
 def press_newton(stack: BeltStack, strand_n: float, give_mm: float) -> float:
-    """Force in the middle of a strand that moves it by so much: how a pre-load is felt."""
+    """Return the force in the middle of a strand that moves it by `give_mm`: a test of its pre-load."""
     return 4 * strand_n * give_mm / stack.centre

@@ -1,17 +1,15 @@
-"""Laying out the belt drive: bearings by the capsule, pulleys by the boss, the belt by the servo's place. mm."""
-
-from __future__ import annotations
+"""Sizes of the belt drive: bearings by the capsule, pulleys by the boss, the belt by the servo's place. mm."""
 
 import math
 from dataclasses import replace
 
 from scanwright.cad.layout.belt.stack import (
-    CASE_ROOM,
+    CASE_GAP,
+    CHAMBER_GAP,
     FOOT_HOLE,
     FOOT_SCREW,
-    HORN_BOSS_ROOM,
+    HORN_BOSS_GAP,
     PULLEY_GAP,
-    RING_ROOM,
     TRAVEL,
     BeltStack,
     drive_corners,
@@ -39,7 +37,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
     """Lay out the scanner of a capsule ring.
 
     Raises:
-        BuildError: no bearing or belt of the catalogue fits the capsule, the horn stands above the belt, the heads of
+        BuildError: no bearing or belt of the catalogue fits the capsule, the horn is above the belt, the heads of
             its screws leave no wall, or the lidar would hang upside down.
     """
     ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
@@ -90,7 +88,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
 
 
 def centre_of(belt_teeth: int, teeth: int, pitch_mm: float) -> float:
-    """Centre distance at which a belt is tight around two equal pulleys: half of it goes around them."""
+    """Return the centre distance at which a belt is tight around two equal pulleys."""
     return (belt_teeth - teeth) * pitch_mm / 2
 
 
@@ -109,17 +107,17 @@ def _carrier(scanner: Scanner, ring: SlipRing, least: float) -> Bearing:
 def _belt(scanner: Scanner, ring: SlipRing) -> Belt:
     if not scanner.belts:
         raise BuildError(
-            f"{DRIVE_PULLEY}: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt beside the axis, and the "
+            f"{DRIVE_PULLEY}: slip_ring {ring.name}: bore_mm = 0: a capsule needs a belt next to the axis, and the "
             "catalogue has none; add a product of kind = 'belt'"
         )
     return scanner.belts[0]
 
 
 def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
-    """The screws of the tower's foot stand around the capsule's chamber."""
+    """Check that the screws of the tower's foot are outside the capsule's chamber."""
     corner = math.sqrt(2) * FOOT_HOLE - FOOT_SCREW.nominal / 2 - scanner.printer.min_wall_mm
     if stack.chamber_radius > corner:
-        most = 2 * (corner - RING_ROOM)
+        most = 2 * (corner - CHAMBER_GAP)
         raise BuildError(
             f"{BEARING_TOWER}: slip_ring {ring.name}: flange.diameter_mm = {stack.flange.diameter_mm:g}: does not fit "
             f"between the screws of the tower's foot; at most {most:.1f}: take a smaller capsule"
@@ -127,42 +125,42 @@ def _check_tower(stack: BeltStack, ring: SlipRing, scanner: Scanner) -> None:
 
 
 def _check_horn(stack: BeltStack) -> None:
-    """The pulley's foot reaches down to the horn."""
+    """Check that the pulley's foot reaches down to the horn."""
     most = stack.teeth_low - stack.horn - stack.servo.case_max_mm[2]
     if stack.horn > stack.teeth_low:
         servo = stack.servo
         raise BuildError(
             f"{DRIVE_PULLEY}: foot: case_max_mm = {list(servo.case_max_mm)}{servo.caution('case_max_mm')}: the horn of "
-            f"{servo.name} stands {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
+            f"{servo.name} is {-servo.case_max_mm[2]:g} mm above its case, and the belt {most:g}; take a hub or a "
             "servo whose horn lies lower"
         )
 
 
 def _check_heads(stack: BeltStack, printer: Printer) -> None:
-    """The heads of the horn's screws leave a wall below the teeth, and around the horn's boss where they reach it."""
+    """Check the wall below the teeth, and around the horn's boss, at the heads of the horn's screws."""
     servo = stack.servo
     screw = SCREWS[servo.horn_screw]
     place = f"{DRIVE_PULLEY}: heads: horn_circle_mm = {servo.horn_circle_mm:g}"
     heads = f"the heads of the {screw.name} screws of {servo.name}"
-    middle, around = servo.horn_circle_mm / 2, screw.head_room + printer.min_wall_mm
+    middle, around = servo.horn_circle_mm / 2, screw.driver_radius + printer.min_wall_mm
     if middle + around > stack.tip_radius - stack.belt.tooth_height_mm:
         raise BuildError(
             f"{place}: {heads} reach into the teeth of a pulley of {stack.teeth}; take a servo with a smaller horn"
         )
     boss = servo.horn_boss_diameter_mm
-    over_boss = stack.pulley_seat - stack.horn - servo.horn_boss_height_mm - HORN_BOSS_ROOM
+    over_boss = stack.pulley_seat - stack.horn - servo.horn_boss_height_mm - HORN_BOSS_GAP
     if over_boss < printer.min_wall_mm and middle - around < boss / 2:
         raise BuildError(f"{place}: {heads} leave no wall around its boss of {boss:g} mm")
 
 
 def _least_centre(stack: BeltStack, servo: Servo) -> float:
-    """Shortest centre distance: case beside the tower, and pulleys beside each other, with the belt put on."""
-    case = stack.wide_radius - servo.case_min_mm[0] + CASE_ROOM
-    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_ROOM)
+    """Return the shortest centre distance with the case next to the tower and the belt mounted."""
+    case = stack.wide_radius - servo.case_min_mm[0] + CASE_GAP
+    return TRAVEL + max(case, 2 * stack.rim_radius + PULLEY_GAP, stack.carrier.outer_mm / 2 + stack.plate_x + CASE_GAP)
 
 
 def _quarter(scanner: Scanner, stack: BeltStack, rotor_radius: float) -> int:
-    """The side of the axis on which the servo needs the lowest deck; of equal ones, beside the axis and not above."""
+    """Return the side of the servo that allows the lowest deck; of equal ones, the one at the side of the axis."""
     up = scanner.angles.T_world_rot(0.0)[2, :3]
     normal = up if up[2] >= -1e-6 else -up
     rotor = rotor_radius + SWEEP_MARGIN

@@ -1,6 +1,6 @@
 """The layout for capsule rings, which let no shaft through: a belt turns a hollow shaft. No kernel: plain numpy.
 
-The servo stands beside the shaft; its belt is toothed and 1:1, so that its absolute angle stays that of the axis.
+The servo is next to the shaft; its belt is toothed and 1:1, so that its absolute angle is that of the axis.
 
 Rotation frame at gamma = 0, mm, from the hub of `cad/layout/hub.py` downwards:
 
@@ -8,7 +8,7 @@ Rotation frame at gamma = 0, mm, from the hub of `cad/layout/hub.py` downwards:
     pulley_top        LEADS_GAP below: the leads leave the shaft between
     teeth_top         a boss with grub screws holds the pulley on the shaft
     teeth_low         the pulley's lower face lies on a collar of the shaft
-    tower_top         the collar lies on the upper bearing; the plate of the servo slides on the tower beside it
+    tower_top         the collar lies on the upper bearing; the plate of the servo slides on the tower next to it
     lower_bottom      lower face of the lower bearing; a ring with grub screws holds the shaft up
     shaft_bottom      a soft tube joins the shaft's bore to the stub of the capsule's rotor
     flange_top        the capsule's flange, screwed to a disc in the tower
@@ -18,8 +18,6 @@ Rotation frame at gamma = 0, mm, from the hub of `cad/layout/hub.py` downwards:
 The servo's frame has the directions of the rotation frame turned by `quarter` about z. Its belt pulls along the line of
 centres, on which the plate slides: `centre` is the distance at which the belt is tight.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -46,24 +44,24 @@ BOSS = 9.0  # height of the pulley's boss, and of the ring under the lower beari
 BOSS_WALL = 9.0  # around the shaft: length of the screws
 RIM = 1.5  # thickness of a pulley's rims
 RIM_ABOVE_BELT = 0.5
-BELT_ROOM = 0.5  # on each side of the belt
+BELT_SIDE_GAP = 0.5  # on each side of the belt
 PULLEY_GAP = 2.0  # between plate and pulleys
 PLATE = 5.0  # of the servo
-HORN_BOSS_ROOM = 0.5  # over the boss of the horn, in the foot of the drive pulley
+HORN_BOSS_GAP = 0.5  # over the boss of the horn, in the foot of the drive pulley
 UNDER_HORN_HEAD = 4.0  # of the drive pulley: at least
 SEAT_GAP = 0.2  # the feet carry, not the plate
 INNER_RING = 1.45  # how far a shoulder may touch a bearing's inner ring, on the radius
 SEAT_WALL = 5.0  # of the tower
 LIP = 1.5  # of the tower inside the bearings' outer rings
-RING_ROOM = 1.5  # around flange and ring in the tower
+CHAMBER_GAP = 1.5  # around flange and ring in the tower
 CAPSULE_GAP = 1.5  # between shaft and capsule
 DISC = 10.0  # thickness, of the capsule's holder
 LEADS = 6.0  # between capsule and mount
 SHELF = 12.0  # thickness of the tower's arms
 PLATE_GRIP = 7.5  # of an arm above the nut of a screw of the plate
-SHELF_WALL = 4.0  # of an arm beside the heads of the plate's screws
+SHELF_WALL = 4.0  # of an arm next to the heads of the plate's screws
 TRAVEL = 3.0  # of the plate to either side
-CASE_ROOM = 2.0  # around the servo's case, beyond the travel
+CASE_GAP = 2.0  # around the servo's case, beyond the travel
 FOOT = 10.0  # thickness of the tower's foot
 FOOT_HALF = 32.0  # of its square
 FOOT_HOLE = 24.0  # x and y of its screws
@@ -71,7 +69,7 @@ FOOT_HOLE = 24.0  # x and y of its screws
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BeltStack(Hub):
-    """The hollow shaft along its axis, and the servo beside it. Lengths in mm."""
+    """The hollow shaft along its axis, and the servo next to it. Lengths in mm."""
 
     shaft_bore: float
     carrier: Bearing  # two of them
@@ -107,7 +105,7 @@ class BeltStack(Hub):
     @property
     def teeth_low(self) -> float:
         """Height of the lower rim's lower face, of both pulleys."""
-        return self.teeth_top - self.belt.width_mm - 2 * (BELT_ROOM + RIM)
+        return self.teeth_top - self.belt.width_mm - 2 * (BELT_SIDE_GAP + RIM)
 
     @property
     def belt_middle(self) -> float:
@@ -217,7 +215,7 @@ class BeltStack(Hub):
     @property
     def chamber_radius(self) -> float:
         """Inner radius of the tower around flange and ring."""
-        return max(self.flange.diameter_mm / 2, self.boss_radius) + RING_ROOM
+        return max(self.flange.diameter_mm / 2, self.boss_radius) + CHAMBER_GAP
 
     @property
     def wide_radius(self) -> float:
@@ -242,23 +240,23 @@ class BeltStack(Hub):
     @property
     def slot_x(self) -> float:
         """Distance of the plate's screws from the horn's axis along the line of centres."""
-        return self.plate_x - TRAVEL - PLATE_SCREW.head_room - 1.0
+        return self.plate_x - TRAVEL - PLATE_SCREW.driver_radius - 1.0
 
     @property
     def arms_y(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Inner side of the two arms beside the case, and the line of the plate's screws on them; servo's frame."""
+        """Inner side of the two arms along the case, and the line of the plate's screws on them; servo's frame."""
         low, high = self.servo.case_min_mm[1], self.servo.case_max_mm[1]
-        beyond = self.rim_radius + PLATE_SCREW.head_room + 0.6  # a driver passes pulley and belt
-        room = SHELF_WALL + PLATE_SCREW.head_room
-        inner = low - CASE_ROOM, high + CASE_ROOM
-        return (inner[0], min(inner[0] - room, -beyond)), (inner[1], max(inner[1] + room, beyond))
+        beyond = self.rim_radius + PLATE_SCREW.driver_radius + 0.6  # a driver passes pulley and belt
+        wall = SHELF_WALL + PLATE_SCREW.driver_radius
+        inner = low - CASE_GAP, high + CASE_GAP
+        return (inner[0], min(inner[0] - wall, -beyond)), (inner[1], max(inner[1] + wall, beyond))
 
     @property
     def plate_y(self) -> tuple[float, float]:
         """Extent of plate and arms across the line of centres, servo's frame."""
         (_, low), (_, high) = self.arms_y
-        room = SHELF_WALL + PLATE_SCREW.head_room
-        return low - room, high + room
+        wall = SHELF_WALL + PLATE_SCREW.driver_radius
+        return low - wall, high + wall
 
     @property
     def shadow_half_angle(self) -> float:
@@ -271,12 +269,12 @@ class BeltStack(Hub):
         return math.atan2(self.rim_radius - 0.1, -self.teeth_top)
 
     def turn(self) -> Array:
-        """Servo's frame to rotation frame, shape (3, 3): a whole number of quarter turns."""
+        """Return the rotation from the servo's frame to the rotation frame, shape (3, 3): whole quarter turns."""
         c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.quarter % 4]
         return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=float)
 
     def servo_origin(self) -> Array:
-        """Where the horn's axis meets its face, rotation frame, shape (3,)."""
+        """Return the centre of the horn's face, rotation frame, shape (3,)."""
         return self.turn() @ [self.centre, 0.0, self.horn]
 
     @property
@@ -286,14 +284,14 @@ class BeltStack(Hub):
 
 
 def case_corners(stack: BeltStack) -> Array:
-    """Corners of the servo's case where it stands, rotation frame, shape (8, 3)."""
+    """Return corners of the servo's case at its place, rotation frame, shape (8, 3)."""
     low, high = stack.servo.case_min_mm, stack.servo.case_max_mm
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
     return corners @ stack.turn().T + stack.servo_origin()
 
 
 def drive_corners(stack: BeltStack) -> Array:
-    """Corners of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
+    """Return corners of boxes around case, plate, arms and servo's pulley, rotation frame, shape (n, 3)."""
     rim, (low, high) = stack.rim_radius, stack.plate_y
     reach = stack.centre + stack.plate_x + TRAVEL
     shelf = [(x, y, z) for x in (0.0, reach) for y in (low, high) for z in (stack.tower_top - SHELF, stack.tower_top)]

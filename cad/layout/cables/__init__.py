@@ -1,1 +1,1 @@
-"""Where the leads of the lidar run on the rotor: smooth paths, the room for them, a way through it. No kernel."""
+"""Paths of the cables: smooth paths, the space for them, a search through it. No kernel."""

@@ -1,10 +1,8 @@
 """The cables that do not turn: the servo's, and the leads of the ring's stator, each from its device to the deck.
 
-No drawing shows where either leaves: the catalogue marks it as assumed. They end tied to a side of the mount's foot, or
-on the deck beside a servo that stands on it. Rotation frame at gamma = 0, mm.
+Their exits are assumed, as the catalogue states. They end tied to a side of the mount's foot, or on the deck next to
+the servo. Rotation frame at gamma = 0, mm.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
@@ -12,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.cables.fixed_room import FixedRoom, fixed_room_of
+from scanwright.cad.layout.cables.fixed_space import FixedSpace, fixed_space_of
 from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
 from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.cables.path import Path
@@ -24,35 +22,27 @@ from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array
 
-LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # of its device, before the first bend
-ON_FOOT = 1.0  # between foot or deck and a cable that lies on it
-BEYOND = 8.0  # the edge of the foot, where a cable ends
-CLEAR = 1.0  # of what it leaves, beside its own radius
-LONGER = (2.0, 8.0, 12.0, 16.0)  # than a cable lies on the foot, before its last bend
-STEP = 9.0  # of the points that a cable may turn at
-AROUND = 20.0  # of these, beyond the ends
-FROM_CASE = 24.0  # where a cable ends on a flat deck
+LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # from its device to the first bend
+ON_FOOT = 1.0  # between foot or deck and a cable on it
+BEYOND = 8.0  # from the edge of the foot to the end of a cable
+CLEAR = 1.0  # of its device, in addition to its radius
+LONGER = (2.0, 8.0, 12.0, 16.0)  # from the foot to the last bend
+STEP = 9.0  # of the lattice of corners
+AROUND = 20.0  # of the lattice beyond the ends
+FROM_CASE = 24.0  # from the case to the end of a cable on a flat deck
 THROUGH_DECK = 15.0
 FROM_SLOT = 0.2
 
 
 @dataclass(frozen=True, slots=True)
 class FixedCable:
-    """One cable that does not turn.
+    """One cable that does not turn."""
 
-    Attributes:
-        name: of its body.
-        device: that it leaves.
-        diameter: of it.
-        radius: least one that it may be bent to.
-        path: its middle from its device to the edge of foot or deck; None if there is none.
-    """
-
-    name: str
-    device: str
-    diameter: float
-    radius: float
-    path: Path | None
+    name: str  # of its body
+    device: str  # at its start
+    diameter: float  # of it
+    radius: float  # least bend radius
+    path: Path | None  # its middle from its device to the edge of foot or deck; None if there is none
 
     @property
     def mass_g(self) -> float:
@@ -62,7 +52,7 @@ class FixedCable:
 
 @dataclass(frozen=True, slots=True)
 class Leaving:
-    """A cable before it has a path: where it leaves, and how far it runs inside of what surrounds its device."""
+    """A cable before it has a path: its exit, and its length inside of the parts around its device."""
 
     name: str
     device: str
@@ -75,13 +65,13 @@ class Leaving:
 
 
 def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
-    """Those that the catalogue describes, clear of what the parts that do not turn fill."""
-    room, cables = fixed_room_of(place, avoid), []
+    """Return the cables that the catalogue describes, clear of the shapes to avoid."""
+    space, cables = fixed_space_of(place, avoid), []
     for lane, leaving in enumerate(_leaving(place)):
-        path = _path(place, room, leaving, lane)
+        path = _path(place, space, leaving, lane)
         cables.append(FixedCable(leaving.name, leaving.device, leaving.diameter, leaving.radius, path))
         if path is not None:
-            room = room.with_cable(path.points(SAMPLE), leaving.diameter / 2)
+            space = space.with_cable(path.points(SAMPLE), leaving.diameter / 2)
     return tuple(cables)
 
 
@@ -97,7 +87,7 @@ def _leaving(place: Placement) -> Iterator[Leaving]:
     yield Leaving(STATOR_LEADS, ring.name, wide, radius, stator.start, down, stator.inside, stator.stiff)
 
 
-def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Path | None:
+def _path(place: Placement, space: FixedSpace, leaving: Leaving, lane: int) -> Path | None:
     deck, half = place.deck, leaving.diameter / 2
     start, out, normal = leaving.start, leaving.out, np.array(deck.normal)
     on_deck = deck.flat and (start - np.array(deck.centre)) @ normal < half
@@ -117,11 +107,11 @@ def _path(place: Placement, room: FixedRoom, leaving: Leaving, lane: int) -> Pat
             through + STEP * np.arange(-math.ceil((through - low) / STEP), math.ceil((high - through) / STEP) + 1)
         )
     lattice = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return short_path(room, starts, goals, half, leaving.radius, lattice)
+    return short_path(space, starts, goals, half, leaving.radius, lattice)
 
 
 def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
-    """Ends over the slots at each side of the foot, outwards, two cables side by side."""
+    """Return ends over the slots at each side of the foot, outwards, two cables side by side."""
     ends = []
     for seat in deck.ties:
         aside = (2 * lane - 1) * (seat.half - half - FROM_SLOT)
@@ -136,7 +126,7 @@ def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
 
 
 def _next_to_case(mounted: Mounted, half: float) -> list[Ending]:
-    """Ends on a flat deck, beside the case, outwards."""
+    """Return ends on a flat deck, next to the case, outwards."""
     corners, z, ends = mounted.corners, mounted.rear + half + ON_FOOT, []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         out = sign * np.eye(3)[axis]

@@ -1,10 +1,8 @@
-"""Where the wires of a lidar's cable meet a lead of the ring: crimped side by side, with a shrink tube over them.
+"""Joint of a lidar's cable with a lead of the ring: crimps side by side in a shrink tube.
 
-That tube is thicker than the bundle. So it sits on the longest straight piece where all of it has room, beside what
-turns and beside the other leads; behind the first bend, where hands reach.
+The tube is thicker than the bundle: it is on the longest straight piece with enough space for it, behind the first
+bend.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -14,17 +12,17 @@ import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import farther
 from scanwright.cad.layout.cables.path import Path, PathPiece
-from scanwright.cad.layout.cables.route import GAP, LeadRoom
+from scanwright.cad.layout.cables.route import GAP, CableSpace
 from scanwright.design.arrays import Array
 
-LENGTH = 12.0  # crimps beside each other, and a shrink tube over them
-WALL = 0.5  # of the shrink tube; of what a lead keeps to all others it leaves a tenth
-STEP = 3.0  # between two places that are tried, and two points of a joint that are looked at
+LENGTH = 12.0  # crimps side by side, and a shrink tube over them
+WALL = 0.5  # of the shrink tube; a tenth of the gap to other leads remains
+STEP = 3.0  # between two tested places, and two points of a joint
 
 
 @dataclass(frozen=True, slots=True)
 class LeadJoint:
-    """The piece of a path that its `LENGTH` sits on, and how far along that from its middle."""
+    """The piece of a path with the joint of `LENGTH`, and the offset from the middle of the piece."""
 
     piece: PathPiece
     off: float
@@ -40,36 +38,32 @@ class LeadJoint:
         return self.piece.middle + self.off * self.along
 
     def points(self) -> Array:
-        """Points from one end to the other, shape (n, 3)."""
+        """Return points from one end to the other, shape (n, 3)."""
         return np.asarray(self.middle + np.arange(-LENGTH / 2, LENGTH / 2 + STEP / 2, STEP)[:, None] * self.along)
 
 
-def joint_of(path: Path, half: float, room: LeadRoom, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
-    """The joint of a lead; None where no straight piece is long enough.
+def joint_of(path: Path, half: float, space: CableSpace, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
+    """Return the joint of a lead with radius `half`; None if no straight piece is long enough.
 
-    Args:
-        path: of the lead.
-        half: its radius.
-        room: that it runs through.
-        others: middles of the other leads, shape (n, 3), and how far to keep the middle of the joint from them.
+    `others` are middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
     """
     places = [place for piece in straights(path) for place in _places(piece)]
     for place in places:
         points = place.points()
-        if room.free(points, half + WALL, GAP - WALL).all() and all(farther(points, *other).all() for other in others):
+        if space.free(points, half + WALL, GAP - WALL).all() and all(farther(points, *other).all() for other in others):
             return place
-    return places[0] if places else None  # the check of clearances tells what it is too near to
+    return places[0] if places else None  # the check of clearances then fails
 
 
 def straights(path: Path) -> list[PathPiece]:
-    """The straight pieces behind the first bend, the longest first."""
+    """Return the straight pieces behind the first bend, the longest first."""
     pieces = path.pieces()
     bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
     return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
 
 
 def _places(piece: PathPiece) -> list[LeadJoint]:
-    """Joints from the middle of a piece to its ends."""
+    """Return joints from the middle of a piece to its ends."""
     most = (piece.length - LENGTH) / 2
     steps = np.linspace(0.0, most, math.ceil(most / STEP) + 1).tolist() if most >= 0 else []
     return [LeadJoint(piece, off) for off in dict.fromkeys(side * step for step in steps for side in (-1.0, 1.0))]

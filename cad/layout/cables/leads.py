@@ -1,11 +1,8 @@
-"""The leads between lidar and slip ring: where they begin and end on this scanner, and the way that each one takes.
+"""The leads between lidar and slip ring, and their paths.
 
-Behind the straight piece that its maker draws, the jacket of the lidar's cable is taken off; its wires go on, bend like
-the leads of the ring, and meet them in a joint on a straight piece. Both turn with the lidar: they bend when
-they are laid, and then no more.
+The jacket of the lidar's cable ends behind its straight piece. Its wires bend like the leads of the ring, and meet them
+in a joint. Both turn with the lidar and do not flex.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
@@ -18,7 +15,7 @@ from scanwright.cad.layout.cables import joint as joints
 from scanwright.cad.layout.cables.joint import LeadJoint, joint_of
 from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.room import RotorRoom, room_of
+from scanwright.cad.layout.cables.rotor_space import RotorSpace, rotor_space_of
 from scanwright.cad.layout.cables.route import Ending, lattice_about_axis, short_path
 from scanwright.cad.layout.drive import Bundle
 from scanwright.cad.layout.hub import BUNDLE_GAP
@@ -26,82 +23,72 @@ from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.arrays import Array
 
-SAMPLE = 1.5  # mm between the points that stand for a lead that is laid
+SAMPLE = 1.5  # mm between the points of a lead
 OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
-CLAMPED = 1.0  # beyond the face that a lead leaves by, and its own radius
+CLAMPED = 1.0  # beyond the face at its exit, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
-LEAD_G_CM3 = 1.5  # reckoned: five wires of 1.3 mm over 0.14 mm2 of copper are 2.9 g/m each, in a bundle of 3.5 mm
+LEAD_G_CM3 = 1.5  # calculated: five wires of 1.3 mm over 0.14 mm2 of copper, 2.9 g/m each, in a bundle of 3.5 mm
 
 
 @dataclass(frozen=True, slots=True)
 class RotorLead:
-    """The lead to one outlet of the lidar.
+    """The lead to one outlet of the lidar."""
 
-    Attributes:
-        y: of the outlet in the lidar's frame, which tells it from the others.
-        diameter: of the bundle.
-        radius: least one that it may be bent to.
-        path: its middle from the ring to the lidar, rotation frame at gamma = 0; None if there is none.
-        joint: where its wires meet the ring's; None if no straight piece is long enough.
-    """
-
-    y: float
-    diameter: float
-    radius: float
-    path: Path | None
-    joint: LeadJoint | None = None
+    y: float  # of the outlet in the lidar's frame
+    diameter: float  # of the bundle
+    radius: float  # least bend radius
+    path: Path | None  # its middle from the ring to the lidar, rotation frame at gamma = 0; None if there is none
+    joint: LeadJoint | None = None  # of its wires with the ring's; None if no straight piece is long enough
 
     @property
     def mass_g(self) -> float:
-        """Mass of the wires between ring and jacket; 0 without a path."""
+        """Return the mass of a bundle along a path; 0 without one."""
         return mass_g(self.path, self.diameter)
 
 
 def mass_g(path: Path | None, diameter: float) -> float:
-    """What a bundle weighs along a path; 0 without one."""
+    """Return the mass of a bundle along a path; 0 without one."""
     return 0.0 if path is None else math.pi / 4 * diameter**2 * path.length() * LEAD_G_CM3 / 1000
 
 
 def leads_of(place: Placement, avoid: Iterable[Shape]) -> tuple[RotorLead, ...]:
-    """One lead for each outlet of the lidar; none without a ring, or if the catalogue does not describe its leads.
+    """Return one lead for each outlet of the lidar; none if the catalogue does not describe leads of the ring.
 
-    Args:
-        place: where everything is.
-        avoid: what the parts that turn fill.
+    `avoid` are shapes of the parts that turn.
     """
     scanner = place.scanner
     ring, lidar = scanner.slip_ring, scanner.lidar
     if ring is None or ring.lead_diameter_mm is None or ring.lead_bend_radius_mm is None:
         return ()
-    numbers, radius, room = range(len(lidar.cable_y_mm)), ring.lead_bend_radius_mm, room_of(place, avoid)
+    numbers, radius, space = range(len(lidar.cable_y_mm)), ring.lead_bend_radius_mm, rotor_space_of(place, avoid)
     half = ring.leads_mm(len(numbers)) / 2
     best: tuple[RotorLead, ...] = ()
-    # who comes first takes the short way, and may bar it to the others: then they come first, or change places
+    # the first lead takes the short path, and may block it for the others: then other orders and places are tried
     for places, order in product((numbers, numbers[::-1]), repeat=2):
         bundles = [Bundle(number, len(numbers), half, radius) for number in places]
-        leads = _laid(place, room, bundles, order)
+        leads = _laid(place, space, bundles, order)
         if not best or _laid_count(leads) > _laid_count(best):
             best = leads
         if _laid_count(best) == len(numbers) or leads[order[0]].path is None:
-            break  # the first has all the room: what has no path then has none
-    return _jointed(replace(room, bearings_rad=None), best)  # a path may be in the fan; its joint is then, too
+            break  # the first has all the space: without a path then, there is none
+    return _jointed(replace(space, bearings_rad=None), best)  # a path may be in the fan, and then its joint
 
 
-def _jointed(room: RotorRoom, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
-    """The leads with their joints, each clear of the other leads and the joints before it."""
+def _jointed(space: RotorSpace, leads: tuple[RotorLead, ...]) -> tuple[RotorLead, ...]:
+    """Return the leads with joints, each clear of the other leads and of earlier joints."""
     points = [np.zeros((0, 3)) if lead.path is None else lead.path.points(SAMPLE) for lead in leads]
     jointed: list[RotorLead] = []
     for i, lead in enumerate(leads):
         apart = lead.diameter + joints.WALL + BUNDLE_GAP / 2
         others = [(middles, apart) for k, middles in enumerate(points) if k != i]
         others += [(other.joint.points(), apart + joints.WALL) for other in jointed if other.joint is not None]
-        joint = None if lead.path is None else joint_of(lead.path, lead.diameter / 2, room, others)
+        joint = None if lead.path is None else joint_of(lead.path, lead.diameter / 2, space, others)
         jointed.append(replace(lead, joint=joint))
     return tuple(jointed)
 
 
 def tied_mm(lead: RotorLead, seat: TieSeat) -> float | None:
-    """Room between a lead and the tongue of the hub that it leaves under; None if it leaves elsewhere."""
+    """Return the distance of a lead from the hub's slotted tab above it; None if it is not below the tab."""
     if lead.path is None:
         return None
     points = lead.path.points(SAMPLE / 3)
@@ -115,53 +102,45 @@ def _laid_count(leads: Sequence[RotorLead]) -> int:
     return sum(lead.path is not None for lead in leads)
 
 
-def _laid(place: Placement, room: RotorRoom, bundles: Sequence[Bundle], order: Sequence[int]) -> tuple[RotorLead, ...]:
-    """The leads in the order of the outlets, laid in an order, each from its place among those that leave the ring."""
+def _laid(
+    place: Placement, space: RotorSpace, bundles: Sequence[Bundle], order: Sequence[int]
+) -> tuple[RotorLead, ...]:
+    """Return the leads by outlet, laid in `order`, each from its bundle at the ring."""
     linkage, outlets, hub = place.linkage, place.scanner.lidar.cable_y_mm, place.stack.hub_radius
     leads: dict[int, RotorLead] = {}
     for i in order:
-        bundle, path = bundles[i], None
-        half, outlet = bundle.half, _outlet(place, outlets[i], bundle.half)
+        bundle, path, half = bundles[i], None, bundles[i].half
+        start = outlet_mm(place, outlets[i], place.scanner.lidar.cable_straight_mm)
+        outlet = Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
         exits = place.drive.lead_exits(bundle, linkage.hub_tie, sum(linkage.cross_azimuths) / 2)
-        # tied if it can be; rather in the fan, where its shadow counts, than not at all
-        for within, exit_ in product((room, replace(room, bearings_rad=None)), exits):
-            starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in exit_.ends]
-            starts = [
-                _from_hub(start, hub, half, exit_.tie) for start in starts if room.clear_of_others(start.corners).all()
-            ]
-            lattice = lattice_about_axis(room.floor, half, hub, [*starts, outlet])
+        # tied if possible; a path in the fan, where its shadow counts, is better than none
+        for within, (tie, ends) in product((space, replace(space, bearings_rad=None)), exits):
+            starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in ends]
+            clear = [start for start in starts if space.clear_of_others(start.corners).all()]
+            starts = [_from_hub(start, hub, half, tie) for start in clear]
+            lattice = lattice_about_axis(space.floor, half, hub, [*starts, outlet])
             path = short_path(within, starts, [outlet], half, bundle.radius, lattice)
             if path is not None:
                 break
         leads[i] = RotorLead(outlets[i], 2 * half, bundle.radius, path)
         if path is not None:
-            room = _with(room, path, 2 * half + BUNDLE_GAP / 2)
+            middles = np.concatenate([path.points(SAMPLE), space.others[0]])
+            space = replace(space, others=(middles, 2 * half + BUNDLE_GAP / 2))
     return tuple(leads[i] for i in sorted(leads))
 
 
 def outlet_mm(place: Placement, y: float, out: float) -> Array:
-    """Point at a distance behind the lidar on the middle of the cable that leaves at a y, shape (3,)."""
+    """Return a point at a distance behind the lidar on the axis of the cable at a y, shape (3,)."""
     lidar, T = place.scanner.lidar, place.scanner.angles.T_rot_laser()
     at = [-lidar.body_mm[0] / 2 - out, y, lidar.cable_z_mm - lidar.optical_height_mm]
     return np.asarray(place.stack.R() @ at + T[:3, 3] * 1000)
 
 
-def _outlet(place: Placement, y: float, half: float) -> Ending:
-    """End of a lead behind the straight piece of the lidar's cable."""
-    start = outlet_mm(place, y, place.scanner.lidar.cable_straight_mm)
-    return Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
-
-
 def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> Ending:
-    """The same end with its lengths counted from the hub's rim; straight as far as it is under a tongue."""
+    """Return the end with its lengths counted from the hub's rim; straight below a slotted tab."""
     inside = hub - float(np.hypot(*start.corners[-1, :2]))
     start = replace(start, lengths=tuple(inside + out for out in OUT), clamped=inside + half + CLAMPED)
     if seat is None:
         return start
     clamped = start.clamped + seat.end - hub
     return replace(start, clamped=clamped, used=clamped - CLAMPED)
-
-
-def _with(room: RotorRoom, path: Path, apart: float) -> RotorRoom:
-    """The room that a lead leaves."""
-    return replace(room, others=(np.concatenate([path.points(SAMPLE), room.others[0]]), apart))

@@ -1,9 +1,7 @@
-"""What a cable must stay clear of: convex shapes, and the cables that run already; asked for many points at once.
+"""Obstacles for cables: convex shapes and earlier cables, for many points at once.
 
 Distances from convex shapes are those from their planes: never more than the true one.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,34 +25,34 @@ class Shape:
 
 
 def shape_of(corners: Array, carved: bool = False) -> Shape:
-    """The convex hull of corners, shape (n, 3)."""
+    """Return the convex hull of corners, shape (n, 3)."""
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return Shape(ConvexHull(corners).equations, middle, float(np.linalg.norm(corners - middle, axis=1).max()), carved)
 
 
-def clear_of(shapes: Sequence[Shape], points: Array, room: float, through: Inside | None = None) -> Mask:
-    """Whether points (n, 3) are farther than `room` from every shape, or `through` lets them be in one that is carved.
+def clear_of(shapes: Sequence[Shape], points: Array, apart: float, through: Inside | None = None) -> Mask:
+    """Return whether points (n, 3) are farther than `apart` from every shape; `through` accepts points in carved ones.
 
-    A shape's planes decide on what its sphere does not clear.
+    Spheres around the shapes are tested first, then their planes.
     """
     clear = np.ones(len(points), dtype=bool)
     middles = np.array([shape.middle for shape in shapes])
-    near = _square(middles, points) < np.array([[(shape.reach + room) ** 2] for shape in shapes])
+    near = _square(middles, points) < np.array([[(shape.reach + apart) ** 2] for shape in shapes])
     for k in np.flatnonzero(near.any(axis=1)).tolist():
         shape, left = shapes[k], np.flatnonzero(near[k] & clear)
-        outside = (shape.planes[:, :3] @ points[left].T + shape.planes[:, 3:]).max(axis=0) > room
+        outside = (shape.planes[:, :3] @ points[left].T + shape.planes[:, 3:]).max(axis=0) > apart
         clear[left] = outside | through(points[left]) if shape.carved and through else outside
     return clear
 
 
 def farther(points: Array, others: Array, apart: float) -> Mask:
-    """Whether points (n, 3) are farther than `apart` from all others (m, 3)."""
+    """Return whether points (n, 3) are farther than `apart` from all others (m, 3)."""
     if not len(others):
         return np.ones(len(points), dtype=bool)
     return np.asarray(_square(others, points).min(axis=0) > apart**2)
 
 
 def _square(others: Array, points: Array) -> Array:
-    """Squares of all distances, (m, n): as one matrix product, good to 1e-9 mm2 within a metre."""
+    """Return the squares of all distances, (m, n), as one matrix product, accurate to 1e-9 mm2 within a metre."""
     theirs, own = np.einsum("ij,ij->i", others, others), np.einsum("ij,ij->i", points, points)
     return np.asarray(theirs[:, None] + own - 2 * (others @ points.T))

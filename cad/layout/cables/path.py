@@ -1,9 +1,7 @@
 """A smooth path: straight pieces with an arc of one radius at each corner. Millimetres.
 
-The arcs are tangent to what they join, so the radius is kept by construction: what is too short for it has no path.
+The arcs are tangent to the straight pieces, so the radius is kept; pieces that are too short have no path.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -17,21 +15,13 @@ STRAIGHT = 1e-6  # rad: less is no corner
 
 @dataclass(frozen=True, slots=True)
 class PathPiece:
-    """One straight piece or arc.
+    """One straight piece or arc."""
 
-    Attributes:
-        start: shape (3,).
-        middle: on the arc, or halfway along the straight, shape (3,).
-        end: shape (3,).
-        length: along it.
-        straight: whether it is no arc.
-    """
-
-    start: Array
-    middle: Array
-    end: Array
-    length: float
-    straight: bool
+    start: Array  # shape (3,)
+    middle: Array  # on the arc, or halfway along the straight, shape (3,)
+    end: Array  # shape (3,)
+    length: float  # along it
+    straight: bool  # whether it is no arc
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +32,18 @@ class Path:
     radius: float
 
     def tangents(self) -> Array:
-        """What the arc at each corner takes of both neighbours, 0 at the ends, shape (n,)."""
+        """Return the tangent length of the arc at each corner, 0 at the ends, shape (n,)."""
         inner = self.radius * np.tan(turns(np.array(self.corners)) / 2)
         return np.concatenate([[0.0], inner, [0.0]])
 
     def slack(self) -> float:
-        """Least length that is left of a straight piece between its arcs; below zero there is no such path."""
+        """Return the least length of a straight piece between its arcs; there is no such path below zero."""
         lengths = np.linalg.norm(np.diff(np.array(self.corners), axis=0), axis=1)
         tangents = self.tangents()
         return float((lengths - tangents[:-1] - tangents[1:]).min())
 
     def pieces(self) -> list[PathPiece]:
-        """Straights and arcs in their order; a straight of no length is left out.
+        """Return straights and arcs in order, without straights of no length.
 
         Raises:
             ValueError: the corners are too near to each other for the radius.
@@ -83,11 +73,11 @@ class Path:
         return pieces
 
     def length(self) -> float:
-        """Length from end to end."""
+        """Return the length from end to end."""
         return sum(piece.length for piece in self.pieces())
 
     def least_radius(self) -> float:
-        """Smallest radius of its arcs as drawn: of the circles through their ends and middles."""
+        """Return the smallest radius of its arcs, from their ends and middles."""
         radii = [math.inf]
         for piece in self.pieces():
             if not piece.straight:
@@ -97,7 +87,7 @@ class Path:
         return round(min(radii), 6)
 
     def points(self, step: float) -> Array:
-        """Points along it, no further apart than a step, shape (n, 3)."""
+        """Return points along it at most a step apart, shape (n, 3)."""
         runs = []
         for piece in self.pieces():
             share = np.linspace(0.0, 1.0, max(2, math.ceil(piece.length / step) + 1))[:, None]
@@ -113,7 +103,7 @@ class Path:
 
 
 def turns(corners: Array) -> Array:
-    """Angle by which a polyline turns at each inner corner [rad], shape (n - 2,)."""
+    """Return the angle by which a polyline turns at each inner corner [rad], shape (n - 2,)."""
     along = np.diff(corners, axis=0)
     along = along / np.linalg.norm(along, axis=1)[:, None]
     cosine = np.einsum("ij,ij->i", along[:-1], along[1:])

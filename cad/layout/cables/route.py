@@ -1,11 +1,9 @@
-"""A short path of a lead through the free space on the rotor, as the corners of smooth arcs.
+"""A short path of a cable through the free space, as the corners of smooth arcs.
 
-Straight pieces between the points of a lattice about the axis make the graph; what is found is a short chain of
-them whose corners leave room for their arcs. Each piece pays for at most half of the arc at either end, so that any
-chain of allowed neighbours is a path.
+Straight pieces between the points of a lattice make the graph; the result is a short chain of them whose corners leave
+space for their arcs. Each piece provides at most half of its length to the arc at either end, so that any chain of
+allowed neighbours is a path.
 """
-
-from __future__ import annotations
 
 import heapq
 import math
@@ -19,73 +17,68 @@ from numpy.typing import NDArray
 from scanwright.cad.layout.cables.path import Path
 from scanwright.design.arrays import Array, Mask
 
-SAMPLE = 3.0  # mm between two points that are looked at
+SAMPLE = 3.0  # mm between two tested points
 AZIMUTHS = 24
 FROM_HUB = 4.0  # first radius of the lattice
 STEP = 12.0  # of its radii and heights
-BEYOND = 12.0  # of the furthest end, where the lattice stops
+BEYOND = 12.0  # of the lattice beyond the furthest end
 REACH = 40.0  # of a piece between two points of the lattice
-GREED = 1.2  # how much the length that is left counts: a way a fifth longer at most, found in half the time
-ARRIVALS = 6  # at a point from which one goes on: no way of 28 was lost or longer than with all of them
+GREED = 1.2  # weight of the remaining length: a path at most a fifth longer, in half the time
+ARRIVALS = 6  # at a point that are continued: none of 28 paths was lost or longer than with all of them
 SHARPEST = math.radians(125.0)
-GAP = 0.6  # between a lead and what it passes
+GAP = 0.6  # between a lead and obstacles
 ROUNDING = 0.3  # more along the straight pieces
 
 
-class LeadRoom(Protocol):
-    """What a lead must stay clear of."""
+class CableSpace(Protocol):
+    """Space for a cable."""
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
-        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
         ...
 
 
-Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and the length that an arc may take of it
+Stiff = tuple[Array, float]  # direction of a stiff end at its tip, and its length available for an arc
 
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """A stiff end of a lead: points that it must pass, the last of them with a free length behind.
+    """A stiff end of a cable: points that it must pass, the last of them with a free length behind."""
 
-    Attributes:
-        corners: from the very end on, shape (k, 3); what follows goes on along `direction`.
-        direction: unit vector, shape (3,).
-        lengths: of the piece behind the last corner that may be tried.
-        used: what the arc at the last corner takes of that piece.
-        clamped: length of that piece along which it may be near: it leaves its device there.
-    """
-
-    corners: Array
-    direction: Array
-    lengths: tuple[float, ...]
-    used: float
-    clamped: float
+    corners: Array  # from the very end on, shape (k, 3); the cable continues along `direction`
+    direction: Array  # unit vector, shape (3,)
+    lengths: tuple[float, ...]  # to try, of the piece behind the last corner
+    used: float  # tangent length of the arc at the last corner
+    clamped: float  # length of that piece that may be near its device
 
     def tips(self) -> Array:
-        """Where the free part of the lead may begin, shape (m, 3)."""
+        """Return the possible starts of the free part of the lead, shape (m, 3)."""
         return np.asarray(self.corners[-1] + np.array(self.lengths)[:, None] * self.direction)
 
 
 def short_path(
-    room: LeadRoom, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
+    space: CableSpace, starts: Sequence[Ending], goals: Sequence[Ending], half: float, radius: float, lattice: Array
 ) -> Path | None:
-    """A short path from one of some ends to one of others, within GREED of the shortest; None where there is none.
+    """Return a short path between two ends, within GREED of the shortest; None if there is none.
 
     Args:
-        room: that it runs through.
-        starts: ends at the one device; any of them will do.
-        goals: ends at the other one, likewise.
-        half: radius of the lead.
-        radius: that it may be bent to.
-        lattice: points that it may turn at, shape (n, 3).
+        space: space for the cable.
+        starts: alternative ends at the one device.
+        goals: alternative ends at the other one.
+        half: radius of the cable.
+        radius: least bend radius.
+        lattice: points of possible corners, shape (n, 3).
     """
-    first, last = ([pair for end in ends for pair in _tips(room, end, half)] for ends in (starts, goals))
+    first, last = (
+        [(end, tip) for end in ends for tip in range(len(end.lengths)) if _clear(space, end, tip, half)]
+        for ends in (starts, goals)
+    )
     if not first or not last:
         return None
-    lattice = lattice[room.free(lattice, half, GAP + ROUNDING)]
+    lattice = lattice[space.free(lattice, half, GAP + ROUNDING)]
     points = np.concatenate([[end.tips()[tip] for end, tip in first], lattice, [end.tips()[tip] for end, tip in last]])
     beyond = len(first) + len(lattice)
-    chain = PathGraph(room, half, radius, points).chain(
+    chain = PathGraph(space, half, radius, points).chain(
         {i: (end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(first)},
         {i: (-end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(last, start=beyond)},
     )
@@ -96,12 +89,8 @@ def short_path(
     return Path(tuple((float(x), float(y), float(z)) for x, y, z in corners), radius)
 
 
-def _tips(room: LeadRoom, end: Ending, half: float) -> list[tuple[Ending, int]]:
-    return [(end, tip) for tip in range(len(end.lengths)) if _clear(room, end, tip, half)]
-
-
 def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[Ending]) -> Array:
-    """Points about the axis, from beside a hub to beyond some ends, above a floor, shape (n, 3)."""
+    """Return points about the axis, from a hub to beyond some ends, above a floor, shape (n, 3)."""
     low, tips = floor + half + GAP + ROUNDING, np.concatenate([end.tips() for end in ends])
     turn = 2 * math.pi * np.arange(AZIMUTHS) / AZIMUTHS
     radius = np.arange(hub + FROM_HUB, float(np.hypot(tips[:, 0], tips[:, 1]).max()) + BEYOND, STEP)
@@ -110,11 +99,11 @@ def lattice_about_axis(floor: float, half: float, hub: float, ends: Sequence[End
     return np.column_stack([r * np.cos(t), r * np.sin(t), z])
 
 
-def _clear(room: LeadRoom, end: Ending, tip: int, half: float) -> bool:
-    """Whether the straight piece that a stiff end runs along is free, but for where its device holds it."""
+def _clear(space: CableSpace, end: Ending, tip: int, half: float) -> bool:
+    """Return whether the straight piece of a stiff end is free outside its device."""
     first, last = min(end.clamped, end.lengths[tip]), end.lengths[tip]
     along = np.linspace(first, last, math.ceil((last - first) / SAMPLE) + 1)
-    return bool(room.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
+    return bool(space.free(end.corners[-1] + along[:, None] * end.direction, half, GAP).all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,23 +117,16 @@ class _Ends:
 
 @dataclass(frozen=True, slots=True)
 class PathGraph:
-    """The points (n, 3) that a lead may turn at, and the straight pieces between them, looked at when asked for.
+    """Points (n, 3) where a cable may turn, and the straight pieces between them, computed when needed."""
 
-    Attributes:
-        room: that the lead runs through.
-        half: radius of the lead.
-        radius: of the arcs between two pieces.
-        points: first those at the ring, last those at the lidar.
-    """
-
-    room: LeadRoom
-    half: float
-    radius: float
-    points: Array
+    space: CableSpace  # space for the cable
+    half: float  # radius of the cable
+    radius: float  # of the arcs between two pieces
+    points: Array  # first those at the ring, last those at the lidar
     _joined: dict[int, tuple[NDArray[np.int64], Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     def chain(self, starts: dict[int, Stiff], goals: dict[int, Stiff]) -> list[int]:
-        """Points of a short chain of pieces from a start to a goal; empty where there is none.
+        """Return the points of a short chain of pieces from a start to a goal; empty if there is none.
 
         Args:
             starts: first points, the direction of the stiff piece that ends there, and its length left for an arc.
@@ -152,7 +134,7 @@ class PathGraph:
         """
         left = GREED * np.linalg.norm(self.points[:, None] - self.points[list(goals)], axis=2).min(axis=1)
         ends = _Ends(min(goals), *(np.array(each) for each in zip(*goals.values(), strict=True)))
-        # a piece is known by its two points; before the first one stands the stiff end
+        # a piece is known by its two points; before the first one is the stiff end
         shortest: dict[int, Array] = {}  # of all chains so far that end with each piece from a point
         came: dict[tuple[int, int], tuple[int, int]] = {}
         arrived: dict[int, int] = {}
@@ -182,7 +164,7 @@ class PathGraph:
         return along / length, length / 2
 
     def _onwards(self, here: int, stiff: Stiff, ends: _Ends, open_: Mask) -> NDArray[np.int64]:
-        """Which of the open pieces from a point one may go on along from a stiff one."""
+        """Return which of the open pieces from a point can follow a stiff one."""
         others, along, lengths = self._pieces_at(here)
         direction, left = stiff
         fits = open_ & (_arc(self.radius, along @ direction) <= np.minimum(left, lengths / 2))
@@ -193,19 +175,19 @@ class PathGraph:
             fits[last] &= _arc(self.radius, turn) <= np.minimum(ends.left[end], lengths[last] / 2)
         chosen = np.flatnonzero(fits)
         inside = self.points[here] + _on_arcs(self.radius, direction, along[chosen])
-        free = self.room.free(inside.reshape(-1, 3), self.half, GAP).reshape(len(inside), -1).all(axis=0)
+        free = self.space.free(inside.reshape(-1, 3), self.half, GAP).reshape(len(inside), -1).all(axis=0)
         return chosen[free]
 
     def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
-        """Points that a free straight piece leads to from one, directions (m, 3) and lengths (m,)."""
+        """Return points reached by a free straight piece, directions (m, 3) and lengths (m,)."""
         if here not in self._joined:
             along = self.points - self.points[here]
             lengths = np.linalg.norm(along, axis=1)
             others = np.flatnonzero((lengths > self.radius) & (lengths < REACH))
             share = np.linspace(0.0, 1.0, math.ceil(REACH / SAMPLE) + 1)[1:, None, None]
             samples = self.points[here] + share * along[others]
-            free = self.room.free(samples.reshape(-1, 3), self.half, GAP + ROUNDING).reshape(len(share), -1).all(axis=0)
-            others = others[free]
+            free = self.space.free(samples.reshape(-1, 3), self.half, GAP + ROUNDING)
+            others = others[free.reshape(len(share), -1).all(axis=0)]
             self._joined[here] = others, along[others] / lengths[others, None], lengths[others]
         return self._joined[here]
 
@@ -219,15 +201,15 @@ def _back(came: dict[tuple[int, int], tuple[int, int]], last: tuple[int, int]) -
 
 
 def _arc(radius: float, cosine: Array) -> Array:
-    """What an arc takes of the pieces that it joins, without end where they turn back."""
+    """Return the tangent length of an arc between two pieces, infinite if they turn back."""
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     return np.where(angle < SHARPEST, radius * np.tan(np.minimum(angle, SHARPEST) / 2), np.inf)
 
 
 def _on_arcs(radius: float, direction: Array, along: Array) -> Array:
-    """Vectors from a corner to the quarters of its arc, for each way on (m, 3): shape (3, m, 3).
+    """Return vectors from a corner to the quarters of its arc, for each next direction (m, 3): shape (3, m, 3).
 
-    The widest arcs are four times as long as SAMPLE; where they begin and end, they touch the straight pieces.
+    The widest arcs are four times as long as SAMPLE.
     """
     half = np.arccos(np.clip(along @ direction, -1.0, 1.0)) / 2
     turned = np.array([-0.5, 0.0, 0.5])[:, None] * half

@@ -1,6 +1,4 @@
-"""Every number of the bearing's cage: its base on the servo's ears, and how stiff it holds the bearing. No kernel."""
-
-from __future__ import annotations
+"""Numbers of the bearing's cage: its base on the servo's ears, and its stiffness. No kernel."""
 
 import math
 from dataclasses import dataclass
@@ -9,11 +7,11 @@ import numpy as np
 
 from scanwright.cad.layout.direct.loads import Supported, hanging, shaft_modulus_pa, supported
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Ears, ears_on
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import CAGE_BASE
-from scanwright.cad.screws import SCREWS, Screw, Thread, Trap, passing_hole, thread_in_part
+from scanwright.cad.screws import SCREWS, Thread, Trap, passing_hole, thread_in_part
 from scanwright.design.catalogue.products import Bearing
-from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
@@ -22,29 +20,15 @@ RING_ABOVE_BASE = 1.5
 SEAT_GAP = 0.2  # the feet carry, not the plate
 FOOT_RADIUS = 3.0
 UNDER_HEAD = 3.0  # of the plate
-HEAD_WALL = 2.0  # beside the recess of a head
 CAGE_SCREW = SCREWS["M3"]
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
 UNDER_CAGE_HEAD = 3.5  # of a leg
 TRAP_WALL = 3.0  # of the boss outside a nut
-WINDOW_HALF_WIDTH = 11.5  # the adapter's arms stand in the windows at +-x; by those at +-y a tie is closed
-TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator beside it
-PLUG_PLAY = 1.0  # around a plug that is passed through a hole
+WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
+TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator next to it
+PLUG_PLAY = 1.0  # clearance around a plug in a hole
 PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
 POISSON = 0.35
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ears:
-    """The front holes of a servo that a plate is screwed to, heights above the horn; x and y of the rotation frame."""
-
-    front: float  # of the case
-    seats: float  # of the planes around the holes
-    opening: float  # radius, or half width of a fork, around the horn flange
-    half_x: float  # of the plate
-    screw: Screw
-    hole: float  # diameter
-    holes: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,26 +51,24 @@ class BearingCage:
 
     @property
     def high(self) -> float:
-        """Height of the boss, and of the whole base."""
+        """Height of the boss, and of the entire base."""
         return _boss_top(self.stack, self.low)
 
     @property
     def foot(self) -> float:
-        """Height of the flange that the bell stands on."""
+        """Height of the flange below the bell."""
         return (self.low + self.high) / 2
 
 
 def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
-    """The holes for the base of a cage.
+    """Return the holes for the base of a cage.
 
     Raises:
-        BuildError: the case has no four holes beside the turning flange.
+        BuildError: the case has no four holes next to the turning flange.
     """
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.front.screw]
-    hole = passing_hole(screw, printer)
     opening = stack.flange_radius + 1.0
-    least = opening + hole / 2 + printer.min_wall_mm
+    least = opening + passing_hole(SCREWS[servo.front.screw], printer) / 2 + printer.min_wall_mm
     free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
@@ -96,25 +78,17 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
             f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
             f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
         )
-    return Ears(
-        front=servo.case_max_mm[2],
-        seats=servo.front.z_mm,
-        opening=opening,
-        half_x=plate_half_x(servo, screw),
-        screw=screw,
-        hole=hole,
-        holes=holes,
-    )
+    return ears_on(scanner, opening, holes)
 
 
 def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | None:
-    """Parameters of the cage of one scanner; None if the horn carries the rotor alone."""
+    """Return the cage of one scanner; None if the horn carries the rotor alone."""
     if stack.bearing is None:
         return None
     printer = scanner.printer
     thread = thread_in_part(CAGE_SCREW, printer, carries=True)
-    if thread.trap is not None and not has_room(thread.trap, stack, _base_low(stack, ears), printer.min_wall_mm):
-        thread = thread_in_part(CAGE_SCREW, printer, room_for_nut=False, carries=True)
+    if thread.trap is not None and not nut_fits(thread.trap, stack, _base_low(stack, ears), printer.min_wall_mm):
+        thread = thread_in_part(CAGE_SCREW, printer, nut_fits=False, carries=True)
     hole = lead_hole(scanner, stack)
     avoid = (*ears.holes, *((x, hole[1]) for x in (-hole[0], hole[0]) if hole[0]))
     return BearingCage(
@@ -130,13 +104,13 @@ def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | N
 
 
 def stator_leads_y(scanner: Scanner, stack: DirectStack) -> float:
-    """Distance from the axis of the leads of a ring's stator: beside the flange and the case, at +y."""
+    """Return the distance from the axis of the leads of a ring's stator, at +y."""
     half = 0.0 if scanner.slip_ring is None else (scanner.slip_ring.lead_diameter_mm or 0.0) / 2
     return max(stack.flange_radius, scanner.servo.case_max_mm[1]) + TURNS_CLEAR + half
 
 
 def lead_hole(scanner: Scanner, stack: DirectStack) -> tuple[float, float]:
-    """Half width and end in y of a hole that a ring's leads and their plugs pass at +y; zeros without a ring."""
+    """Return the half width and end in y of the hole for a ring's leads and plugs at +y; zeros without a ring."""
     ring = scanner.slip_ring
     if ring is None:
         return 0.0, 0.0
@@ -144,11 +118,6 @@ def lead_hole(scanner: Scanner, stack: DirectStack) -> tuple[float, float]:
     wide, thick = ring.plug_mm or (lead, lead)
     y = max(stack.flange_radius + TURNS_CLEAR + thick, stator_leads_y(scanner, stack) + lead / 2) + PLUG_PLAY
     return max(wide, lead) / 2 + PLUG_PLAY, y
-
-
-def plate_half_x(servo: Servo, screw: Screw) -> float:
-    """Half width of a plate on the servo's front: that of the case, or what the heads of the ears' screws need."""
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.head_room + HEAD_WALL)
 
 
 def _base_low(stack: DirectStack, ears: Ears) -> float:
@@ -159,16 +128,16 @@ def _boss_top(stack: DirectStack, low: float) -> float:
     return min(low + BASE_HEIGHT, stack.ring_bottom - RING_ABOVE_BASE)
 
 
-def has_room(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
-    """Whether a nut in the boss has a floor below it and does not reach the ring above."""
+def nut_fits(trap: Trap, stack: DirectStack, low: float, wall: float) -> bool:
+    """Return whether a nut in the boss has a floor below it and does not reach the ring above."""
     quarter = (_boss_top(stack, low) - low) / 4
     return 3 * quarter - trap.corner >= wall and trap.corner <= quarter + RING_ABOVE_BASE / 2
 
 
 def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
-    """Sideways stiffness of a cage at the bearing: legs (shear, bending, rocking) and base by beam formulas, halved.
+    """Return the sideways stiffness of a cage at the bearing: legs and base by beam formulas, halved.
 
-    Screws and plates are stiffer or softer than beams: assumed to be right within a factor of two.
+    It is assumed to be right within a factor of two.
     """
     E = PLASTIC_PA * 1e-6  # N/mm2
     G = E / (2 + 2 * POISSON)
@@ -191,7 +160,7 @@ def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
 
 
 def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius: float) -> float:
-    """Azimuth [rad] within a leg whose radial screw stays furthest from the ears' screws."""
+    """Return the azimuth [rad] within a leg whose radial screw stays furthest from the ears' screws."""
 
     def clearance(azimuth: float) -> float:
         reach = np.linspace(radius - SCREW_DEPTH, radius, 11)
@@ -202,7 +171,7 @@ def _leg_screw(middle_deg: float, holes: tuple[tuple[float, float], ...], radius
 
 
 def share_weight(scanner: Scanner, stack: DirectStack, cage: BearingCage | None, weight: Weight) -> Supported:
-    """How horn and bearing share the weight of all that turns."""
+    """Return how horn and bearing share the weight of all that turns."""
     if cage is None:
         return hanging(weight, stack, shaft_modulus_pa(scanner, stack))
     return supported(weight, stack, stiffness_n_per_m(stack, cage.ears))

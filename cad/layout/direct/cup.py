@@ -1,19 +1,16 @@
-"""The printed shaft of a scanner that needs neither ring nor bearing. No kernel.
+"""The printed shaft of a scanner without ring and bearing. No kernel.
 
-Nothing has to pass over such a shaft, so that it need be no thinner than a ring's bore or the circle of the horn's
-screws: it is a cup around the heads of these screws, low and wide. What is wide enough needs no metal: a cup of 30 mm
-with a bore of 20 bends no more than a rod of aluminium of 12. Nuts in slots of its wall hold the hub.
+A cup around the heads of the horn's screws, low and wide: a cup of 30 mm with a bore of 20 bends no more than an
+aluminium rod of 12. Nuts in slots of its wall hold the hub.
 """
-
-from __future__ import annotations
 
 import math
 
-from scanwright.cad.layout.direct.frame import heads_over_horn_mm, needs_frame
+from scanwright.cad.layout.direct.frame import GRIP, OVER_HEADS, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import Envelope, hub_height, rows_of
 from scanwright.cad.layout.hub import CUP_HUB_WALL
-from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE, horn_thread_mm
+from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.servo import Servo
@@ -21,24 +18,26 @@ from scanwright.design.scanner import Scanner
 
 CUP_WALL = 7.0  # an insert for a cross screw, or its nut with plastic before and behind it
 FLOOR = 4.0  # on the horn
-ROUND_HOLE = 0.05  # what the facets of a hole take from the wall beside it
+ROUND_HOLE = 0.05  # loss of wall by the facets of a hole
 FLOOR_ON_FOOT = 3.0  # over the foot of a cup on a servo frame
-OVER_BOSS = 2.0  # of the horn: play, and a floor that is no skin
+OVER_BOSS = 2.0  # of the horn: clearance, and a printable floor
 
 
 def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
     """Lay out the stack of one scanner without a ring and a bearing; R is the laser in the rotation frame, (3, 3)."""
     servo = scanner.servo
     floor = max(FLOOR, servo.horn_boss_height_mm + OVER_BOSS)
-    bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].head_room
+    bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].driver_radius
     diameter = float(math.ceil(bore + 2 * CUP_WALL))
     hub_radius = flange = diameter / 2 + CUP_HUB_WALL
     foot, foot_height, grip = 0.0, 0.0, 0.0
     if needs_frame(servo):  # it must widen above the heads of the frame's screws
         foot = (servo.horn_circle_mm + passing_hole(SCREWS[servo.horn_screw], scanner.printer)) / 2
         foot += scanner.printer.min_wall_mm + ROUND_HOLE
-        foot_height, flange = heads_over_horn_mm(servo), diameter / 2
-        wall = SCREWS[servo.horn_screw].head_room + scanner.printer.min_wall_mm  # around the heads in the cone
+        # over the horn's face: the heads of the frame's screws, with clearance
+        foot_height = servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
+        flange = diameter / 2
+        wall = SCREWS[servo.horn_screw].driver_radius + scanner.printer.min_wall_mm  # around the heads in the cone
         grip = _grip(servo, max(floor, foot_height + max(FLOOR_ON_FOOT, wall)))
         floor = max(grip, foot_height + flange - foot)  # a cone of 45 deg needs no support
     return DirectStack(
@@ -64,7 +63,7 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
 
 
 def _grip(servo: Servo, least: float) -> float:
-    """Return the thickness from a least one on at which a screw of a standard length fills the horn's thread."""
-    deep = horn_thread_mm(servo) - THREAD_FREE
+    """Return the thickness, at least `least`, at which a screw of a standard length fills the horn's thread."""
+    deep = servo.horn_thread_depth_mm - THREAD_FREE
     lengths = LENGTHS[servo.horn_screw]
     return max(least, next((length for length in lengths if length >= least + deep), lengths[-1]) - deep)

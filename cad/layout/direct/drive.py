@@ -1,7 +1,5 @@
 """The servo on the axis, as a `DriveLayout`: horn, shaft through the ring, hub."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 
@@ -17,7 +15,6 @@ from scanwright.cad.layout.direct.frame import (
     corner_holes,
     frame_of,
     needs_frame,
-    no_rear_holes,
 )
 from scanwright.cad.layout.direct.lead_exits import lead_exits, stator_exit
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
@@ -28,12 +25,13 @@ from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
 from scanwright.cad.screws import SCREWS
+from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-# The order that always works: what comes over the shaft follows what carries it.
+# Assembly order: parts over the shaft follow the parts that carry it.
 BUILT = (
     names.SERVO_FRAME,
     names.BASE_MOUNT,
@@ -56,7 +54,7 @@ CAGE_HEADS = 4.0  # of the screws of the cage, beyond it
 
 
 def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """The drive of a scanner whose ring lets the shaft through, or that has none.
+    """Return the drive of a scanner with a through-bore ring or without a ring.
 
     Raises:
         BuildError: it cannot be laid out.
@@ -69,7 +67,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
     if frame is not None and (scanner.slip_ring is not None or stack.bearing is not None):
         raise BuildError(
             f"{names.SERVO_FRAME}: holes: {scanner.servo.name} has usable holes in its front only, which its frame "
-            "takes: take no slip ring, or another servo"
+            "uses: use no slip ring, or another servo"
         )
     leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
     cage_n_per_m = 0.0 if cage is None else stiffness_n_per_m(stack, cage.ears)
@@ -154,20 +152,23 @@ def _stations(
 
 
 def _bears(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
-    """Only a horn without a bearing can have too much by a bar; if it has too much without one, the check says so."""
+    """Return whether the horn bears a bar; with a bearing, or if it is overloaded without the bar, a check decides."""
     if stack.bearing is not None or not horn_bears(scanner, stack):
         return True
     return horn_bears_balanced(scanner, stack, bar_g, bar_z)
 
 
 def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Mounted:
-    """The servo's case, or the frame that holds it.
+    """Return the servo's case, or the frame that holds it, on the mount.
 
     Raises:
         BuildError: it has no holes that may carry it.
     """
     if frame is None and not corner_holes(servo.rear.places):
-        raise no_rear_holes(servo)
+        raise BuildError(
+            f"{names.SERVO_FRAME}: holes: {servo.name} has no four equal holes in its rear and no two in its front "
+            f"({what_holds(servo.holes)}{servo.caution('holes')}): use another servo"
+        )
     xs, ys, zs = zip(servo.case_min_mm, servo.case_max_mm, strict=True)
     around, top = max(stack.ring_radius + ADAPTER_ARMS, stack.hub_radius), max(stack.ring_top, stack.horn)
     if stack.bearing is not None:
@@ -208,7 +209,7 @@ def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
         yield LeftOut(names.SERVO_FRAME, f"{scanner.servo.name} is held by the holes in its rear", 1, "parts")
     if stack.bearing is None:
         servo = scanner.servo
-        why = f"the horn of {servo.name} carries an axis this upright alone"
+        why = f"the horn of {servo.name} alone carries an axis this upright"
         if servo.radial_load_n is None:
-            why = f"{why}, by what such a horn is trusted with: its maker rates none"
+            why = f"{why} (rating assumed: its maker states none)"
         yield LeftOut(names.BEARING_CAGE, why, 1, "parts")

@@ -1,25 +1,22 @@
-"""Every number of the frame that holds a servo by the threads in its front. No kernel.
+"""Numbers of the frame that holds a servo by the threads in its front. No kernel.
 
-A servo whose rear has only case screws, such as those of the X series, hangs from a plate on its front.
-Four legs carry the plate, and their feet are screwed to the deck or to the base mount.
+For servos whose rear has only case screws, such as the X series: the servo hangs from a plate on four legs, whose feet
+are screwed to the deck or to the base mount.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.names import SERVO_FRAME
-from scanwright.cad.screws import SCREWS, Screw, passing_hole
-from scanwright.design.catalogue.holes import what_holds
+from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
 GRIP = 2.5  # of the plate, under the heads of the servo's screws
-HORN_ROOM = 0.5  # around what turns in the plate's opening
-OVER_HEADS = 0.5  # between the heads and what turns above them
+HORN_GAP = 0.5  # around the turning parts in the plate's opening
+OVER_HEADS = 0.5  # between the heads and the parts that turn above them
 GAP = 0.3  # around the case
 LEG = 5.0
 WINDOW = 8.0  # half width of the opening between two legs, about the servo's plug
@@ -34,33 +31,18 @@ SEAT_GAP = 0.3  # the feet carry, not the case
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoFrame:
-    """Lengths in mm; x and y are those of the servo, z of the rotation frame.
+    """Lengths in mm; x and y are those of the servo, z of the rotation frame."""
 
-    Attributes:
-        low: lower face of the feet.
-        plate: lower face of the plate, on the front of the case.
-        opening: radius around the axis.
-        half_x: of the room for the case.
-        ends_y: of legs and plate.
-        window_y: between the legs of a side.
-        screw: that holds the servo.
-        hole: diameter.
-        holes: places of these screws.
-        feet: places of the screws in the feet.
-        foot_hole: diameter.
-    """
-
-    low: float
-    plate: float
-    opening: float
-    half_x: float
-    ends_y: tuple[float, float]
-    window_y: tuple[float, float]
-    screw: Screw
-    hole: float
-    holes: tuple[tuple[float, float], ...]
-    feet: tuple[tuple[float, float], ...]
-    foot_hole: float
+    low: float  # lower face of the feet
+    plate: float  # lower face of the plate, on the front of the case
+    opening: float  # radius around the axis
+    half_x: float  # of the space for the case
+    ends_y: tuple[float, float]  # of legs and plate
+    window_y: tuple[float, float]  # between the legs of a side
+    hole: float  # diameter, of the servo's screws
+    holes: tuple[tuple[float, float], ...]  # places of these screws
+    feet: tuple[tuple[float, float], ...]  # places of the screws in the feet
+    foot_hole: float  # diameter
 
     @property
     def high(self) -> float:
@@ -79,7 +61,7 @@ class ServoFrame:
         return min(abs(end - y) for end in self.ends_y)
 
     def legs(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
-        """Boxes of the four legs with their feet, as low and high corners."""
+        """Return the boxes of the four legs with their feet, as low and high corners."""
         spans = ((self.ends_y[0], self.window_y[0]), (self.window_y[1], self.ends_y[1]))
         return [
             (
@@ -106,11 +88,6 @@ def needs_frame(servo: Servo) -> bool:
     return not corner_holes(servo.rear.places) and len(servo.front.places) >= 2
 
 
-def heads_over_horn_mm(servo: Servo) -> float:
-    """Return the height over the horn's face that whatever is wider than the frame's opening must keep."""
-    return servo.front.z_mm + GRIP + SCREWS[servo.front.screw].head_height + OVER_HEADS
-
-
 def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
     """Return the frame of one scanner whose servo needs one.
 
@@ -118,14 +95,13 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
         BuildError: the servo's screws come too close to its horn.
     """
     servo, printer = scanner.servo, scanner.printer
-    screw = SCREWS[servo.front.screw]
-    hole = passing_hole(screw, printer)
-    opening = max(servo.horn_diameter_mm / 2, stack.foot_radius) + HORN_ROOM
+    hole = passing_hole(SCREWS[servo.front.screw], printer)
+    opening = max(servo.horn_diameter_mm / 2, stack.foot_radius) + HORN_GAP
     wall = min(math.hypot(x, y) for x, y in servo.front.places) - hole / 2 - opening
     if wall < printer.min_wall_mm:
         raise BuildError(
             f"{SERVO_FRAME}: plate: holes = {list(servo.front.places)} in front{servo.caution('holes')}: leave a "
-            f"wall of {wall:.2f} mm beside the horn of {servo.name}, {printer.name} needs min_wall_mm = "
+            f"wall of {wall:.2f} mm next to the horn of {servo.name}, {printer.name} needs min_wall_mm = "
             f"{printer.min_wall_mm:g}"
         )
     (x0, y0, z0), (x1, y1, _) = servo.case_min_mm, servo.case_max_mm
@@ -145,17 +121,8 @@ def frame_of(scanner: Scanner, stack: DirectStack) -> ServoFrame:
         half_x=half_x,
         ends_y=(y0, y1),
         window_y=window,
-        screw=screw,
         hole=hole,
         holes=servo.front.places,
         feet=((out, front), (-out, front), (-out, back), (out, back)),
         foot_hole=passing_hole(FOOT_SCREW, printer),
-    )
-
-
-def no_rear_holes(servo: Servo) -> BuildError:
-    """Return the error of a servo that neither its rear nor its front can hold."""
-    return BuildError(
-        f"{SERVO_FRAME}: holes: {servo.name} has no four equal holes in its rear and no two in its front "
-        f"({what_holds(servo.holes)}{servo.caution('holes')}): take another servo"
     )

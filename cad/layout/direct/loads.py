@@ -1,11 +1,9 @@
-"""What the rotor's weight does to the horn, and the bearing that a tilted axis needs. No kernel: plain numpy.
+"""Load of the rotor's weight on the horn, and the bearing of a tilted axis. No kernel.
 
-Without a bearing the horn carries the whole tilt moment, through a turned shaft or a printed cup. With one the shaft is
-a beam, clamped in the horn and held at the height of the bearing by the cage, a spring; its waist is the thinnest piece
-of that beam. SI units; lengths of the stack are millimetres.
+Without a bearing the horn carries the tilt moment through a turned shaft or a printed cup. With one the shaft is a
+beam, clamped in the horn and supported by the cage, a spring, at the bearing; its waist is the thinnest piece of that
+beam. SI units; lengths of the stack are millimetres.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -39,22 +37,15 @@ SHEAR_SHARE = 0.9  # of a round section that carries shear
 
 @dataclass(frozen=True, slots=True)
 class ShaftMetal:
-    """What a shaft may be turned from.
+    """Metal of a turned shaft."""
 
-    Attributes:
-        name: as it is ordered.
-        modulus_pa: of elasticity.
-        waist: diameter of the waist in this metal, as a share of that in aluminium.
-        yields_pa: shear stress at which it yields.
-    """
-
-    name: str
-    modulus_pa: float
-    waist: float
-    yields_pa: float
+    name: str  # order name
+    modulus_pa: float  # of elasticity
+    waist: float  # diameter of the waist in this metal, as a share of that in aluminium
+    yields_pa: float  # shear stress at which it yields
 
     def twisted_off_nm(self, waist_diameter: float) -> float:
-        """Torque at which a waist yields that is of this diameter in aluminium."""
+        """Return the torque at which a waist yields; its diameter is stated for aluminium."""
         return self.yields_pa * math.pi * (self.waist * waist_diameter / 1000) ** 3 / 16
 
 
@@ -78,7 +69,7 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
     """Return the smallest bearing around shaft and leads and under the hub; None without a ring if there is none.
 
     Raises:
-        BuildError: the leads of the ring need more room than any bearing leaves.
+        BuildError: the leads of the ring need more space than any bearing leaves.
     """
     depth = max(LEADS_DEPTH, stack.lead_diameter + 2 * BUNDLE_GAP)
     least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * depth)
@@ -95,15 +86,15 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
 
 
 def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
-    """Whether the horn alone bears the heaviest linkage that any angles give: without a bearing a scanner is safe.
+    """Return whether the horn bears the heaviest linkage of any angles without a bearing.
 
-    A horn that its maker does not rate is trusted with little.
+    A horn without a rating is assumed to bear little.
     """
     return heaviest(scanner, stack).moment_nm <= trusted_moment_nm(scanner)
 
 
 def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
-    """Whether the horn alone bears the heaviest linkage and a bar, of this mass and height, that balances it."""
+    """Return whether the horn bears the heaviest linkage and a bar of this mass and height that balances it."""
     weight = heaviest(scanner, stack)
     bar = bar_g / 1000 * STANDARD_GRAVITY_M_S2 * tilt_sine(scanner) * (bar_z - stack.horn) / 1000
     return weight.across_n * weight.lever_m + bar <= trusted_moment_nm(scanner)
@@ -129,20 +120,14 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
     R = float((bend * reach * moment).sum()) / give
     over = (stack.hub_bottom - stack.bearing_middle) / 1000
     beyond = weight.across_n * (weight.lever_m - b - over / 2) + weight.along_n * weight.off_axis_m
-    shaft = metal.modulus_pa * _second_moment(stack.shaft_diameter)
+    shaft = metal.modulus_pa * math.pi / 64 * (stack.shaft_diameter / 1000) ** 4
     slope = float((bend * (moment - R * reach)).sum()) + over * beyond / shaft
     foot = weight.across_n * weight.lever_m + weight.along_n * weight.off_axis_m
     return Supported(abs(foot - R * b), R, abs(slope), b / give)
 
 
 def hanging(weight: Weight, stack: DirectStack, modulus_pa: float) -> Supported:
-    """The horn alone carries: a cantilever up to the hub, which is stiff.
-
-    Args:
-        weight: of all that turns.
-        stack: without a bearing.
-        modulus_pa: of the shaft.
-    """
+    """Return the load of a horn that carries alone: a cantilever up to the rigid hub, of this modulus."""
     above_horn, thick = stack.slices(stack.hub_bottom - stack.horn, stack.waist_diameter)
     outer, inner = stack.radius_at(above_horn, stack.waist_diameter) / 1000, stack.bore_at(above_horn) / 1000
     moment = weight.across_n * (weight.lever_m - above_horn / 1000) + weight.along_n * weight.off_axis_m
@@ -153,7 +138,7 @@ def hanging(weight: Weight, stack: DirectStack, modulus_pa: float) -> Supported:
 def shaft_bend(
     stack: DirectStack, modulus_pa: float = ALUMINIUM_PA, cage_n_per_m: float = 0.0, horn_rad_per_nm: float = 0.0
 ) -> ShaftBend:
-    """Return how far the beam from horn to hub gives way at the hub.
+    """Return the compliance of the shaft at the hub.
 
     Round sections or tubes (Timoshenko), clamped in the horn; a spring braces the bearing's sleeve sideways.
 
@@ -186,17 +171,12 @@ def shaft_bend(
 
 
 def shaft_modulus_pa(scanner: Scanner, stack: DirectStack) -> float:
-    """Modulus of elasticity of the shaft's material: a cup is printed, every other shaft is taken for aluminium."""
+    """Return the elastic modulus of the shaft: of the print for a cup, else of aluminium."""
     return 1e9 * scanner.printer.modulus_gpa if stack.cup_bore > 0 else ALUMINIUM_PA
 
 
-def _second_moment(diameter_mm: float) -> float:
-    """Second moment of area of a round bar [m4]."""
-    return math.pi / 64 * (diameter_mm / 1000) ** 4
-
-
 def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
-    """Weight of the rotor with the heaviest linkage."""
+    """Return the weight of the rotor with the heaviest linkage."""
     lidar, ring = scanner.lidar, scanner.slip_ring
     normal = stack.R()[:, 2]
     middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
@@ -214,7 +194,7 @@ def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
 
 
 def _shaft_g(scanner: Scanner, stack: DirectStack) -> float:
-    """Mass of the plain shaft, or of a cup with its flange."""
+    """Return the mass of the plain shaft, or of a cup with its flange."""
     density = scanner.printer.density_g_cm3 if stack.cup_bore > 0 else ALUMINIUM_G_CM3
     section = stack.shaft_diameter**2 - stack.cup_bore**2
     flange = (2 * stack.flange_radius) ** 2 * stack.flange_thickness if stack.cup_bore > 0 else 0.0

@@ -1,16 +1,15 @@
-"""Laying out the direct drive: shaft and flange by ring and horn, the hub by the lidar, and the bearing. mm."""
-
-from __future__ import annotations
+"""Sizes of the direct drive: shaft and flange by ring and horn, the hub by the lidar, and the bearing. mm."""
 
 import math
 from dataclasses import replace
 
 from scanwright.cad.layout.direct.adapter import fork_holes
-from scanwright.cad.layout.direct.cage import Ears, ears_of
+from scanwright.cad.layout.direct.cage import ears_of
 from scanwright.cad.layout.direct.cup import cup_stack
 from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
 from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height, leaning_least, lidar_pose, rows_of
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT
@@ -20,15 +19,16 @@ from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-SHAFT_PLAIN = 12.0  # without a ring, where the heads of the horn's screws leave room
-SHAFT_LOOSE = 1.0  # likewise at most, where the heads of the horn's screws leave no room for more
+SHAFT_PLAIN = 12.0  # without a ring, if it fits between the heads of the horn's screws
+SHAFT_LOOSE = 1.0  # most clearance in a ring, if no thicker shaft fits between these heads
 SHAFT_SLIDES = 0.05  # in the bore of a ring, whose set screws hold it, on the diameter
 SHAFT_MIN = 8.0
-COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less only where the heads beside it stand close
+LEAST_BORE = SHAFT_MIN + SHAFT_SLIDES
+COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less if the heads next to it are close
 
 
 def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ears | None]:
-    """Lay out the stack of one scanner with its servo on the axis, and the ears that a bearing's cage stands on.
+    """Lay out the stack of one scanner with its servo on the axis, and the ears of a bearing's cage.
 
     Raises:
         BuildError: the ring has no bore, a bore too small for a shaft, the case has no holes for a cage, or the lidar
@@ -47,7 +47,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
 
 
 def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
-    """A cup if neither ring nor bearing needs a turned shaft."""
+    """Return the stack, a cup if neither ring nor bearing needs a turned shaft."""
     cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
@@ -75,37 +75,34 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         sub_plate=None,
     )
     bearing = None
-    if _needs_bearing(scanner, alone):
+    # the horn is not rated for the rotor, or only the base of a cage has holes for the adapter of a ring
+    if not horn_bears(scanner, alone) or (ring is not None and not fork_holes(scanner.servo, alone)):
         try:
             bearing = bearing_for(scanner, alone)
         except BuildError:
-            ears_of(scanner, alone)  # first what no other ring can correct
+            ears_of(scanner, alone)  # its error comes first: no other ring corrects it
             raise
     return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
 
 
-def _needs_bearing(scanner: Scanner, stack: DirectStack) -> bool:
-    """If the horn is not rated for the rotor, or if only the base of a bearing's cage finds holes for a ring."""
-    return not horn_bears(scanner, stack) or (scanner.slip_ring is not None and not fork_holes(scanner.servo, stack))
-
-
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
-    """Shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
+    """Return the shaft diameter, and the ring's length, radius and bore (0 without a ring)."""
     ring = scanner.slip_ring
     if ring is None:
-        return _between_heads(scanner.servo), 0.0, 0.0, 0.0
+        shaft = min(SHAFT_PLAIN, math.floor(4 * _radius_on_horn(scanner.servo)) / 2)  # between the heads of its screws
+        return max(SHAFT_MIN, shaft), 0.0, 0.0, 0.0
     if ring.bore_mm == 0:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = 0: direct drive needs a ring with a through bore: the shaft from horn "
-            f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {_least_bore():.1f}"
+            f"to lidar would have to pass the stator of a capsule; take a ring with bore_mm >= {LEAST_BORE:.1f}"
         )
     shaft = round(ring.bore_mm - SHAFT_SLIDES, 2)
-    if shaft / 2 > _room_on_horn(scanner.servo) > (ring.bore_mm - SHAFT_LOOSE) / 2:
-        shaft = math.floor(4 * _room_on_horn(scanner.servo)) / 2  # the ring's set screws centre it
+    if shaft / 2 > _radius_on_horn(scanner.servo) > (ring.bore_mm - SHAFT_LOOSE) / 2:
+        shaft = math.floor(4 * _radius_on_horn(scanner.servo)) / 2  # the ring's set screws centre it
     if shaft < SHAFT_MIN:
         raise BuildError(
             f"slip_ring {ring.name}: bore_mm = {ring.bore_mm:g}: a shaft of {shaft:g} mm bends under the lidar; "
-            f"take a ring with bore_mm >= {_least_bore():.1f}"
+            f"take a ring with bore_mm >= {LEAST_BORE:.1f}"
         )
     if ring.bore_mm + 4.0 > ring.outer_diameter_mm:
         raise BuildError(
@@ -115,32 +112,23 @@ def _ring(scanner: Scanner) -> tuple[float, float, float, float]:
     return shaft, ring.length_mm, ring.outer_diameter_mm / 2, ring.bore_mm
 
 
-def _between_heads(servo: Servo) -> float:
-    """Diameter of a shaft that no ring asks for: thinner where the heads of the horn's screws stand close."""
-    return max(SHAFT_MIN, min(SHAFT_PLAIN, math.floor(4 * _room_on_horn(servo)) / 2))
-
-
-def _room_on_horn(servo: Servo) -> float:
-    """Radius that the heads of the horn's screws leave."""
+def _radius_on_horn(servo: Servo) -> float:
+    """Return the radius inside the heads of the horn's screws."""
     return (servo.horn_circle_mm - SCREWS[servo.horn_screw].head_diameter) / 2
 
 
-def _least_bore() -> float:
-    return SHAFT_MIN + SHAFT_SLIDES
-
-
 def _flange(servo: Servo, shaft_diameter: float) -> tuple[float, float, float, float]:
-    """Radius and thickness of the horn flange, radius and height of the collar over the horn's boss."""
+    """Return the radius and thickness of the horn flange, radius and height of the collar over the horn's boss."""
     screw = SCREWS[servo.horn_screw]
     circle = servo.horn_circle_mm / 2
     radius = max(servo.horn_diameter_mm / 2, circle + screw.head_diameter / 2 + 0.5)
-    room, boss = _room_on_horn(servo), servo.horn_boss_diameter_mm / 2
-    collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(room, boss + COLLAR_WALL_MIN)))
-    if collar > room:
+    inside, boss = _radius_on_horn(servo), servo.horn_boss_diameter_mm / 2
+    collar = max(shaft_diameter / 2, min(boss + COLLAR_WALL, max(inside, boss + COLLAR_WALL_MIN)))
+    if collar > inside:
         mark = servo.caution("horn_circle_mm")
         raise BuildError(
             f"{SERVO_SHAFT}: collar radius = {collar:g} mm: the heads of the horn's {screw.name} screws on a circle of "
-            f"{servo.horn_circle_mm:g} mm{mark} leave {room:g} mm; take a ring with a smaller bore, a capsule, or none"
+            f"{servo.horn_circle_mm:g} mm{mark} leave {inside:g} mm; use a ring with a smaller bore, a capsule, or none"
         )
     thickness = 4.0
     return radius, thickness, collar, max(servo.horn_boss_height_mm + 4.0, thickness + screw.head_height)

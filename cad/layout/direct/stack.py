@@ -2,12 +2,12 @@
 
 Rotation frame at gamma = 0, mm: origin at the optical centre, z the rotation axis out of the servo horn, +y
 towards the servo's +Y face, where the index marks meet. Everything that turns stays above the plane of the
-ring's top, everything that stands still beside the shaft stays below it: clearance of a whole turn needs no stepping.
+ring's top, all fixed parts around the shaft stay below it: clearance over a turn needs no stepping.
 
     z = 0             optical centre
     -h                top of the linkage's hub
     shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
-    hub_bottom        the shoulder, or below it the lower end of the sleeve that sits in a bearing
+    hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
     leads_low         HUB_GAP, or what the bend of its leads needs, below: the end of the ring's rotor collar
     ring_top          the collar's length below
     ring_bottom       the length of the ring's stator below
@@ -18,8 +18,6 @@ A tilted axis whose rotor is too heavy for the horn alone gets a bearing on a sl
 (`cad/layout/direct/loads.py`). Without ring and bearing nothing has to pass over the shaft: it is a printed cup
 (`cad/layout/direct/cup.py`), its flange CUP_GAP below the shoulder.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass
@@ -56,7 +54,7 @@ GROOVES = {
 CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
 CAGE_WALL = 5.0
 CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
-BEARING_SLACK = 0.3  # along the axis: room for what bonds the bearing
+BEARING_SLACK = 0.3  # along the axis: space for the bond of the bearing
 CAGE_GAP = 1.0  # between hub and cage
 WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
@@ -77,13 +75,13 @@ class DirectStack(Hub):
     collar_height: float
     waist_length: float  # of the thin piece that bends where horn and bearing are not quite in line
     waist_diameter: float  # in aluminium
-    foot_radius: float = 0.0  # of a cup that stands over the screws of a servo frame; 0 of every other one
+    foot_radius: float = 0.0  # of a cup over the screws of a servo frame; else 0
     foot_height: float = 0.0
     grip: float = 0.0  # of such a cup under the heads of the horn's screws; else its flange
 
     @property
     def shaft(self) -> str:
-        """Name of the part that stands on the horn."""
+        """Name of the part on the horn."""
         return SERVO_SHAFT if self.cup_bore == 0 else HORN_CUP
 
     @property
@@ -155,14 +153,14 @@ class DirectStack(Hub):
         return max(size for size in GROOVES if size <= self.shaft_diameter)
 
     def radius_at(self, above_horn: Array, waist_diameter: float) -> Array:
-        """Radius of the shaft at heights above the horn; the pocket of the horn's boss is left out.
+        """Return the radius of the shaft at heights above the horn, without the pocket of the horn's boss.
 
-        The floor of a cup counts as wide as the circle of the screws that clamp it: finite elements of a cup that the
-        face of its horn holds turn 1.2 times as far.
+        The floor of a cup counts as wide as the circle of its screws: finite elements of a cup on the face of its horn
+        turn 1.2 times as far.
 
         Args:
             above_horn: heights, any shape.
-            waist_diameter: of its waist, in the metal at hand.
+            waist_diameter: of its waist, in the metal used.
         """
         z, shaft = np.asarray(above_horn), self.shaft_diameter / 2
         if self.foot_radius > 0:  # a cone of 45 deg above the foot
@@ -177,15 +175,15 @@ class DirectStack(Hub):
         return np.where(z < self.flange_thickness, np.maximum(self.flange_radius, radius), radius)
 
     def bore_at(self, above_horn: Array) -> Array:
-        """Radius inside the shaft at heights above the horn: 0 where it is solid."""
+        """Return the radius inside the shaft at heights above the horn: 0 if it is solid."""
         return np.where(np.asarray(above_horn) < self.horn_grip, 0.0, self.cup_bore / 2)
 
     def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
-        """Middles and thicknesses of slices of the shaft above the horn; none of them spans an edge of it.
+        """Return middles and thicknesses of slices of the shaft above the horn; none crosses an edge of it.
 
         Args:
             length: of the piece above the horn.
-            waist_diameter: of its waist, in the metal at hand.
+            waist_diameter: of its waist, in the metal used.
         """
         waist = self.collar_height + self.waist_length
         slope = (self.shaft_diameter - waist_diameter) / 2

@@ -1,1 +1,1 @@
-"""Every number of the parts that a scanner works without and a task may ask for. No kernel."""
+"""Numbers of optional parts that a task may require. No kernel."""

@@ -1,1 +1,1 @@
-"""What turns with the lidar: its linkage, the seats of cable ties, the counterweight. No kernel."""
+"""Parts that turn with the lidar: linkage, seats of cable ties, counterweight. No kernel."""

@@ -1,11 +1,10 @@
-"""The counterweight of a tilted axis: which bar, how long, and where it has room. Rotation frame, mm and grams.
+"""The counterweight of a tilted axis: section, length and place of a bar. Rotation frame, mm and grams.
 
-Lidar and linkage hang on one side of the axis. Where that is tilted, gravity turns the rotor to and fro, and the gears
-change their flank by the play between them. A piece of bright bar, screwed to an ear of the hub on the other side,
-takes that away. It must leave the lidar, its cables and screws, the neck, the deck and the fan alone, wherever its
-slots let it slide: where no bar does, there is none.
+Gravity turns the unbalanced rotor of a tilted axis back and forth, and the gears change flank through their backlash. A
+piece of steel bar, screwed to an ear of the hub on the other side, prevents that. It must stay clear of lidar, cables,
+screws, neck, deck and fan wherever its slots let it slide; if no bar does, there is none.
 
-The bar is chosen before there are solids, from an estimate of what it balances; only its length waits for them.
+The bar is chosen before there are solids, from an estimate of the imbalance; its length is then cut to the solids.
 """
 
 from __future__ import annotations
@@ -22,14 +21,14 @@ from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
-from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, Ear, LinkageBody
+from scanwright.cad.layout.rotor.linkage import CROSS_RADIUS, AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-# bright steel bar as it is sold (EN 10278), across and along the axis, lightest first
+# sections of bright steel bar on sale (EN 10278), across and along the axis, lightest first
 SECTIONS = (
     (8, 8),
     (10, 10),
@@ -52,15 +51,15 @@ SECTIONS = (
 )
 SCREW = SCREWS["M4"]
 UPRIGHT = 1e-6  # sine of the tilt
-EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_ROOM + 0.5  # clear of the cross screws
+EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_RADIUS + 0.5  # clear of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
 FROM_HUB = 1.0
-TRIM = 5.0  # that the bar can slide either way: a lidar's centre of mass is undocumented
+TRIM = 5.0  # travel of the bar in either direction: a lidar's centre of mass is undocumented
 SCREWS_AT = (9.0, 25.0)  # from the inner end of the bar
 LEAST_LENGTH = 32.0  # covers the screws
 LONGER = 2.0  # than estimated the bar may become (measured: 1.5)
 GAP = 1.0
-STEP = 2.0  # of the points that stand for a bar
+STEP = 2.0  # of the points in a bar
 SAW = 0.5  # lengths are cut to this
 
 
@@ -85,7 +84,7 @@ class Counterweight:
 
     @property
     def stock(self) -> str:
-        """What to saw it from."""
+        """Bar stock and length."""
         return f"bright steel bar {self.section[0]:g} x {self.section[1]:g}, sawn to {self.length:g}"
 
     @property
@@ -94,7 +93,7 @@ class Counterweight:
         return tuple((first + last) / 2 for first, last in self.ear.slots)
 
     def balancing(self, moment: Array) -> Counterweight:
-        """The same bar, cut to balance a moment of all else that turns, shape (2,) [g mm]."""
+        """Return the bar, cut to balance a moment of all else that turns, shape (2,) [g mm]."""
         needed = max(0.0, -float(moment @ _direction(self.ear.azimuth)))
         length = math.sqrt(self.start**2 + 2 * needed / _grams_per_mm(self.section)) - self.start
         return replace(self, length=SAW * round(length / SAW))
@@ -104,22 +103,13 @@ def counterweight_of(
     scanner: Scanner,
     drive: DriveLayout,
     deck: Deck,
-    linkage: LinkageBody,
+    linkage: AlignmentLinkage,
     plate_ties: tuple[TieSeat, ...],
     neck: Array,
 ) -> Counterweight | LeftOut:
-    """The lightest bar that balances the rotor and has room, or why there is none.
-
-    Args:
-        scanner: angles and products.
-        drive: below the hub.
-        deck: that the bar must stay clear of.
-        linkage: that carries it.
-        plate_ties: tongues of its plate.
-        neck: corners of its neck, shape (n, 3).
-    """
+    """Return the lightest bar that balances the rotor and fits, or why there is none; neck of shape (n, 3)."""
     if not backlash_matters(scanner):
-        return _without(f"the play of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
+        return _without(f"the backlash of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
     if tilt_sine(scanner) < UPRIGHT:
         return _without("gravity does not turn an upright axis")
     moment = estimated_moment(scanner, linkage, neck)
@@ -127,19 +117,22 @@ def counterweight_of(
     if torque_nm(scanner, float(np.linalg.norm(moment))) <= least:
         return _without(f"gravity turns the rotor with no more than the friction of bearing and ring, {least:g} N m")
     if keeps_flank(scanner, moment):
-        return _without("all over the sweep gravity keeps the gears on one flank")
+        return _without("gravity keeps the gears on one flank during the entire sweep")
     azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))
     free, fault = _FreeSpace(drive, deck, linkage, plate_ties, neck), ""
     for section in SECTIONS:
         bar = _bar(scanner, linkage, azimuth, section)
-        bar = bar.balancing(moment + _ear_moment(scanner, linkage, bar.ear))
+        ear, density = bar.ear, scanner.printer.density_g_cm3 / 1000
+        across = 2 * ear.half_width * (ear.high - ear.low) * density
+        of_ear = across * (ear.end**2 - linkage.stack.hub_radius**2) / 2 * _direction(ear.azimuth)
+        bar = bar.balancing(moment + of_ear)
         if bar.length < LEAST_LENGTH:
             fault = fault or "would be shorter than its screws need"
             break
         fault = free.fault(scanner, bar)
         if not fault:
             return bar
-    return _without(f"the rotor is out of balance, but the bar that would mend it {fault}")
+    return _without(f"the rotor is out of balance, but the bar that would balance it {fault}")
 
 
 def _without(why: str) -> LeftOut:
@@ -154,13 +147,13 @@ def _grams_per_mm(section: tuple[float, float]) -> float:
     return section[0] * section[1] * STEEL_G_CM3 / 1000
 
 
-def _bar(scanner: Scanner, linkage: LinkageBody, azimuth: float, section: tuple[float, float]) -> Counterweight:
+def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: tuple[float, float]) -> Counterweight:
     stack = linkage.stack
     start = stack.hub_radius + FROM_HUB + TRIM
     ear = Ear(
         azimuth=azimuth,
-        half_width=max(section[0] / 2, SCREW.head_room + TRIM / 2),
-        end=start + SCREWS_AT[-1] + TRIM + SCREW.head_room,
+        half_width=max(section[0] / 2, SCREW.driver_radius + TRIM / 2),
+        end=start + SCREWS_AT[-1] + TRIM + SCREW.driver_radius,
         low=stack.shoulder + EAR_ABOVE_SHOULDER,
         high=-stack.h - EAR_BELOW_TOP,
         slots=tuple((start + at - TRIM, start + at + TRIM) for at in SCREWS_AT),
@@ -169,59 +162,54 @@ def _bar(scanner: Scanner, linkage: LinkageBody, azimuth: float, section: tuple[
     return Counterweight(ear=ear, section=section, start=start, length=LEAST_LENGTH)
 
 
-def _ear_moment(scanner: Scanner, linkage: LinkageBody, ear: Ear) -> Array:
-    across = 2 * ear.half_width * (ear.high - ear.low) * scanner.printer.density_g_cm3 / 1000
-    return across * (ear.end**2 - linkage.stack.hub_radius**2) / 2 * _direction(ear.azimuth)
-
-
 @dataclass(frozen=True, slots=True)
 class _FreeSpace:
-    """What a bar and its ear must leave alone."""
+    """Everything that a bar and its ear must stay clear of."""
 
     drive: DriveLayout
     deck: Deck
-    linkage: LinkageBody
+    linkage: AlignmentLinkage
     plate_ties: tuple[TieSeat, ...]
     neck: Array
 
     def fault(self, scanner: Scanner, bar: Counterweight) -> str:
-        """What a bar, wherever it slides, and its ear would meet; empty if nothing."""
+        """Return what a bar with its ear would collide with wherever it slides; empty if nothing."""
         linkage = self.linkage
         ear, half, stack = bar.ear, bar.section[0] / 2, linkage.stack
         inner, outer = bar.start - TRIM, bar.end + TRIM + LONGER
         if math.hypot(bar.end, half) > self.drive.envelope.radius(stack.sub_plate):
-            return "would reach further than the lidar"
+            return "would extend beyond the lidar"
         rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
         if _height_over(self.deck, rims) < FOOT_THICKNESS + FREE / 2:
-            return "would come too near to the deck"
+            return "would be too near to the deck"
         if not self.drive.bears(bar.mass_g, bar.ear.high + bar.section[1] / 2):
-            return f"would be more than the horn of {scanner.servo.name} bears alone"
+            return f"would be too heavy for the horn of {scanner.servo.name} alone"
         of_bar = _points((inner, -half, ear.high), (outer, half, ear.high + bar.section[1]), ear.azimuth)
         of_ear = _points((inner, -ear.half_width, ear.low), (ear.end, ear.half_width, ear.high), ear.azimuth)
         placed, put_in = of_bar @ stack.R(), of_ear @ stack.R()  # the bar comes last, when the lidar is in its place
         boxes = [linkage.body, *linkage.cables, *([] if linkage.ears is None else [linkage.ears])]
         if any(in_box(placed, box, GAP).any() or in_box(put_in, swept(box), GAP).any() for box in boxes):
             return "would meet the lidar or its cables"
-        tongues = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in self.plate_ties]
-        if any(in_box(points, (low, high), GAP).any() for low, high in tongues for points in (placed, put_in)):
-            return "would meet a tongue of the plate"
+        tabs = [np.sort(tie.corners(tie.inner)[[0, -1]], axis=0) for tie in self.plate_ties]
+        if any(in_box(points, (low, high), GAP).any() for low, high in tabs for points in (placed, put_in)):
+            return "would meet a slotted tab of the plate"
         both = np.concatenate([placed, put_in])
         if in_fan(both, linkage, GAP).any():
-            return "would stand in the fan"
+            return "would be in the fan"
         if behind_screws(both, linkage).any():
-            return "would stand before the screws of the lidar"
+            return "would block the screws of the lidar"
         return "would meet the neck of the linkage" if in_hull(of_bar, self.neck, GAP).any() else ""
 
 
 def _height_over(deck: Deck, rims: tuple[tuple[float, float], ...]) -> float:
-    """Least height over the deck of circles about the axis, each a radius and a z."""
+    """Return the least height over the deck of circles about the axis, each a radius and a z."""
     normal = np.array(deck.normal)
     lean = math.hypot(normal[0], normal[1])
     return float(min(z * normal[2] - around * lean for around, z in rims) - np.array(deck.centre) @ normal)
 
 
 def _points(low: tuple[float, float, float], high: tuple[float, float, float], azimuth: float) -> Array:
-    """Points of a box whose first axis has an azimuth, its faces included, in the rotation frame, shape (n, 3)."""
+    """Return points of a box whose first axis has an azimuth, rotation frame, shape (n, 3)."""
     axes = [np.linspace(a, b, max(2, math.ceil((b - a) / STEP) + 1)) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     out = _direction(azimuth)

@@ -1,6 +1,4 @@
-"""How far a rotor is out of balance before there are solids, and what gravity makes of that. Grams and mm."""
-
-from __future__ import annotations
+"""Estimated imbalance of a rotor, and the torque of gravity on it. Grams and mm."""
 
 import math
 
@@ -9,7 +7,7 @@ import numpy as np
 from scanwright.cad.layout.envelope import PLATE_THICKNESS
 from scanwright.cad.layout.loads import noise_deg, tilt_sine
 from scanwright.cad.layout.rotor.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
-from scanwright.cad.layout.rotor.linkage import LinkageBody
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.motion import Sweep
@@ -18,11 +16,10 @@ from scanwright.design.scanner import Scanner
 CELL = 2.0
 
 
-def estimated_moment(scanner: Scanner, p: LinkageBody, neck: Array) -> Array:
-    """Mass times distance from the axis of lidar, linkage and sub-plate, rotation frame, shape (2,) [g mm].
+def estimated_moment(scanner: Scanner, p: AlignmentLinkage, neck: Array) -> Array:
+    """Return the mass times distance from the axis of lidar, linkage and sub-plate, rotation frame, shape (2,) [g mm].
 
-    The linkage is counted in cells: within 3 % of its solid (`tests/cad/parts/test_balance.py`). Its neck is the hull
-    of corners of shape (n, 3).
+    The linkage is a sum of cells, within 3 % of its solid (`tests/cad/parts/test_balance.py`); `neck` has shape (n, 3).
     """
     lidar, stack, R = scanner.lidar, p.stack, p.stack.R()
     reach = max(p.half_x, p.half_y) if p.ears is None else max(p.ears[1][:2])
@@ -51,17 +48,17 @@ def estimated_moment(scanner: Scanner, p: LinkageBody, neck: Array) -> Array:
 
 
 def torque_nm(scanner: Scanner, moment: float) -> float:
-    """Largest torque of gravity about the axis, over a whole turn, for an imbalance [g mm]."""
+    """Return the largest torque of gravity about the axis over a turn, for an imbalance [g mm]."""
     return moment * 1e-6 * STANDARD_GRAVITY_M_S2 * tilt_sine(scanner)
 
 
 def keeps_flank(scanner: Scanner, moment: Array, error: float = 0.0) -> bool:
-    """Whether a sweep stays where gravity turns the rotor one way only, and so keeps the gears on one flank.
+    """Return whether gravity turns the rotor one way only over the whole sweep: the gears then keep one flank.
 
     Args:
         scanner: angles and products.
         moment: mass times distance from the axis, shape (2,), or the distance alone: any unit.
-        error: how far that may be off in any direction, same unit.
+        error: of the moment in any direction, same unit.
     """
     motion = scanner.angles.motion
     if not isinstance(motion, Sweep):
@@ -76,6 +73,6 @@ def keeps_flank(scanner: Scanner, moment: Array, error: float = 0.0) -> bool:
 
 
 def backlash_matters(scanner: Scanner) -> bool:
-    """Whether the play of the servo's gears shows in a cloud; if that is unknown, it does."""
+    """Return whether the servo's backlash shows in a cloud, or is unknown."""
     backlash = scanner.servo.backlash_deg
     return backlash is None or backlash > noise_deg(scanner)

@@ -1,9 +1,7 @@
-"""Every number of the alignment linkage. Rotation frame at gamma = 0, mm."""
-
-from __future__ import annotations
+"""Numbers of the alignment linkage. Rotation frame at gamma = 0, mm."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,22 +28,22 @@ from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft: nothing but it has to hold
+CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft
 CROSS_WASHER_MM, CROSS_WASHER_THICK = 9.0, 0.8  # ISO 7093: a wide one, the pressure on plastic limits the friction
-CROSS_ROOM = CROSS_WASHER_MM / 2 + 0.2  # radius of the way of washer, head and driver
+CROSS_RADIUS = CROSS_WASHER_MM / 2 + 0.2  # radius of the path of washer, head and driver
 CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
-HEEL = 8.0  # how far the neck reaches below a lying plate
-BACK = 6.0  # and behind its lower half: it carries the lidar like a bracket, thick at its foot
-RING_MARGIN = 0.03  # by how much [rad] the sector of a full fan ends before what the ring hides
-FIN_HALF = 0.06  # half of a sector [rad] in which the neck would stand as a fin
+HEEL = 8.0  # of the neck below a lying plate
+BACK = 6.0  # of the neck behind its lower half: a bracket, thick at its foot
+RING_MARGIN = 0.03  # rad, between the sector of a full fan and the sector that the ring hides
+FIN_HALF = 0.06  # rad, half of a sector in which the neck would be a fin
 
 
 @dataclass(frozen=True, slots=True)
 class Ear:
-    """Where a counterweight is screwed to the hub, on slots along the radius: lengths in mm, `azimuth` in rad."""
+    """Lug of the hub for a counterweight, with slots along the radius: lengths in mm, `azimuth` in rad."""
 
     azimuth: float
     half_width: float
@@ -57,8 +55,8 @@ class Ear:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinkageBody:
-    """Hub, neck and plate: lengths in mm, angles in rad, directions in the rotation frame."""
+class AlignmentLinkage:
+    """Hub, neck and plate with attachments: lengths in mm, angles in rad, directions in the rotation frame."""
 
     stack: Hub
     seat: float  # z of the lidar's base in the laser frame
@@ -67,7 +65,7 @@ class LinkageBody:
     half_y: float
     chamfer: float
     body: Box
-    ears: Box | None  # room of a sub-plate's ears
+    ears: Box | None  # space of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: Thread
     cables: tuple[Box, ...]
@@ -80,28 +78,14 @@ class LinkageBody:
     fit: float  # diametral clearance of the spigot
     cross_hole: float  # diameter, in the hub
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT
-    cross_thread: Thread | None  # of a printed shaft; None where they hold in metal
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AlignmentLinkage(LinkageBody):
-    """The whole part: its body, and what is attached to that."""
-
+    cross_thread: Thread | None  # of a printed shaft; None in metal
     ear: Ear | None = None
     hub_tie: TieSeat | None = None  # rotation frame
     plate_ties: tuple[TieSeat, ...] = ()  # laser frame
 
-    @classmethod
-    def on(
-        cls, body: LinkageBody, ear: Ear | None = None, hub_tie: TieSeat | None = None, ties: tuple[TieSeat, ...] = ()
-    ) -> AlignmentLinkage:
-        """Attach ear and seats of ties to a body."""
-        own = {field.name: getattr(body, field.name) for field in fields(LinkageBody)}
-        return cls(**own, ear=ear, hub_tie=hub_tie, plate_ties=ties)
 
-
-def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> LinkageBody:
-    """Parameters of the linkage of one scanner, before anything is attached.
+def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> AlignmentLinkage:
+    """Return the linkage of one scanner, before anything is attached.
 
     Raises:
         BuildError: the screw holes come too near to the plate's edge.
@@ -121,13 +105,13 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
     if edge < printer.min_wall_mm:
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: seat: holes at {list(lidar.base.places)}: leaves a wall of {edge:.2f} mm "
-            f"at the edge of the plate, {lidar.name} beside {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
+            f"at the edge of the plate, {lidar.name} with {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
     corner = min(half_x + half_y - abs(x) - abs(y) for x, y in outermost)
     chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
     low, high = lidar.window_z_mm
-    return LinkageBody(
+    return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
         top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE_THICKNESS),
@@ -152,10 +136,10 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Linkage
     )
 
 
-def neck_corners(p: LinkageBody, attempt: int) -> Array:
-    """Corners of the neck's hull, shape (n, 3): the hub's core, raised to just under the lidar, and the plate.
+def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
+    """Return corners of the neck's hull, shape (n, 3): the hub's core, raised to just under the lidar, and the plate.
 
-    No facet coincides with hub, plate or body: radius - 1, ends inset; that is why the booleans hold.
+    For safe booleans no facet coincides with hub, plate or body.
     """
     stack = p.stack
     turn = math.radians(0.7 + 1.9 * attempt)
@@ -172,27 +156,27 @@ def neck_corners(p: LinkageBody, attempt: int) -> Array:
 
 
 def _foot(plate: Array, stack: Hub) -> Array:
-    """The lower half of the plate's corners, moved down, and back: else a lying plate hangs on a wedge with an edge."""
+    """Return the lower half of the plate's corners, moved down and back: it thickens the neck of a lying plate."""
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
         return plate
     normal = stack.R()[:, 2]
     lying = math.hypot(normal[0], normal[1]) ** 2
-    room = max(0.0, float(lower[:, 2].min()) - stack.shoulder - 2.0)
-    heel = lower - [0.0, 0.0, min(HEEL * lying, room)]
-    return np.concatenate([heel, lower - min(BACK * lying, room / max(normal[2], 1e-6)) * normal])
+    free = max(0.0, float(lower[:, 2].min()) - stack.shoulder - 2.0)
+    heel = lower - [0.0, 0.0, min(HEEL * lying, free)]
+    return np.concatenate([heel, lower - min(BACK * lying, free / max(normal[2], 1e-6)) * normal])
 
 
 def _grown(box: Box) -> Box:
-    """A box with the lidar's gap around its sides."""
+    """Return a box with the lidar's gap around its sides."""
     (x0, y0, z0), (x1, y1, z1) = box
     return (x0 - BODY_GAP, y0 - BODY_GAP, z0), (x1 + BODY_GAP, y1 + BODY_GAP, z1)
 
 
 def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ...]:
-    """The fan less the sector that the ring hides anyway: a lying linkage would be sawn off there.
+    """Return the fan without the sector that the ring hides: a lying linkage needs the material there.
 
-    What lies between two pieces is no fin: a full fan is closed where it begins and ends.
+    A full fan is closed at its start.
     """
     first, last = float(bearings.min()), float(bearings.max())
     pieces = [(first, last)]
@@ -205,7 +189,7 @@ def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ..
     half = math.acos(min(1.0, cosine / max(tilt_sine, 1e-12)))
     if half < FIN_HALF:
         return tuple(pieces)
-    if len(pieces) > 1:  # a full fan has beams on both sides of the sector, and those beside the ring are to be free
+    if len(pieces) > 1:  # a full fan has beams on both sides of the sector, and those next to the ring must be free
         half = max(FIN_HALF, half - RING_MARGIN)
     centre = math.atan2(-q[1], -q[0])
     for turn in (-2 * math.pi, 0.0, 2 * math.pi):
@@ -220,27 +204,27 @@ def _free_bearings(stack: Hub, bearings: Array) -> tuple[tuple[float, float], ..
 
 
 def _cross_azimuths(normal: Array) -> tuple[float, ...]:
-    """The two of CROSS_AT on the side away from the plate."""
+    """Return the two of CROSS_AT on the side away from the plate."""
     towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else 0.0
     middle = round(towards / (math.pi / 2) - 1e-6) * (math.pi / 2)
     return middle - math.pi / 4, middle + math.pi / 4
 
 
 def cross_seat_mm(stack: Hub) -> float:
-    """Distance from the axis of the washers' faces that the heads of the cross screws bear on."""
+    """Return the distance of the cross screws' washers from the axis."""
     return stack.hub_radius - CROSS_SUNK
 
 
-def cross_floor_mm(p: LinkageBody, azimuth: float) -> float:
-    """Distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
+def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
+    """Return the distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
     bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.cross_hole / 2
     flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
     on_flat = (flat - half * abs(math.cos(azimuth))) / out if out > 0 else bore
     return min(math.sqrt(bore**2 - half**2), on_flat)
 
 
-def cross_thread_mm(p: LinkageBody) -> float:
-    """Thread that a cross screw finds in the shaft before the other one crosses it, or in a cup before its nut."""
+def cross_thread_mm(p: AlignmentLinkage) -> float:
+    """Return the thread length of a cross screw in the shaft up to the other one, or in a cup up to its nut."""
     outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
     if thread is None:
         return outer - CROSS_SCREW.nominal / 2 - CROSSING

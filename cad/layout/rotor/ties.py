@@ -1,10 +1,8 @@
-"""Where leads are tied to the parts, so that a pull on one ends there.
+"""Slotted tabs for cable ties, which take the pull off the cables.
 
-The hub has a tongue over the way out of the ring's leads, rotation frame; the plate one under each cable of the lidar,
-laser frame. Millimetres. No kernel.
+The hub has one above the exit of the ring's leads, rotation frame; the plate one under each cable of the lidar, laser
+frame. Millimetres. No kernel.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator
@@ -15,30 +13,30 @@ from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.envelope import PLATE_THICKNESS
 from scanwright.cad.layout.names import HUB_TIE, PLATE_TIE
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from scanwright.cad.layout.rotor.linkage import Ear, LinkageBody
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import SLOT_ACROSS, TieSeat
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
-OVER_LEADS = 0.55  # between the leads of a bearing's sleeve and a tongue
-THICK = 4.0  # of a tongue of the hub with nothing over it
+OVER_LEADS = 0.55  # between the leads of a bearing's sleeve and a tab
+THICK = 4.0  # of a tab of the hub with nothing over it
 ROOT = 3.0  # of it inside the hub
 FROM_SIDE = 1.2  # of the slots, from hub or plate
-TIE_OVER = 3.0  # room for a tie and for the fingers that close it
-UNDER_BAR = 0.5  # of a tongue that is one with the ear of a counterweight, so that the bar lies on the ear
+TIE_OVER = 3.0  # space for a tie and the fingers that close it
+UNDER_BAR = 0.5  # of a tab joined with the ear of a counterweight: the bar is on the ear
 NEAR_EAR = math.radians(60.0)
 GAP = 0.5
-BEAM = 4.0  # around the scan plane: a tongue may stand before the window beside its beams
-STEP = 1.5  # of the points that stand for a tongue
-PLATE_LOW, BELOW_SEAT = 5.0, 0.5  # lower and upper face of a tongue of the plate, below the plate's
+BEAM = 4.0  # around the scan plane: a tab may be in front of the window outside of the beams
+STEP = 1.5  # of the points in a tab
+PLATE_LOW, BELOW_SEAT = 5.0, 0.5  # lower and upper face of a tab of the plate, below the plate's
 
 
-def plate_ties_of(lidar: Lidar, p: LinkageBody, neck: Array) -> tuple[TieSeat, ...] | LeftOut:
-    """A tongue below each cable of the lidar, laser frame, or why there is none."""
+def plate_ties_of(lidar: Lidar, p: AlignmentLinkage, neck: Array) -> tuple[TieSeat, ...] | LeftOut:
+    """Return a tab below each cable of the lidar, laser frame, or why there is none."""
     if p.stack.sub_plate == "x" or not lidar.cable_y_mm:
-        return _without(PLATE_TIE, "an ear of the sub-plate, or no cable, is where it would be")
+        return _without(PLATE_TIE, "an ear of the sub-plate is in its place, or there is no cable")
     seats = tuple(
         TieSeat(
             azimuth=math.pi,
@@ -59,34 +57,28 @@ def plate_ties_of(lidar: Lidar, p: LinkageBody, neck: Array) -> tuple[TieSeat, .
             return _without(PLATE_TIE, "it would reach below the hub")
         tie = _filled(seat, seat.first, seat.last, seat.half + SLOT_ACROSS, (seat.low - TIE_OVER, seat.low))
         if in_hull(tie, neck, GAP).any():
-            return _without(PLATE_TIE, "the neck lies under the place where it would be")
+            return _without(PLATE_TIE, "the neck is below its place")
     return seats
 
 
-def hub_tie_of(scanner: Scanner, drive: DriveLayout, p: LinkageBody, ear: Ear | None, neck: Array) -> TieSeat | LeftOut:
-    """The tongue of the hub, rotation frame, or why there is none.
-
-    Args:
-        scanner: angles and products.
-        drive: below the hub.
-        p: the linkage.
-        ear: of a counterweight.
-        neck: corners of the linkage's neck, shape (n, 3).
-    """
+def hub_tie_of(
+    scanner: Scanner, drive: DriveLayout, p: AlignmentLinkage, ear: Ear | None, neck: Array
+) -> TieSeat | LeftOut:
+    """Return the tab of the hub, rotation frame, or why there is none; `neck` has shape (n, 3)."""
     if scanner.slip_ring is None or not scanner.lidar.cable_y_mm:
         return _without(HUB_TIE, "no leads leave a ring below the hub")
     if drive.no_hub_tie:
         return _without(HUB_TIE, drive.no_hub_tie)
-    free = next((seat for seat in _candidates(p, ear) if _has_room(seat, p, neck)), None)
-    return free or _without(HUB_TIE, "plate, fan or the way of what is put in is where it would be")
+    free = next((seat for seat in _candidates(p, ear) if _fits(seat, p, neck)), None)
+    return free or _without(HUB_TIE, "plate, fan or the path of an inserted part is in its place")
 
 
 def _without(which: str, why: str) -> LeftOut:
-    return LeftOut(which, why, 1, "tongues")
+    return LeftOut(which, why, 1, "slotted tabs")
 
 
-def _candidates(p: LinkageBody, ear: Ear | None) -> Iterator[TieSeat]:
-    """Seats between the cross screws, where the leads of a bearing's sleeve leave; else on their free sides too."""
+def _candidates(p: AlignmentLinkage, ear: Ear | None) -> Iterator[TieSeat]:
+    """Yield seats between the cross screws; if the leads do not leave by a sleeve, on the other sides too."""
     stack, free = p.stack, sum(p.cross_azimuths) / 2
     wired = stack.bearing is not None
     low = stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS if wired else stack.shoulder
@@ -106,8 +98,8 @@ def _candidates(p: LinkageBody, ear: Ear | None) -> Iterator[TieSeat]:
         )
 
 
-def _has_room(seat: TieSeat, p: LinkageBody, neck: Array) -> bool:
-    """Whether a tongue of the hub is out of the way of all else, and a tie reaches around it."""
+def _fits(seat: TieSeat, p: AlignmentLinkage, neck: Array) -> bool:
+    """Return whether a tab of the hub is clear of all else, with space for a tie around it."""
     body = _filled(seat, seat.first - FROM_SIDE, seat.end, seat.half_width, (seat.low, seat.high))
     over = (seat.high + 0.1, seat.high + TIE_OVER)
     tie = _filled(seat, seat.first, seat.last, seat.half + SLOT_ACROSS, over)

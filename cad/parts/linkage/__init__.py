@@ -1,1 +1,1 @@
-"""Parts that carry the lidar: the alignment linkage and what is screwed to it."""
+"""Parts that carry the lidar: the alignment linkage and parts screwed to it."""

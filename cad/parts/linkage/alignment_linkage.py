@@ -1,15 +1,12 @@
 """Alignment linkage: carries the lidar on the shaft at exactly R_rot_laser, its optical centre on the axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub sits on the shaft's spigot (blind bore with a flat
-at +y, two screws on the free side that cross into it); a neck, the convex hull of hub and plate less all that must stay
-free, leads to the plate whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT),
-a groove in the hub at +y (index). Where a bearing holds the shaft, the wires of the ring's rotor leave its sleeve
-through a channel of the hub. Tongues of hub and plate have slots for the ties of leads and cables. Under a sub-plate
-(`sub_plate.py`) the plate lies lower, with nuts for its ears and pockets for the heads of its screws. Where a
-counterweight balances the rotor, an ear of the hub carries it.
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. A hub is on the shaft's spigot (blind bore with a flat at
++y, two screws that cross into it); a neck, the convex hull of hub and plate without all free space, leads to the plate
+whose upper face is the lidar's seat. Marks: a V in the plate's edge at the lidar's +x (FRONT), a groove in the hub at
++y (index). If a bearing holds the shaft, the wires of the ring's rotor leave its sleeve through a channel of the hub.
+Tabs of hub and plate have slots for cable ties. Under a sub-plate (`sub_plate.py`) the plate is lower, with nuts for
+its ears and pockets for the heads of its screws. An ear of the hub carries a counterweight.
 """
-
-from __future__ import annotations
 
 import itertools
 import math
@@ -24,12 +21,7 @@ from scanwright.cad import outlines, solids
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, around_axis, slot_ends
-from scanwright.cad.layout.joints import (
-    Joint,
-    fixing_in,
-    inward_axes,
-    screws,
-)
+from scanwright.cad.layout.joints import Joint, fixing_in, inward_axes, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, LIDAR_BODY
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.free_space import in_hull
@@ -53,8 +45,8 @@ from scanwright.design.errors import BuildError
 
 LIDAR_STEP = Step(
     "Lidar on its seat",
-    "On the bench: put the lidar on its seat, its front to the V in the edge (FRONT), its cables to the other side. "
-    f"{screws(LIDAR_BODY)}",
+    "On the bench: put the lidar on its seat, its front towards the V in the edge (FRONT), its cables to the other "
+    f"side. {screws(LIDAR_BODY)}",
     "no light shows under the lidar: a gap of 0.1 mm tilts its plane by about a tenth of a degree",
 )
 OF_LIDAR = (
@@ -69,20 +61,31 @@ OF_LIDAR = (
     "lidar.cable_straight_mm",
 )
 RETRIES = 5
-WIDER = 0.03  # of the ways of drivers, each time: they may graze the rim of the hub
+WIDER = 0.03  # of the paths of drivers, in each attempt: they may graze the rim of the hub
 TRAP_LENGTH = 15.0  # below the plate: the neck may begin there
 MARK_LENGTH = 8.0  # of the mark beyond the plate: a neck that is thicker there keeps a wall
 DRIVER_LENGTH = 150.0
-DRIVER_DEEP = 8.0  # below the plate, where a wall beside a driver's way is measured: the neck tapers
-DRIVER_WALL = 3.0  # what would be less is open
+DRIVER_DEEP = 8.0  # below the plate: height at which the wall next to a driver is measured, since the neck tapers
+DRIVER_WALL = 3.0  # a thinner wall next to a driver is removed
 
 
 def linkage_spec(place: Placement) -> PartSpec:
-    """The linkage of one scanner; the shaft that it sits on has the words of its step."""
-    p = place.linkage
+    """Return the linkage of one scanner; its step is in the spec of its shaft."""
+    p, heads = place.linkage, cross_seat_mm(place.stack)
+    crossed = Joint(  # cap screws through the hub's wall into threads or nuts of the shaft
+        ALIGNMENT_LINKAGE,
+        place.drive.shaft,
+        "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
+        CROSS_SCREW,
+        inward_axes(p.cross_azimuths, heads, p.stack.cross),
+        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
+        thread_mm=cross_thread_mm(p),
+        thread=p.cross_thread,
+        washer_mm=CROSS_WASHER_MM,
+    )
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
-        slots = f"the slots of {ALIGNMENT_LINKAGE}, where a screw may sit {p.screw_travel:.2g} mm nearer or farther"
+        slots = f"the slots of {ALIGNMENT_LINKAGE}, in which a screw may be {p.screw_travel:.2g} mm nearer or farther"
         shapes["lidar.holes"] = slots
     return PartSpec(
         name=ALIGNMENT_LINKAGE,
@@ -92,33 +95,14 @@ def linkage_spec(place: Placement) -> PartSpec:
         shapes=shapes,
         angles="laser",
         seat=p.top,
-        joints=(
-            _crossed(p, place.drive.shaft),
-            *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)]),
-        ),
+        joints=(crossed, *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)])),
         avoid=tuple(_around(place)),
         steps={LIDAR: LIDAR_STEP},
     )
 
 
-def _crossed(p: AlignmentLinkage, shaft: str) -> Joint:
-    """The hub on the shaft: cap screws through its wall into threads or nuts of the shaft."""
-    heads = cross_seat_mm(p.stack)
-    return Joint(
-        ALIGNMENT_LINKAGE,
-        shaft,
-        "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
-        CROSS_SCREW,
-        inward_axes(p.cross_azimuths, heads, p.stack.cross),
-        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
-        thread_mm=cross_thread_mm(p),
-        thread=p.cross_thread,
-        washer_mm=CROSS_WASHER_MM,
-    )
-
-
 def _around(place: Placement) -> Iterator[Shape]:
-    """Hub, tongues, and the neck, from which the channels of the cables are cut."""
+    """Yield the hub, tabs, and the neck, from which the channels of the cables are cut."""
     p, stack = place.linkage, place.stack
     yield shape_of(around_axis(stack.hub_radius, stack.shoulder, -stack.h))
     for tie in p.plate_ties:
@@ -131,9 +115,8 @@ def _around(place: Placement) -> Iterator[Shape]:
 def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     """Make the linkage.
 
-    A sliver where two cuts nearly meet can open the mesh of a valid solid; the neck is then turned a little, the ways
-    of drivers are made wider, and nothing else, so that the height, and with it the frame chain, stays what the layout
-    said.
+    A sliver between two cuts can open the mesh of a valid solid; further attempts turn the neck a little and widen the
+    paths of drivers. The frame chain does not change.
 
     Raises:
         BuildError: no attempt gave one valid watertight solid.
@@ -149,22 +132,22 @@ def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
 
 @dataclass(frozen=True, slots=True)
 class Shapes:
-    """What the linkage is made of, each in its place: `alignment_linkage` and the preview put it together.
+    """The shapes of the linkage, in place: `alignment_linkage` and the preview join them in the same order.
 
-    Both do it in this order: plate and neck, less room and fins, of which the body of the plate stays; with the hub,
-    less the room; less the holes.
+    Plate and neck, without free space and fins, of which the body of the plate is kept; with the hub, without the free
+    space; without the holes.
     """
 
     plate: cq.Shape
     neck: cq.Shape
-    room: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
+    free_space: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
     fins: list[cq.Shape]  # the fan, and what would be a fin of the neck
     hub: cq.Shape
     holes: list[cq.Shape]  # and marks
 
 
 def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
-    """The shapes; `attempt` turns the neck a little, and widens the ways of drivers.
+    """Return the shapes; `attempt` turns the neck a little, and widens the paths of drivers.
 
     Raises:
         BuildError: the kernel fails at one.
@@ -179,7 +162,7 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         return Shapes(
             plate=_plate(p).moved(laser),
             neck=solids.hull(corners),
-            room=[shape.moved(laser) for shape in (*_lidar_room(p), *_drivers(p, attempt))],
+            free_space=[shape.moved(laser) for shape in (*_lidar_space(p), *_drivers(p, attempt))],
             fins=[shape.moved(laser) for shape in fins],
             hub=hub(p),
             holes=[*(shape.moved(laser) for shape in marked), *hub_cuts(p)],
@@ -190,11 +173,11 @@ def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
     tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt)
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt) as checked:
         body: cq.Shape = checked(shapes.plate.fuse(shapes.neck))
-    with building(ALIGNMENT_LINKAGE, "free room of lidar, cables and fan", "tilt", tilt):
-        # the slab may leave loose crumbs beside the plate: the load path is what holds the plate
-        body = _largest(body.cut(*shapes.room, *shapes.fins))
+    with building(ALIGNMENT_LINKAGE, "free space of lidar, cables and fan", "tilt", tilt):
+        # small loose pieces next to the plate are dropped
+        body = _largest(body.cut(*shapes.free_space, *shapes.fins))
     with building(ALIGNMENT_LINKAGE, "hub", "h", f"{stack.h} mm") as checked:
-        body = checked(body.fuse(shapes.hub).cut(*shapes.room))
+        body = checked(body.fuse(shapes.hub).cut(*shapes.free_space))
     with building(ALIGNMENT_LINKAGE, "holes and marks", "h", f"{stack.h} mm") as checked:
         linkage = checked(body.cut(*shapes.holes).clean())
     bottom = linkage.BoundingBox().zmin
@@ -210,15 +193,15 @@ def _tilt(p: AlignmentLinkage) -> str:
     return f"{math.degrees(math.acos(min(1.0, p.stack.R()[2, 2]))):.3f} deg"
 
 
-def _lidar_room(p: AlignmentLinkage) -> list[cq.Solid]:
-    """What must stay free so that the lidar can be put in along its own z: body and cables, swept upwards."""
+def _lidar_space(p: AlignmentLinkage) -> list[cq.Solid]:
+    """Return the space for inserting the lidar along its z: body and cables, swept upwards."""
     over = [box for box in (p.body, p.ears) if box is not None]
     boxes = [*(((x, y, p.top), high) for (x, y, _), high in over), *p.cables]
     return [solids.box(low, (x, y, FAR)) for low, (x, y, _) in boxes]
 
 
 def _plate(p: AlignmentLinkage) -> cq.Shape:
-    """The plate with the tongues behind it, and under a sub-plate its ears."""
+    """Return the plate with its tabs, and under a sub-plate its ears."""
     low = p.top - PLATE_THICKNESS
     plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
     if p.plate_ties:
@@ -230,15 +213,15 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
-    """Heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
+    """Return heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
     if p.ears is not None:
         return []
     low = p.top - PLATE_THICKNESS
-    return _for_screws(p, p.screw.head_room + WIDER * attempt, low - DRIVER_LENGTH, low)
+    return _for_screws(p, p.screw.driver_radius + WIDER * attempt, low - DRIVER_LENGTH, low)
 
 
 def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
-    """Cuts from the ways of drivers or heads outwards, if they run near the surface: else a skin would be left."""
+    """Return cuts outwards from drivers or heads near the surface, which would leave a skin."""
     low, high = p.top - PLATE_THICKNESS - DRIVER_LENGTH, p.top - PLATE_THICKNESS
     below = high - DRIVER_DEEP
     if p.ears is not None:
@@ -247,42 +230,42 @@ def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
     opened = []
     for place in p.holes:
         out = np.array(place) / math.hypot(*place)
-        fins = np.array([[*(place + (p.screw.head_room + DRIVER_WALL) * out), below]])
+        fins = np.array([[*(place + (p.screw.driver_radius + DRIVER_WALL) * out), below]])
         if not in_hull(fins, neck, 0.0).any():
             end = place + 2 * max(p.half_x, p.half_y) * out
-            opened.append(solids.slot(p.screw.head_room, place, end.tolist(), low, high))
+            opened.append(solids.slot(p.screw.driver_radius, place, end.tolist(), low, high))
     return opened
 
 
 def _pockets(p: AlignmentLinkage) -> tuple[float, float]:
-    """Heights of the pockets for the heads of the lidar's screws, under a sub-plate."""
+    """Return heights of the pockets for the heads of the lidar's screws, under a sub-plate."""
     return p.top - p.screw.head_height - 0.5, p.top + 1.0
 
 
 def _for_screws(p: AlignmentLinkage, radius: float, low: float, high: float) -> list[cq.Shape]:
-    """Cuts for the base screws: round ones, or as long as their slots."""
+    """Return cuts for the base screws: round ones, or as long as their slots."""
     return [solids.slot(radius, *slot_ends(place, p.screw_travel), low, high) for place in p.holes]
 
 
 def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
-    """Holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
+    """Return holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
         return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
-    pockets = _for_screws(p, p.screw.head_room, *_pockets(p))
+    pockets = _for_screws(p, p.screw.driver_radius, *_pockets(p))
     low = p.top - PLATE_THICKNESS - 1.0
     traps = [] if p.ear_thread.trap is None else [_ear_trap(p, p.ear_thread.trap, hole) for hole in p.ear_screws]
     return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
 
 
 def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.Solid:
-    """Pocket in the plate's lower face and the nut's way into it; its flats face the ends of the ear."""
+    """Return the pocket of a nut in the plate's lower face, its flats towards the ends of the ear."""
     outline = outlines.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
     low = p.top - PLATE_THICKNESS
     return solids.prism(outline, low - TRAP_LENGTH, low + trap.depth)
 
 
 def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
-    """FRONT: a V in the edge at +x, half the plate deep, and through what the neck has there. Laser frame."""
+    """Return FRONT: a V in the edge at +x, half the plate deep, and through the neck there. Laser frame."""
     x = p.half_x if p.stack.sub_plate != "x" else p.half_x + EAR_REACH
     low, high = p.top - PLATE_THICKNESS / 2, p.top + 1.0
     beyond = np.arange(2.0, MARK_LENGTH, 0.5)
@@ -292,7 +275,7 @@ def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
 
 
 def _largest(shape: cq.Shape) -> cq.Shape:
-    """The body that holds the plate; crumbs under 2 % of it are dropped, more than that is a broken neck."""
+    """Return the body that holds the plate; pieces under 2 % of it are dropped, a larger one is a broken neck."""
     bodies = sorted(shape.Solids(), key=lambda solid: -solid.Volume())
     if len(bodies) > 1 and bodies[1].Volume() < 0.02 * bodies[0].Volume():
         return bodies[0]

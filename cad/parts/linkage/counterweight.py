@@ -3,8 +3,6 @@
 Frame: rotation frame at gamma = 0, mm. It lies along a radius; its screws come from below, through slots of the ear.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import partial
@@ -25,49 +23,16 @@ from scanwright.design.left_out import LeftOut
 
 
 def counterweight_spec(place: Placement) -> PartSpec | LeftOut:
-    """The bar of one scanner, or why it has none."""
+    """Return the bar of one scanner, or why it has none."""
     bar = place.counterweight
     return bar if isinstance(bar, LeftOut) else bar_spec(place, bar)
 
 
 def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
-    """A bar that may be cut to another length than the layout estimated."""
-    tie = place.linkage.hub_tie
-    first = (
-        ""
-        if tie is None or not tie.grooved
-        else "First lay a cable tie into the groove beside the hub: it waits for the leads. "
-    )
-    words = (
-        f"{first}Lay the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
-        f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
-        "heads. A lidar's centre of mass is undocumented: when the scanner turns, slide the bar along its slots "
-        "to where `scanwright scan` prints the least ripple."
-    )
-    return PartSpec(
-        name=COUNTERWEIGHT,
-        turns=True,
-        make=partial(counterweight, bar),
-        step=Step(
-            "Counterweight on the linkage", words, "no screw stands out above the bar, which lies flat on the ear"
-        ),
-        after=SUB_PLATE,
-        process="sawn",
-        material=bar.stock,
-        work=f"{len(bar.screws)} threads {SCREW.name}",
-        shaped_by=("lidar.mass_g",),
-        shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
-        lifted="radius",
-        joints=(_joint(bar),),
-        avoid=tuple(_around(bar)),
-    )
-
-
-def _joint(bar: Counterweight) -> Joint:
-    """The bar on the ear of the hub, from below."""
-    ear, slide = bar.ear, bar.ear.slots[0]
-    x, y = math.cos(ear.azimuth), math.sin(ear.azimuth)
-    return Joint(
+    """Return the spec of a bar, whose length may differ from the layout's estimate."""
+    tie, ear = place.linkage.hub_tie, bar.ear
+    x, y, slide = math.cos(ear.azimuth), math.sin(ear.azimuth), ear.slots[0]
+    joint = Joint(
         ALIGNMENT_LINKAGE,
         COUNTERWEIGHT,
         "thread",
@@ -77,10 +42,36 @@ def _joint(bar: Counterweight) -> Joint:
         thread_mm=bar.section[1],
         slot_mm=(ear.slot_width, slide[1] - slide[0] + ear.slot_width),
     )
+    first = (
+        ""
+        if tie is None or not tie.grooved
+        else "First lay a cable tie into the groove next to the hub, for the leads. "
+    )
+    words = (
+        f"{first}Put the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
+        f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
+        "heads. A lidar's centre of mass is undocumented: when the scanner turns, slide the bar along its slots "
+        "until `scanwright scan` prints the least ripple."
+    )
+    return PartSpec(
+        name=COUNTERWEIGHT,
+        turns=True,
+        make=partial(counterweight, bar),
+        step=Step("Counterweight on the linkage", words, "no screw protrudes from the bar, which is flat on the ear"),
+        after=SUB_PLATE,
+        process="sawn",
+        material=bar.stock,
+        work=f"{len(bar.screws)} threads {SCREW.name}",
+        shaped_by=("lidar.mass_g",),
+        shapes={"servo.backlash_deg": f"whether there is a {COUNTERWEIGHT}"},
+        lifted="radius",
+        joints=(joint,),
+        avoid=tuple(_around(bar)),
+    )
 
 
 def _around(bar: Counterweight) -> Iterator[Shape]:
-    """The bar on its ear, and the heads of its screws wherever it slides."""
+    """Yield the bar on its ear, and the heads of its screws wherever it slides."""
     ear, half = bar.ear, max(bar.ear.half_width, bar.section[0] / 2)
     above, below = ear.high + bar.section[1], ear.low - SCREW.head_height
     wide = SCREW.head_diameter / 2
@@ -91,11 +82,7 @@ def _around(bar: Counterweight) -> Iterator[Shape]:
 
 
 def counterweight(p: Counterweight) -> cq.Solid:
-    """Make the bar.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the bar."""
     half, low, high = p.section[0] / 2, p.ear.high, p.ear.high + p.section[1]
     with building(COUNTERWEIGHT, "bar and threads", "length", f"{p.length:g} mm") as checked:
         threads = [solids.upright(SCREW.core / 2, low - 1.0, high + 1.0, at, 0.0) for at in p.screws]

@@ -1,9 +1,7 @@
-"""Fins: what a convex neck, tapering to an edge, leaves beside what is cut out of it. Laser frame, mm.
+"""Fins: thin walls that a convex neck leaves next to its cuts. Laser frame, mm.
 
-Skins are no walls, and the claws outside of the cables of a lying lidar carry nothing, though they are thicker.
+Also cut off are the claws outside of the cables of a lying lidar, which carry nothing.
 """
-
-from __future__ import annotations
 
 import math
 
@@ -17,21 +15,21 @@ from scanwright.cad.layout.envelope import Box
 from scanwright.design.arrays import Array
 
 FAR = 200.0  # beyond any linkage
-THIN = 3.0  # beside the lidar, what would stand thinner than this is cut off
+THIN = 3.0  # thinner walls next to the lidar are cut off
 PRONG = 7.0  # likewise outside of a cable
-INTO = 0.3  # below the rooms of lidar and cables: no ridge stays along their edges
+INTO = 0.3  # below the space of lidar and cables: no ridge remains along their edges
 
 
 def fins_of(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> list[cq.Shape]:
-    """What the tapering hull would leave thinner than THIN beside the lidar, and than CLAW outside its cables.
+    """Return cuts of what the hull would leave thinner than THIN next to the lidar, and than PRONG outside its cables.
 
-    On each side: all beyond it, less the prism over where the hull is thicker there. No face lies in one of
-    the hull or of the lidar's room: the prism is drawn in a little, the cut begins inside and below the room.
+    On each side: all beyond it, less the prism over the thick part of the hull. No face coincides with one of the hull
+    or of the lidar's space: the prism is 0.3 mm narrower, and the cut begins below the space.
 
     Args:
         top: height of the plate.
-        body: room of the lidar.
-        cables: rooms of its cables.
+        body: space of the lidar.
+        cables: spaces of its cables.
         corners: of the neck, shape (n, 3).
     """
     planes = np.unique(np.round(ConvexHull(corners).equations, 7), axis=0)
@@ -55,9 +53,9 @@ def fins_of(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> l
 
 
 def _thick(planes: Array, outward: Array, edge: float, least: float, onto: Array) -> Array | None:
-    """Outline, 0.3 mm drawn in, of where a hull goes on for `least` beyond an edge, shape (n, 2); None where nowhere.
+    """Return the outline, shape (n, 2), 0.3 mm narrower, in which a hull is `least` thick beyond an edge, or None.
 
-    That is the shadow of the hull, itself moved by it, and the half space beyond the edge, all cut with each other.
+    That is the shadow of the intersection of the hull, the hull moved by `least`, and the half space beyond the edge.
 
     Args:
         planes: of the hull.

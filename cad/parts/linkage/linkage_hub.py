@@ -1,9 +1,7 @@
-"""The hub of the alignment linkage: seat of the shaft, way of the wires, ear of the bar; tongues for cable ties.
+"""The hub of the alignment linkage: seat of the shaft, channel of the wires, ear of the bar; tabs for cable ties.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm.
 """
-
-from __future__ import annotations
 
 import math
 
@@ -12,7 +10,7 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.hub import JOURNAL_WALL
-from scanwright.cad.layout.rotor.linkage import CROSS_ROOM, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.rotor.linkage import CROSS_RADIUS, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size
@@ -22,7 +20,7 @@ EAR_CORNER = 0.3  # of its half width
 
 
 def hub(p: AlignmentLinkage) -> cq.Shape:
-    """The hub with the ear of a counterweight."""
+    """Return the hub with the ear of a counterweight."""
     stack = p.stack
     hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
     if p.ear is not None:
@@ -33,19 +31,19 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
 
 
 def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
-    """What is cut from it: cross screws, way of the wires, index groove, bore, slots of ear and tongue."""
+    """Return the cuts of the hub: cross screws, wires, index groove, bore, slots of ear and tab."""
     ties = [] if p.hub_tie is None else tie_slots(p.hub_tie)
     return [*_crossed(p), *_wires(p), _index_groove(p), _bore(p), *_ear_slots(p), *ties]
 
 
 def tie_lug(seat: TieSeat) -> cq.Shape:
-    """The tongue of a cable tie, in the frame of its seat."""
+    """Return the tab of a cable tie, in the frame of its seat."""
     low = (seat.inner, seat.aside - seat.half_width, seat.low)
     return solids.box(low, (seat.end, seat.aside + seat.half_width, seat.high)).moved(solids.about_axis(seat.azimuth))
 
 
 def tie_slots(seat: TieSeat) -> list[cq.Shape]:
-    """Its two slots, and the groove that joins them."""
+    """Return the two slots of a tab, and the groove that joins them."""
     beyond = 1.0
     cuts = [
         solids.box(
@@ -69,7 +67,7 @@ def _ear(ear: Ear, start: float) -> cq.Shape:
 
 
 def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
-    """Slots with round ends, along the radius."""
+    """Return slots with round ends, along the radius."""
     if p.ear is None:
         return []
     ear, half = p.ear, p.ear.slot_width / 2
@@ -78,7 +76,7 @@ def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:
 
 
 def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
-    """Channel between the two cross screws: from that of the bearing's sleeve out over the cage."""
+    """Return the channel between the two cross screws, from the bearing's sleeve out over the cage."""
     stack = p.stack
     if stack.bearing is None or stack.ring_length == 0:
         return []
@@ -94,21 +92,21 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
 
 
 def _free_side(p: AlignmentLinkage) -> float:
-    """Azimuth between the two cross screws."""
+    """Return the azimuth between the two cross screws."""
     return sum(p.cross_azimuths) / 2
 
 
 def _crossed(p: AlignmentLinkage) -> list[cq.Solid]:
-    """Holes of the cross screws, and the way of their heads and drivers."""
+    """Return the holes of the cross screws, and the paths of their heads and drivers."""
     stack, cuts = p.stack, []
     for azimuth in p.cross_azimuths:
         cuts.append(solids.radial(p.cross_hole / 2, azimuth, stack.cross))
-        cuts.append(solids.radial(CROSS_ROOM, azimuth, stack.cross, cross_seat_mm(stack) - CROSS_WASHER_THICK))
+        cuts.append(solids.radial(CROSS_RADIUS, azimuth, stack.cross, cross_seat_mm(stack) - CROSS_WASHER_THICK))
     return cuts
 
 
 def _bore(p: AlignmentLinkage) -> cq.Shape:
-    """Room of the spigot: a cylinder with a flat at +y."""
+    """Return the bore for the spigot: a cylinder with a flat at +y."""
     stack = p.stack
     radius = (stack.shaft_diameter + p.fit) / 2
     round_bore = solids.upright(radius, stack.shoulder - 1.0, stack.spigot_top)
@@ -117,7 +115,7 @@ def _bore(p: AlignmentLinkage) -> cq.Shape:
 
 
 def _index_groove(p: AlignmentLinkage) -> cq.Solid:
-    """Groove at the hub's lower end, or above the wires if they leave at +y; there an ear carries it outwards."""
+    """Return a groove at the hub's lower end, above the wires if they leave at +y, or in an ear there."""
     stack, ear, y = p.stack, p.ear, p.stack.hub_radius
     low, high = stack.shoulder - 1.0, stack.shoulder + 4.0
     if stack.journal > 0 and math.cos(_free_side(p) - math.pi / 2) > 0.9:
@@ -128,7 +126,7 @@ def _index_groove(p: AlignmentLinkage) -> cq.Solid:
 
 
 def _reach_along_y(ear: Ear) -> float:
-    """Where +y leaves an ear; 0 where it is on another side."""
+    """Return where +y leaves an ear; 0 if it is on another side."""
     along, across = math.cos(ear.azimuth - math.pi / 2), abs(math.sin(ear.azimuth - math.pi / 2))
     if along <= 0:
         return 0.0

@@ -1,11 +1,9 @@
-"""Sub-plate: between lidar and linkage where the hub would cover one of the lidar's screws.
+"""Sub-plate between lidar and linkage, used if the hub would cover one of the lidar's screws.
 
-Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. On the
-bench it is screwed to the lidar from below; then its two ears are screwed to the linkage from the lidar's side, where
-nothing is in the way. The heads of the lidar's screws stand in pockets of the linkage.
+Frame: made in the laser frame, returned in the rotation frame at gamma = 0 (`cad/layout/hub.py`), mm. It is screwed to
+the lidar on the bench; then its two ears are screwed to the linkage from the lidar's side. The heads of the lidar's
+screws are in pockets of the linkage.
 """
-
-from __future__ import annotations
 
 from functools import partial
 
@@ -27,7 +25,6 @@ from scanwright.cad.layout.hub import Axis, Hub
 from scanwright.cad.layout.joints import Joint, fixing_in, fixing_of, lidar_thread_mm, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR_BODY, SUB_PLATE
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
@@ -38,12 +35,23 @@ CHAMFER = 3.0
 
 
 def sub_plate_spec(place: Placement) -> PartSpec | None:
-    """The sub-plate of one scanner; None if a driver reaches all screws of the lidar."""
+    """Return the sub-plate of one scanner; None if a driver reaches all screws of the lidar."""
     scanner, axis = place.scanner, place.stack.sub_plate
     if axis is None:
         return None
+    p, thread = place.linkage, place.linkage.ear_thread
+    on_linkage = Joint(
+        SUB_PLATE,
+        ALIGNMENT_LINKAGE,
+        fixing_in(thread),
+        EAR_SCREW,
+        placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
+        grip_mm=SUB_PLATE_THICKNESS,
+        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
+        thread=thread,
+    )
     words = (
-        "The hub covers one of the lidar's screws, so the lidar came on a plate of its own: put this plate on the "
+        "The hub covers one of the lidar's screws, so the lidar is on a separate plate: put this plate on the "
         "linkage, FRONT over FRONT, and drive the screws of its ears from the lidar's side. "
         f"{screws(ALIGNMENT_LINKAGE)}"
     )
@@ -53,14 +61,14 @@ def sub_plate_spec(place: Placement) -> PartSpec | None:
         make=partial(sub_plate, scanner, place.stack, axis),
         step=Step("Lidar and sub-plate on the linkage", words, "the two plates meet without a gap"),
         angles="laser",
-        seat=place.linkage.seat,
+        seat=p.seat,
         lifted="lidar",
-        joints=(lidar_joint(place, SUB_PLATE, SUB_PLATE_THICKNESS), _ears_joint(place.linkage)),
+        joints=(lidar_joint(place, SUB_PLATE, SUB_PLATE_THICKNESS), on_linkage),
     )
 
 
 def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
-    """The lidar on the linkage, or on its sub-plate."""
+    """Return the joint of the lidar with the linkage, or with its sub-plate."""
     p = place.linkage
     axes = placed_axes(upright_axes(p.holes, p.seat - grip, 1.0), p.stack.R())
     slot = (p.screw_hole, p.screw_hole + 2 * p.screw_travel) if p.screw_travel > 0 else None
@@ -78,27 +86,8 @@ def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
     )
 
 
-def _ears_joint(p: AlignmentLinkage) -> Joint:
-    """The sub-plate on the linkage."""
-    thread = p.ear_thread
-    return Joint(
-        SUB_PLATE,
-        ALIGNMENT_LINKAGE,
-        fixing_in(thread),
-        EAR_SCREW,
-        placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
-        grip_mm=SUB_PLATE_THICKNESS,
-        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
-        thread=thread,
-    )
-
-
 def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
-    """Make the sub-plate, its ears along an axis of the laser frame.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the sub-plate, its ears along an axis of the laser frame."""
     lidar, printer = scanner.lidar, scanner.printer
     half_x, half_y = lidar.half_mm
     low, high = -lidar.optical_height_mm - SUB_PLATE_THICKNESS, -lidar.optical_height_mm
@@ -116,5 +105,5 @@ def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
 
 
 def front_mark(x: float, beyond: float = 2.0) -> Array:
-    """FRONT: outline of a V that is cut from a plate where it ends at x, and goes on beyond."""
+    """Return FRONT: outline of a V cut from a plate that ends at x, continued beyond."""
     return np.array([[x - 3.0, 0.0], [x + 1.0, -4.0], [x + beyond, -4.0], [x + beyond, 4.0], [x + 1.0, 4.0]])

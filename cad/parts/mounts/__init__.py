@@ -1,1 +1,1 @@
-"""Standing parts that hold servo, bearings and slip ring."""
+"""Fixed parts that hold servo, bearings and slip ring."""

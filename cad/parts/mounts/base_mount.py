@@ -1,13 +1,11 @@
-"""Base mount: holds the servo case, or the tower of a belt, on a deck with the rotation axis where the angles want it.
+"""Base mount: holds the servo case, frame or belt tower on a deck, with the rotation axis at the angles of the task.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm; the deck is that of `cad/layout/deck.py`. Two
-rails with feet take the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut
-that stays wholly behind the back plate's front face (nothing of servo and rotor is there), and a foot with the deck's
-holes: four M4 on 80 x 80 mm unless the task names others. Slots at the sides of the foot take the ties of cables.
-Screws: first the case from behind through the strut, then the foot on the deck.
+Frame: rotation frame at gamma = 0 (`cad/layout/hub.py`), mm; the deck is that of `cad/layout/deck.py`. Two rails with
+feet hold the case by its rear holes and leave a channel for the plugs; a back plate behind them, a strut behind the
+back plate's front face, and a foot with the deck's holes: four M4 on 80 x 80 mm unless the task states others. Slots at
+the sides of the foot are for cable ties. Screws: first the case from behind through the strut, then the foot on the
+deck.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -43,8 +41,8 @@ from scanwright.design.left_out import LeftOut
 
 SERVO_STEP = Step(
     "Servo into the mount",
-    f"Put the case between the rails of the base mount, plugs to the channel behind it. {screws(SERVO_CASE)} "
-    "Connect the servo's cable now, and lay a cable tie into the slots of the foot where it leaves. "
+    f"Put the case between the rails of the base mount, plugs towards the channel behind it. {screws(SERVO_CASE)} "
+    "Connect the servo's cable now, and lay a cable tie into the slots of the foot at its exit. "
     f"{screws(DECK)}",
     check="the case does not rock on its four feet, nor the mount on the deck",
     brings=(SERVO,),
@@ -52,21 +50,17 @@ SERVO_STEP = Step(
 TOWER_STEP = Step(
     "Tower on the mount",
     "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
-    f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot where cables leave. {screws(DECK)}",
+    f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot at the exit of cables. {screws(DECK)}",
     check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
 )
 FRAME_STEP = Step(
     "Frame on the mount",
     f"Put the frame on the rails of the base mount. {screws(SERVO_FRAME)} Connect the servo's cable now, and lay a "
-    f"cable tie into the slots of the foot where it leaves. {screws(DECK)}",
+    f"cable tie into the slots of the foot at its exit. {screws(DECK)}",
     check="the frame does not rock on its four feet, nor the mount on the deck",
 )
 RAIL_HALF = 5.0  # of the mount's rails, at most
-OF_SERVO = (
-    "servo.case_min_mm",
-    "servo.case_max_mm",
-    "servo.holes",
-)
+OF_SERVO = ("servo.case_min_mm", "servo.case_max_mm", "servo.holes")
 RAIL_HALF_WIDTH = 4.0  # least
 FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
@@ -76,9 +70,9 @@ STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_S
 
 
 def mount_spec(place: Placement) -> PartSpec | LeftOut:
-    """The mount of one scanner, or why the servo is screwed to the deck."""
+    """Return the mount of one scanner, or why the servo is screwed to the deck."""
     if place.deck.flat:
-        return LeftOut(BASE_MOUNT, "the axis stands upright: the servo is screwed flat to the deck", 1, "parts")
+        return LeftOut(BASE_MOUNT, "the axis is upright: the servo is screwed flat to the deck", 1, "parts")
     onto = place.drive.mounted.onto
     return PartSpec(
         name=BASE_MOUNT,
@@ -93,7 +87,7 @@ def mount_spec(place: Placement) -> PartSpec | LeftOut:
 
 
 def _joints(place: Placement) -> Iterator[Joint]:
-    """What the mount carries, and the mount on the deck unless a plate is between them."""
+    """Yield the joint of mount and load, and of mount and deck unless a plate is between them."""
     mounted, deck = place.drive.mounted, place.deck
     yield Joint(
         BASE_MOUNT,
@@ -111,7 +105,7 @@ def _joints(place: Placement) -> Iterator[Joint]:
 
 
 def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
-    """Back plate, rails, strut and foot; what is under the foot is below the face of the deck."""
+    """Yield the back plate, rails, strut and foot."""
     (x, y), (_, cy, cz) = deck.back_half, deck.back_centre
     yield shape_of(box_corners(((-x, cy - y, cz - BACK_THICKNESS), (x, cy + y, cz))))
     for side in (1.0, -1.0):
@@ -127,11 +121,7 @@ def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
 
 
 def base_mount(place: Placement) -> cq.Solid:
-    """Make the mount.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the mount."""
     deck, mounted, printer = place.deck, place.drive.mounted, place.scanner.printer
     hole, deck_hole = passing_hole(mounted.screw, printer) / 2, passing_hole(deck.screw, printer) / 2
     axis = f"({deck.normal[0]:.4f}, {deck.normal[1]:.4f}, {deck.normal[2]:.4f})"
@@ -145,9 +135,10 @@ def base_mount(place: Placement) -> cq.Solid:
         feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
         body = body.fuse(*rails, *feet)
         cuts: list[cq.Shape] = []
+        driver, heads = mounted.screw.driver_radius, mounted.ears - UNDER_MOUNT_HEAD
         for x, y in mounted.holes:
             cuts.append(solids.upright(hole, back - 20.0, mounted.ears + 1.0, x, y))
-            cuts.append(solids.upright(mounted.screw.head_room, back - 400.0, mounted.ears - UNDER_MOUNT_HEAD, x, y))
+            cuts.append(solids.upright(driver, back - 400.0, heads, x, y))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
         cuts += [cut.moved(on_deck) for seat in deck.ties for cut in tie_slots(seat)]
@@ -161,7 +152,7 @@ def _back_plate(deck: Deck) -> cq.Solid:
 
 
 def _strut(deck: Deck) -> cq.Shape:
-    """Hull of back plate and a pad in the foot, behind the front of the back plate."""
+    """Return the hull of back plate and a pad in the foot, behind the front of the back plate."""
     high = deck.back_centre[2] - STRUT_BEHIND
     return solids.hull(strut_corners(deck)).cut(solids.box((-400.0, -400.0, high), (400.0, 400.0, high + 400.0)))
 
@@ -170,6 +161,6 @@ def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Sol
     x = side * mounted.holes[0][0]
     _, cy, cz = deck.back_centre
     y = deck.back_half[1] - RAIL_INSET
-    half = max(RAIL_HALF_WIDTH, mounted.screw.head_room + rail_wall(printer))
+    half = max(RAIL_HALF_WIDTH, mounted.screw.driver_radius + rail_wall(printer))
     low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))

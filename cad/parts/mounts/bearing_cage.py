@@ -1,18 +1,15 @@
-"""Bearing cage: holds a thin-section bearing around the shaft's sleeve where the axis is tilted too far for the horn.
+"""Bearing cage: holds a thin-section bearing around the shaft's sleeve if the axis is tilted too far for the horn.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Two parts, since the cage must come down over
-the ring:
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Two parts, since the cage is put over the ring:
 
     cage_base     thick plate on the ears of the servo's front, with a boss that centres the cage; with a ring it is
                   the plate of `slip_ring_adapter`
     bearing_cage  a bell around ring and adapter: legs between windows, a roof of 45 deg, the bearing's seat
 
-Put together: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell when the
-bearing has found the sleeve, and the bond in its seat when all of that is in line. The sleeve slides in the bearing:
-along the axis the horn carries alone.
+Order: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell when the bearing
+is centred on the sleeve, and the bond in its seat last. The sleeve slides in the bearing: the horn alone carries axial
+loads.
 """
-
-from __future__ import annotations
 
 import math
 from functools import partial
@@ -32,16 +29,15 @@ from scanwright.cad.layout.direct.cage import (
     UNDER_HEAD,
     WINDOW_HALF_WIDTH,
     BearingCage,
-    Ears,
-    plate_half_x,
 )
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
+from scanwright.cad.layout.drive import Ears, plate_half_x
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import (
     ALL_SCREWS,
     Joint,
     fixing_in,
-    fixing_of,
+    front_joint,
     inward_axes,
     round_wall_mm,
     screws,
@@ -51,25 +47,35 @@ from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
 from scanwright.cad.parts.tolerances import OnSheet, printed_seat
-from scanwright.cad.screws import SCREWS, Trap
+from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
-ROOM = 0.7  # between the bell's foot and what stands beside it
+BELL_GAP = 0.7  # around the bell's foot
 
 
 def bell_spec(place: Placement) -> PartSpec | None:
-    """The bell of one scanner; None if no bearing carries its axis."""
+    """Return the bell of one scanner; None if no bearing carries its axis."""
     p = place.drive.of(BearingCage)
     if p is None:
         return None
+    heads = p.stack.cage_inner + UNDER_CAGE_HEAD
+    joint = Joint(
+        BEARING_CAGE,
+        CAGE_BASE if place.scanner.slip_ring is None else SLIP_RING_ADAPTER,
+        fixing_in(p.thread),
+        CAGE_SCREW,
+        inward_axes(p.legs, heads, (p.foot + p.high) / 2),
+        grip_mm=round_wall_mm(p.stack.cage_inner, heads, p.cage_hole),
+        thread_mm=SCREW_DEPTH - p.fit / 2 if p.thread.trap is None else TRAP_WALL,
+        thread=p.thread,
+    )
     leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
     words = (
         f"With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, {leads}and lower the cage "
         f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once "
-        "around, so that the bearing finds the sleeve, tighten the screws crosswise, turn once more, and let the "
-        "epoxy set before anything hangs on the shaft: it fills what the print leaves, and the bearing is where the "
-        "shaft runs."
+        "around, so that the bearing centres on the sleeve, tighten the screws crosswise, turn once more, and let the "
+        "epoxy set before you load the shaft: it fills the gaps of the print."
     )
     return PartSpec(
         name=BEARING_CAGE,
@@ -77,29 +83,14 @@ def bell_spec(place: Placement) -> PartSpec | None:
         make=partial(bearing_cage, p),
         step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
         sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
-        joints=(_bell_joint(p, CAGE_BASE if place.scanner.slip_ring is None else SLIP_RING_ADAPTER),),
+        joints=(joint,),
         avoid=(shape_of(around_axis(p.stack.cage_outer, p.low, p.stack.cage_top)),),
         rows=(Row("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat"),),
     )
 
 
-def _bell_joint(p: BearingCage, base: str) -> Joint:
-    """The bell on its base, by radial screws."""
-    stack, heads = p.stack, p.stack.cage_inner + UNDER_CAGE_HEAD
-    return Joint(
-        BEARING_CAGE,
-        base,
-        fixing_in(p.thread),
-        CAGE_SCREW,
-        inward_axes(p.legs, heads, (p.foot + p.high) / 2),
-        grip_mm=round_wall_mm(stack.cage_inner, heads, p.cage_hole),
-        thread_mm=SCREW_DEPTH - p.fit / 2 if p.thread.trap is None else TRAP_WALL,
-        thread=p.thread,
-    )
-
-
 def base_spec(place: Placement) -> PartSpec | None:
-    """Its base as a separate part; None if it is the plate of the adapter, or nothing."""
+    """Return the base as a separate part; None if it is part of the adapter, or not needed."""
     p = place.drive.of(BearingCage)
     if p is None or place.scanner.slip_ring is not None:
         return None
@@ -110,7 +101,7 @@ def base_spec(place: Placement) -> PartSpec | None:
         step=Step(
             "Base of the cage on the servo",
             f"Lower the base over the shaft. {screws(SERVO_CASE)}",
-            "the shaft turns a whole turn without touching the base",
+            "the shaft turns a full turn without touching the base",
         ),
         shaped_by=ON_CASE,
         joints=(on_ears(place.scanner.servo, p.stack, p.ears, CAGE_BASE),),
@@ -119,32 +110,20 @@ def base_spec(place: Placement) -> PartSpec | None:
 
 
 def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
-    """A plate on the front of the servo's case."""
+    """Return the joint of a plate on the front of the servo's case."""
     heads = stack.horn + ears.front + SEAT_GAP + UNDER_HEAD
-    axes, grip = upright_axes(ears.holes, heads, -1.0), heads - (stack.horn + ears.seats)
-    return Joint(
-        part,
-        SERVO_CASE,
-        fixing_of(servo.front),
-        ears.screw,
-        axes,
-        grip_mm=grip,
-        thread_mm=servo.front.depth_mm,
-    )
+    grip = heads - (stack.horn + ears.seats)
+    return front_joint(servo, part, SERVO_CASE, upright_axes(ears.holes, heads, -1.0), grip)
 
 
 def around_base(servo: Servo, p: BearingCage) -> Shape:
-    """What the base fills beside the bell."""
-    wide, back = plate_half_x(servo, SCREWS[servo.front.screw]), servo.case_min_mm[1]
+    """Return the shape of the base next to the bell."""
+    wide, back = plate_half_x(servo), servo.case_min_mm[1]
     return shape_of(box_corners(((-wide, back, p.low), (wide, 0.0, p.stack.ring_bottom))))
 
 
 def bearing_cage(p: BearingCage) -> cq.Solid:
-    """Make the bell.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the bell."""
     stack = p.stack
     size = f"{p.bearing.outer_mm:g}"
     with building(BEARING_CAGE, "bell", "outer_mm", size) as checked:
@@ -170,23 +149,19 @@ def bearing_cage(p: BearingCage) -> cq.Solid:
         for azimuth in p.legs:
             middle, heads = (p.foot + p.high) / 2, stack.cage_inner + UNDER_CAGE_HEAD
             cuts.append(solids.radial(p.cage_hole / 2, azimuth, middle))
-            cuts.append(solids.radial(CAGE_SCREW.head_room, azimuth, middle, heads))
+            cuts.append(solids.radial(CAGE_SCREW.driver_radius, azimuth, middle, heads))
         return checked(body.cut(*cuts).clean())
 
 
 def cage_base(p: BearingCage) -> cq.Solid:
-    """Make the plate on the servo.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the plate on the servo."""
     stack, ears = p.stack, p.ears
     seats = stack.horn + ears.seats
     last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
     with building(CAGE_BASE, "plate and boss", "holes", ears.holes) as checked:
-        reaches_out = -last > stack.cage_outer + ROOM + 2 * FOOT_RADIUS
+        reaches_out = -last > stack.cage_outer + BELL_GAP + 2 * FOOT_RADIUS
         tail = solids.box((-ears.half_x, last, p.low), (ears.half_x, 0.0, p.high if reaches_out else p.foot))
-        around = solids.upright(stack.cage_outer + ROOM, p.foot, p.high + 1.0)
+        around = solids.upright(stack.cage_outer + BELL_GAP, p.foot, p.high + 1.0)
         boss = solids.upright(stack.cage_inner - p.fit / 2, p.low, p.high)
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
         half, reach = p.lead_hole
@@ -198,7 +173,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.upright(ears.opening, stack.horn + ears.front, p.high + 1.0)]
         for x, y in ears.holes:
             cuts.append(solids.upright(ears.hole / 2, seats - 1.0, p.high + 1.0, x, y))
-            cuts.append(_head_room(p, x, y))
+            cuts.append(_head_recess(p, x, y))
         for azimuth in p.legs:
             middle, start = (p.foot + p.high) / 2, stack.cage_inner - SCREW_DEPTH
             cuts.append(solids.radial(p.thread.hole / 2, azimuth, middle, start, SCREW_DEPTH + 1.0))
@@ -208,16 +183,16 @@ def cage_base(p: BearingCage) -> cq.Solid:
 
 
 def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
-    """Slot in the boss that a nut is dropped into from above, before the ring and the bell come."""
+    """Return the slot in the boss for a nut, inserted from above before ring and bell."""
     middle, half = (p.foot + p.high) / 2, trap.across / 2
     outer = p.stack.cage_inner - p.fit / 2 - TRAP_WALL
     slot = solids.box((outer - trap.depth, -half, middle - trap.corner), (outer, half, p.high + 1.0))
     return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
 
 
-def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
-    """Recess of one screw's head; one beside the opening is open to it, else a sliver would stand between them."""
-    radius, low, high = p.ears.screw.head_room, p.low + UNDER_HEAD, p.high + 1.0
+def _head_recess(p: BearingCage, x: float, y: float) -> cq.Shape:
+    """Return the recess of one screw's head; next to the opening it is open, else a sliver would remain."""
+    radius, low, high = p.ears.screw.driver_radius, p.low + UNDER_HEAD, p.high + 1.0
     recess: cq.Shape = solids.upright(radius, low, high, x, y)
     reach = math.hypot(x, y)
     if reach - radius > p.ears.opening + 1.0:
@@ -227,7 +202,7 @@ def _head_room(p: BearingCage, x: float, y: float) -> cq.Shape:
 
 
 def _windows(p: BearingCage) -> list[cq.Solid]:
-    """Windows: at +-x open below, for the adapter's arms; at +-y closed, so that the legs stand in pairs."""
+    """Return the windows: at +-x open below, for the adapter's arms; at +-y closed, which joins the legs in pairs."""
     cuts = []
     for k in range(4):
         out = np.array([1.0, 0.0, 0.0]) if k % 2 == 0 else np.array([0.0, 1.0, 0.0])

@@ -1,14 +1,12 @@
-"""Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo beside them.
+"""Bearing tower of the belt layout: holds the shaft's two bearings, the capsule below them, and the servo next to them.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; the servo's side is that of `BeltStack.quarter`.
-A tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
-screws; at its top a shelf of two arms, between which the servo hangs from its plate: the plate's screws end in the
-arms. Nuts, where the printer's profile asks for them, go into the arms from below and into the foot from its corners.
-A round window on the far side leads a driver to the grub screws of `shaft_ring`. Its top is flat: it prints upside
-down. An index groove in the edge of its top at +y meets the groove of the linkage's hub.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; the servo's side is that of `BeltStack.quarter`. A
+tube with a seat at either end of a lip, wider around the capsule, on a square foot with the threads of the mount's
+screws; at its top a shelf of two arms, between which the servo hangs from its plate. Nuts are inserted into the arms
+from below and into the foot from its corners. Through a round window on the far side a driver reaches the grub screws
+of `shaft_ring`. It prints upside down on its flat top. An index groove in the edge of its top at +y meets the groove of
+the linkage's hub.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator
@@ -20,7 +18,7 @@ import numpy as np
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.belt.stack import (
     BOSS,
-    CASE_ROOM,
+    CASE_GAP,
     DISC,
     FOOT,
     FOOT_HALF,
@@ -33,14 +31,7 @@ from scanwright.cad.layout.belt.stack import (
     TRAVEL,
     BeltStack,
 )
-from scanwright.cad.layout.belt.tower import (
-    DISC_SCREW,
-    SCREW_DEPTH,
-    UNDER_FOOT_NUT,
-    UNDER_HEAD,
-    BearingTower,
-    disc_azimuths,
-)
+from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_FOOT_NUT, UNDER_HEAD, disc_azimuths
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
@@ -48,7 +39,7 @@ from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.parts.tolerances import OnSheet, printed_seat
-from scanwright.cad.screws import Trap, thread_in_part
+from scanwright.cad.screws import Thread, Trap, passing_hole, thread_in_part, trap_of
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 
@@ -60,80 +51,69 @@ MARKED = 6.0  # half of the edge that it is in
 
 
 def tower_spec(place: Placement) -> PartSpec | None:
-    """The tower of one scanner; None without a belt."""
-    p = place.drive.of(BearingTower)
-    if p is None:
+    """Return the tower of one scanner; None without a belt."""
+    stack, printer, foot = place.drive.of(BeltStack), place.scanner.printer, place.drive.mounted.thread
+    if stack is None or foot is None:
         return None
-    stack = p.stack
-    words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
-    return PartSpec(
-        name=BEARING_TOWER,
-        turns=False,
-        make=partial(bearing_tower, p),
-        step=Step(
-            "Bearings into the tower", words, "both inner rings turn freely, neither bearing stands out", (BEARING,)
-        ),
-        sheet=OnSheet((printed_seat(stack.carrier, p.fit),), _nuts_words(p)),
-        shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
-        shapes={"printer.fit_clearance_mm": "every bore and seat"},
-        joints=(_disc_joint(p, place.scanner.printer),),
-        avoid=tuple(_around(stack)),
-    )
-
-
-def _disc_joint(p: BearingTower, printer: Printer) -> Joint:
-    """The capsule's disc in the tower, by radial screws."""
-    stack, heads = p.stack, p.stack.chamber_radius + UNDER_HEAD
-    return Joint(
+    heads, fit = stack.chamber_radius + UNDER_HEAD, printer.fit_clearance_mm
+    joint = Joint(
         BEARING_TOWER,
         SLIP_RING_ADAPTER,
         "thread",
         DISC_SCREW,
         placed_axes(inward_axes(disc_azimuths(stack), heads, stack.disc_top - DISC / 2), stack.turn()),
-        grip_mm=round_wall_mm(stack.chamber_radius, heads, p.disc_hole),
-        thread_mm=SCREW_DEPTH - p.fit / 2,
-        thread=thread_in_part(DISC_SCREW, printer, room_for_nut=False),
+        grip_mm=round_wall_mm(stack.chamber_radius, heads, passing_hole(DISC_SCREW, printer)),
+        thread_mm=SCREW_DEPTH - fit / 2,
+        thread=thread_in_part(DISC_SCREW, printer, nut_fits=False),
+    )
+    words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
+    return PartSpec(
+        name=BEARING_TOWER,
+        turns=False,
+        make=partial(bearing_tower, stack, printer, foot),
+        step=Step(
+            "Bearings into the tower", words, "both inner rings turn freely, neither bearing protrudes", (BEARING,)
+        ),
+        sheet=OnSheet((printed_seat(stack.carrier, fit),), _nuts_words(foot, printer)),
+        shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
+        shapes={"printer.fit_clearance_mm": "every bore and seat"},
+        joints=(joint,),
+        avoid=tuple(_around(stack)),
     )
 
 
 def _around(stack: BeltStack) -> Iterator[Shape]:
-    """Tower with its foot."""
+    """Yield the tower and its foot."""
     yield shape_of(around_axis(stack.wide_radius, stack.tower_bottom, stack.tower_top))
     flares = max(0.0, math.sqrt(2) * FOOT_HALF - stack.wide_radius)  # the cone on the foot, at 45 deg
     foot = stack.tower_bottom + FOOT + flares
     yield shape_of(box_corners(((-FOOT_HALF, -FOOT_HALF, stack.tower_bottom), (FOOT_HALF, FOOT_HALF, foot))))
 
 
-def _nuts_words(p: BearingTower) -> tuple[str, ...]:
-    """What the drawing says of the room for nuts."""
-    words = []
-    if p.plate.trap is not None:
-        words.append(f"Hexagons under the arms for nuts {PLATE_SCREW.name}: {p.plate.trap.across:g} across flats.")
-    if p.foot.trap is not None:
-        words.append(f"Slots in the foot for nuts {FOOT_SCREW.name}: {p.foot.trap.across:g} wide, from its corners.")
+def _nuts_words(foot: Thread, printer: Printer) -> tuple[str, ...]:
+    """Return the notes of the drawing on spaces for nuts."""
+    plate, words = trap_of(PLATE_SCREW, printer), []
+    if plate is not None:
+        words.append(f"Hexagons under the arms for nuts {PLATE_SCREW.name}: {plate.across:g} across flats.")
+    if foot.trap is not None:
+        words.append(f"Slots in the foot for nuts {FOOT_SCREW.name}: {foot.trap.across:g} wide, from its corners.")
     return tuple(words)
 
 
-def bearing_tower(p: BearingTower) -> cq.Solid:
-    """Make the tower.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
-    stack = p.stack
+def bearing_tower(stack: BeltStack, printer: Printer, foot: Thread) -> cq.Solid:
+    """Make the tower; `foot` is the thread of the mount's screws."""
     size = f"{stack.carrier.outer_mm:g}"
     with building(BEARING_TOWER, "tube, shelf and foot", "outer_mm", size) as checked:
-        body = checked(_tube(p).fuse(_foot(p), _shelf(p)).cut(_inside(p)))
+        body = checked(_tube(stack).fuse(_foot(stack), _shelf(stack)).cut(_inside(stack, printer.fit_clearance_mm)))
     with building(BEARING_TOWER, "holes and mark", "outer_mm", size) as checked:
-        made = checked(body.cut(*_holes(p)).clean()).moved(solids.location(stack.turn()))
+        made = checked(body.cut(*_holes(stack, printer, foot)).clean()).moved(solids.location(stack.turn()))
         edge = (stack.plate_y[1], stack.tower_radius, -stack.plate_y[0], stack.tower_radius)[stack.quarter]
         groove = solids.prism(outlines.diamond(GROOVE, edge), stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0)
         return checked(made.cut(groove).clean())
 
 
-def _tube(p: BearingTower) -> cq.Solid:
+def _tube(stack: BeltStack) -> cq.Solid:
     """Round outer shape: around the bearings, then at 45 deg wider around the capsule."""
-    stack = p.stack
     narrow, wide, wall = stack.tower_radius, stack.wide_radius, 1.0
     inner = stack.carrier.outer_mm / 2 - LIP
     turn = stack.lower_bottom
@@ -150,10 +130,9 @@ def _tube(p: BearingTower) -> cq.Solid:
     )
 
 
-def _inside(p: BearingTower) -> cq.Shape:
-    """Seats, the way between them, and the chamber."""
-    stack = p.stack
-    seat, width = stack.carrier.outer_mm / 2 + p.fit / 4, stack.carrier.width_mm
+def _inside(stack: BeltStack, fit: float) -> cq.Shape:
+    """Return the seats, the passage between them, and the chamber."""
+    seat, width = stack.carrier.outer_mm / 2 + fit / 4, stack.carrier.width_mm
     passage = stack.carrier.outer_mm / 2 - LIP
     upper = solids.upright(seat, stack.tower_top - width, stack.tower_top + 1.0)
     middle = solids.upright(passage, stack.lower_bottom, stack.tower_top)
@@ -162,9 +141,8 @@ def _inside(p: BearingTower) -> cq.Shape:
     return upper.fuse(middle, lower, chamber)
 
 
-def _foot(p: BearingTower) -> cq.Shape:
-    """The square of the mount's screws, on a cone that needs no support upside down."""
-    stack = p.stack
+def _foot(stack: BeltStack) -> cq.Shape:
+    """Return the square of the mount's screws, on a cone that needs no support upside down."""
     low, high = stack.tower_bottom, stack.tower_bottom + FOOT
     plate = solids.prism(outlines.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), low, high)
     reach = math.sqrt(2) * FOOT_HALF
@@ -183,14 +161,13 @@ def _foot(p: BearingTower) -> cq.Shape:
     return plate.fuse(cone.intersect(around))
 
 
-def _shelf(p: BearingTower) -> cq.Shape:
-    """A plate around the tube's top, forked around the servo's case; servo's frame."""
-    stack = p.stack
+def _shelf(stack: BeltStack) -> cq.Shape:
+    """Return a plate around the tube's top, forked around the servo's case; servo's frame."""
     low, high = stack.plate_y
     (inner_low, _), (inner_high, _) = stack.arms_y
     bottom, top = stack.tower_top - SHELF, stack.tower_top
-    root = stack.centre + stack.servo.case_min_mm[0] - TRAVEL - CASE_ROOM
-    end = stack.centre + stack.slot_x + TRAVEL + PLATE_SCREW.head_room + 1.0
+    root = stack.centre + stack.servo.case_min_mm[0] - TRAVEL - CASE_GAP
+    end = stack.centre + stack.slot_x + TRAVEL + PLATE_SCREW.driver_radius + 1.0
     back = -stack.tower_radius
     outline = [[-MARKED, low], [end, low], [end, high], [-MARKED, high], [back, 12.0], [back, -12.0]]
     shelf = solids.prism(outline, bottom, top)
@@ -198,32 +175,31 @@ def _shelf(p: BearingTower) -> cq.Shape:
 
 
 def _corner_slot(trap: Trap, floor: float, azimuth: float) -> cq.Solid:
-    """Slot in a corner of the foot that a nut is pushed into from outside, before the mount comes."""
+    """Return the slot in a corner of the foot for a nut, inserted from outside before the mount."""
     start, half = math.sqrt(2) * FOOT_HOLE - trap.corner, trap.across / 2
     slot = solids.box((start, -half, floor), (math.sqrt(2) * FOOT_HALF, half, floor + trap.depth))
     return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
 
 
-def _holes(p: BearingTower) -> list[cq.Solid]:
-    stack = p.stack
-    cuts = []
+def _holes(stack: BeltStack, printer: Printer, foot: Thread) -> list[cq.Solid]:
+    plate, cuts = thread_in_part(PLATE_SCREW, printer), []
     for x in (stack.centre - stack.slot_x, stack.centre + stack.slot_x):
         for _, y in stack.arms_y:
-            cuts.append(solids.upright(p.plate.hole / 2, stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0, x, y))
-            if p.plate.trap is not None:
-                nut = np.array([x, y]) + outlines.polygon(p.plate.trap.corner, 6, 0.0)
+            cuts.append(solids.upright(plate.hole / 2, stack.tower_top - SHELF - 1.0, stack.tower_top + 1.0, x, y))
+            if plate.trap is not None:
+                nut = np.array([x, y]) + outlines.polygon(plate.trap.corner, 6, 0.0)
                 cuts.append(solids.prism(nut, stack.tower_top - SHELF - 1.0, stack.tower_top - PLATE_GRIP))
     low = stack.tower_bottom
-    deep = FOOT - 1.0 if p.foot.trap is None else UNDER_FOOT_NUT + p.foot.trap.depth + BEYOND_NUT
+    deep = FOOT - 1.0 if foot.trap is None else UNDER_FOOT_NUT + foot.trap.depth + BEYOND_NUT
     for x in (FOOT_HOLE, -FOOT_HOLE):
         for y in (FOOT_HOLE, -FOOT_HOLE):
-            cuts.append(solids.upright(p.foot.hole / 2, low - 1.0, low + deep, x, y))
-            if p.foot.trap is not None:
-                cuts.append(_corner_slot(p.foot.trap, low + UNDER_FOOT_NUT, math.atan2(y, x)))
+            cuts.append(solids.upright(foot.hole / 2, low - 1.0, low + deep, x, y))
+            if foot.trap is not None:
+                cuts.append(_corner_slot(foot.trap, low + UNDER_FOOT_NUT, math.atan2(y, x)))
     for azimuth in disc_azimuths(stack):
         height, heads = stack.disc_top - DISC / 2, stack.chamber_radius + UNDER_HEAD
-        cuts.append(solids.radial(p.disc_hole / 2, azimuth, height))
-        cuts.append(solids.radial(DISC_SCREW.head_room, azimuth, height, heads))
+        cuts.append(solids.radial(passing_hole(DISC_SCREW, printer) / 2, azimuth, height))
+        cuts.append(solids.radial(DISC_SCREW.driver_radius, azimuth, height, heads))
     ring = stack.collar_low + BOSS / 2
     cuts.append(solids.cylinder(WINDOW / 2, (0.0, 0.0, ring), (-1.0, 0.0, 0.0), 80.0))
     return cuts

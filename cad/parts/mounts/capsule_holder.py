@@ -2,11 +2,8 @@
 
 Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm; turned with the servo's side. The capsule hangs
 through its middle, its flange on top, screws from below with nuts on the flange; then the disc slides into the tower
-from below, and three radial screws hold it. The flange's own wide holes and the soft tube on the rotor take what is
-not in line.
+from below, and three radial screws hold it. The wide holes of the flange and the soft tube compensate misalignment.
 """
-
-from __future__ import annotations
 
 from functools import partial
 
@@ -23,23 +20,23 @@ from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 
-BODY_ROOM = 0.5  # around the capsule's body
+BODY_GAP = 0.5  # around the capsule's body
 SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
 RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
 
 RING_STEP = Step(
     "Capsule into the tower",
-    "Lead the rotor's leads up the shaft and out by its windows, those of each cable by the one that the step "
+    "Pull the rotor's leads up the shaft and out of its windows, those of each cable through the one that the step "
     '"Leads between lidar and ring" names, if there is one, and slide the disc into the tower from below until the '
-    "soft tube sits in the shaft. "
+    "soft tube is in the shaft. "
     f"{screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
-    "turned by hand, the shaft takes the rotor along without slipping",
+    "turned by hand, the shaft turns the rotor without slipping",
 )
 
 
 def holder_spec(place: Placement) -> PartSpec | None:
-    """The disc of one scanner; None if it has no capsule."""
+    """Return the disc of one scanner; None if it has no capsule."""
     stack, printer = place.drive.of(BeltStack), place.scanner.printer
     if stack is None:
         return None
@@ -47,16 +44,14 @@ def holder_spec(place: Placement) -> PartSpec | None:
     screw, thickness = SCREWS[stack.flange.screw], stack.flange.thickness_mm
     words = (
         "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
-        f"{screws(RING_STATOR)} Leave them so loose that the flange still gives. Push 10 mm of soft tube, "
+        f"{screws(RING_STATOR)} Leave them so loose that the flange still moves. Push 10 mm of soft tube, "
         f"{stack.shaft_bore:g} x {stack.rotor.diameter_mm:g} mm, over the stub of the rotor."
     )
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
         make=partial(capsule_holder, stack, printer),
-        step=Step(
-            "Capsule on its disc", words, "the capsule can be shifted a little by hand, and its rotor turns freely"
-        ),
+        step=Step("Capsule on its disc", words, "the capsule moves a little by hand, and its rotor turns freely"),
         shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
         joints=(Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness),),
         rows=(Row("wiring", "soft tube", SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER), CRIMPS),
@@ -65,17 +60,13 @@ def holder_spec(place: Placement) -> PartSpec | None:
 
 
 def capsule_holder(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the disc.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the disc."""
     low, high = stack.disc_top - DISC, stack.disc_top
     hole = passing_hole(SCREWS[stack.flange.screw], printer)
-    thread = thread_in_part(DISC_SCREW, printer, room_for_nut=False)
+    thread = thread_in_part(DISC_SCREW, printer, nut_fits=False)
     with building(SLIP_RING_ADAPTER, "disc", "flange.diameter_mm", f"{stack.flange.diameter_mm:g}") as checked:
         radius = stack.chamber_radius - printer.fit_clearance_mm / 2
-        cuts = [solids.upright(stack.ring_radius + BODY_ROOM, low - 1.0, high + 1.0)]
+        cuts = [solids.upright(stack.ring_radius + BODY_GAP, low - 1.0, high + 1.0)]
         cuts += [solids.upright(hole / 2, low - 1.0, high + 1.0, x, y) for x, y in flange_centres(stack.flange)]
         for azimuth in disc_azimuths(stack):
             start = radius - SCREW_DEPTH

@@ -1,10 +1,8 @@
-"""Servo frame: holds a servo by the threads in its front, where its rear has none that may carry it.
+"""Servo frame: holds a servo by the threads in its front, if its rear has no usable ones.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/frame.py`), mm. A plate with an opening around the horn, sides
-beside the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
+along the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
 """
-
-from __future__ import annotations
 
 from functools import partial
 
@@ -14,12 +12,11 @@ from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.direct.frame import FOOT, GRIP, HEADER, LEAST_BRIDGE, LEG, ServoFrame
 from scanwright.cad.layout.envelope import box_corners
-from scanwright.cad.layout.joints import Joint, fixing_of, screws, upright_axes
+from scanwright.cad.layout.joints import front_joint, screws, upright_axes
 from scanwright.cad.layout.names import SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step
 from scanwright.cad.solids import building
-from scanwright.design.catalogue.servo import Servo
 
 
 def frame_spec(place: Placement) -> PartSpec | None:
@@ -27,6 +24,7 @@ def frame_spec(place: Placement) -> PartSpec | None:
     frame, servo = place.drive.of(ServoFrame), place.scanner.servo
     if frame is None:
         return None
+    heel = frame.heel_mm if len(frame.holes) == 2 else None
     words = (
         "Push the servo into the frame from below, its horn through the opening. "
         f"{screws(SERVO_CASE)} Do not loosen the screws that close its case."
@@ -37,37 +35,20 @@ def frame_spec(place: Placement) -> PartSpec | None:
         make=partial(servo_frame, frame),
         step=Step("Servo into its frame", words, "the horn turns freely in the opening", (SERVO,)),
         shaped_by=("servo.case_min_mm", "servo.cable_exit_mm", *ON_CASE),
-        joints=(_on_servo(servo, frame),),
+        joints=(front_joint(servo, SERVO_FRAME, SERVO_CASE, upright_axes(frame.holes, frame.high, -1.0), GRIP, heel),),
         avoid=tuple(shape_of(box_corners(leg)) for leg in frame.legs()),
     )
 
 
-def _on_servo(servo: Servo, frame: ServoFrame) -> Joint:
-    return Joint(
-        SERVO_FRAME,
-        SERVO_CASE,
-        fixing_of(servo.front),
-        frame.screw,
-        upright_axes(frame.holes, frame.high, -1.0),
-        grip_mm=GRIP,
-        thread_mm=servo.front.depth_mm,
-        heel_mm=frame.heel_mm if len(frame.holes) == 2 else None,
-    )
-
-
 def servo_frame(p: ServoFrame) -> cq.Solid:
-    """Make the frame.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the frame."""
     (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + LEG
     with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
         body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))
         feet = [solids.box((-p.reach_x, a, p.low), (p.reach_x, b, p.low + FOOT)) for a, b in ((y0, w0), (w1, y1))]
-        room = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
+        inside = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
         window = solids.box((-p.reach_x - 1.0, w0, p.low - 1.0), (p.reach_x + 1.0, w1, p.plate - HEADER))
-        body = checked(body.fuse(*feet).cut(room, window).clean())
+        body = checked(body.fuse(*feet).cut(inside, window).clean())
     with building(SERVO_FRAME, "opening and holes", "holes", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.plate - 1.0, p.high + 1.0)]
         if y1 - p.opening < LEAST_BRIDGE:  # a plate that ends so close to the horn is open there

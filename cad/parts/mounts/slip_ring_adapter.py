@@ -1,15 +1,13 @@
 """Slip-ring adapter: keeps the ring's stator from turning, from the servo's front holes.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. The rotor of the ring is clamped to the shaft
-and carries the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in
-their groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides round the horn flange
-from -y after the shaft is on, then the ring comes down over the spigot between the arms.
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. The rotor of the ring is clamped to the shaft and
+carries the ring; two arms, compliant towards the axis and stiff around it, hold the stator with a cable tie in their
+groove. A stiff bracket would load the ring's bearings. The fork is open at +y: it slides around the horn flange from -y
+after the shaft is on, then the ring is lowered over the spigot between the arms.
 
 Under the cage of a bearing (`bearing_cage.py`) it is a thick closed plate with a boss that centres the cage, held by
-every pair of ears beside the flange; it comes down over the shaft. Without a ring it has no arms and is `cage_base`.
+every pair of ears outside the flange; it is lowered over the shaft. Without a ring it has no arms and is `cage_base`.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
@@ -18,16 +16,16 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.direct.adapter import ARM, ARM_GAP, ARM_HALF_WIDTH, PLATE, SlipRingAdapter, arm_top
-from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage, Ears, plate_half_x
+from scanwright.cad.layout.direct.adapter import ARM, ARM_GAP, ARM_HALF_WIDTH, PLATE, UNDER_ROOF
+from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.drive import Ears, plate_half_x
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import RING, SERVO_CASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.mounts.bearing_cage import around_base, cage_base, on_ears
 from scanwright.cad.parts.part_spec import CRIMPS, ON_CASE, PartSpec, Row, Step
-from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
@@ -35,58 +33,54 @@ RING_STEP = Step(
     "Slip ring",
     "Pass the plugs of the stator's leads down on the side of the index, and lower the ring over the shaft, its "
     "collar upwards. Clamp the collar to the shaft with its own set screws. Turn the stator until its leads hang "
-    "straight, and hold it by a cable tie in the grooves of the adapter: it may move a little, it may not turn.",
-    "turned by hand, the shaft takes the rotor along and the stator stays; no lead is pulled",
+    "straight, and hold it by a cable tie in the grooves of the adapter: it can move a little, but must not turn.",
+    "turned by hand, the shaft turns the rotor, not the stator; no lead is pulled",
 )
 OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead_diameter_mm", "slip_ring.plug_mm")
 
 
 def adapter_spec(place: Placement) -> PartSpec | None:
-    """The adapter of one scanner; None without a ring."""
-    p, cage = place.drive.of(SlipRingAdapter), place.drive.of(BearingCage)
-    if p is None:
+    """Return the adapter of one scanner; None without a ring."""
+    stack, fork, cage = place.drive.of(DirectStack), place.drive.of(Ears), place.drive.of(BearingCage)
+    if stack is None or place.scanner.slip_ring is None:
         return None
-    how = "Lower the plate over the shaft." if p.fork is None else "Slide the fork round the flange of the shaft."
-    ears = p.fork if cage is None else cage.ears
+    how = "Lower the plate over the shaft." if fork is None else "Slide the fork around the flange of the shaft."
+    ears = fork if cage is None else cage.ears
     assert ears is not None  # a fork, or the base of a cage
+    servo = place.scanner.servo
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(slip_ring_adapter, p, cage),
+        make=partial(slip_ring_adapter, stack, fork, cage),
         step=Step(
-            "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a whole turn without touching"
+            "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a full turn without touching"
         ),
         shaped_by=(*ON_CASE, *OF_RING),
-        joints=(on_ears(place.scanner.servo, p.stack, ears, SLIP_RING_ADAPTER),),
-        avoid=tuple(_around(place.scanner.servo, p)) if cage is None else (around_base(place.scanner.servo, cage),),
+        joints=(on_ears(servo, stack, ears, SLIP_RING_ADAPTER),),
+        avoid=tuple(_around(servo, stack)) if cage is None else (around_base(servo, cage),),
         rows=(Row("wiring", "cable tie", "cable tie around the ring's stator", "groove of the adapter"), CRIMPS),
         steps={RING: RING_STEP},
     )
 
 
-def _around(servo: Servo, p: SlipRingAdapter) -> Iterator[Shape]:
-    """Arms and fork."""
-    stack, front = p.stack, p.stack.horn + servo.case_max_mm[2] + SEAT_GAP
-    outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo, SCREWS[servo.front.screw]))
+def _around(servo: Servo, stack: DirectStack) -> Iterator[Shape]:
+    """Yield arms and fork."""
+    front = stack.horn + servo.case_max_mm[2] + SEAT_GAP
+    outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo))
     yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
     yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + PLATE))))
 
 
-def slip_ring_adapter(p: SlipRingAdapter, cage: BearingCage | None) -> cq.Solid:
-    """Make the adapter: the fork, or the base of a cage, and the arms.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
-    stack = p.stack
+def slip_ring_adapter(stack: DirectStack, fork: Ears | None, cage: BearingCage | None) -> cq.Solid:
+    """Make the adapter: the fork, or the base of a cage, and the arms."""
     inner = stack.ring_radius + ARM_GAP
     outer = inner + ARM
-    if p.fork is not None:
-        body, top = _fork(stack, p.fork, outer), stack.horn + p.fork.front + SEAT_GAP + PLATE
+    if fork is not None:
+        body, top = _fork(stack, fork, outer), stack.horn + fork.front + SEAT_GAP + PLATE
     else:
         assert cage is not None
         body, top = cage_base(cage), cage.foot
-    high_end = arm_top(p)
+    high_end = stack.ring_bottom + min(30.0, stack.ring_length - (UNDER_ROOF if fork is None else 5.0))
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         arms = [
             solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end))
@@ -104,7 +98,7 @@ def slip_ring_adapter(p: SlipRingAdapter, cage: BearingCage | None) -> cq.Solid:
 
 
 def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
-    """The plate on the servo, open at +y."""
+    """Return the plate on the servo, open at +y."""
     low, seats = stack.horn + p.front + SEAT_GAP, stack.horn + p.seats
     top = low + PLATE
     ys = [y for _, y in p.holes]
@@ -117,5 +111,5 @@ def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
         cuts = [solids.box((-p.opening, slot_end, low - 9), (p.opening, 99.0, top + 9))]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, top + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.head_room, low + UNDER_HEAD, top + 1.0, x, y))
+            cuts.append(solids.upright(p.screw.driver_radius, low + UNDER_HEAD, top + 1.0, x, y))
         return checked(tail.fuse(prongs, *feet).cut(*cuts))

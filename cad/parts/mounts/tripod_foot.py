@@ -1,12 +1,11 @@
 """Tripod foot: a plate under the mount, with a nut 1/4-20 UNC for a tripod's screw.
 
-Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/modules/tripod_foot.py`. It lies on the
-lower face of the mount's foot and has its outline. The tripod's nut lies in a pocket that the mount closes; those of
-the mount's screws in pockets from below.
+Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/modules/tripod_foot.py`. It is below the
+mount's foot and has its outline. The tripod's nut is in a pocket that the mount closes; those of the mount's screws in
+pockets from below.
 """
 
-from __future__ import annotations
-
+import math
 from collections.abc import Iterator
 from functools import partial
 
@@ -16,14 +15,7 @@ import numpy as np
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
-from scanwright.cad.layout.modules.tripod_foot import (
-    FLOOR,
-    HEEL,
-    OVER_NUTS,
-    PROTRUDES,
-    TripodFoot,
-    corner_turn,
-)
+from scanwright.cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, PROTRUDES, TripodFoot
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import PartSpec, Step
@@ -33,21 +25,21 @@ from scanwright.design.left_out import LeftOut
 
 
 def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
-    """The plate of one scanner, if the task requires it."""
+    """Return the plate of one scanner, if the task requires it."""
     p = place.deck.tripod
     if p is None:
-        return LeftOut(TRIPOD_FOOT, f"the task does not ask for it by modules.{TRIPOD_FOOT}", 1, "parts")
+        return LeftOut(TRIPOD_FOOT, f"the task does not require it (modules.{TRIPOD_FOOT})", 1, "parts")
     nut = "Lay the nut 1/4-20 into the pocket in the middle of the plate. " if p.tripod.trap is not None else ""
     words = (
         f"{nut}Put the plate under the foot of the mount, over its holes. {screws(TRIPOD_FOOT, BASE_MOUNT)} When the "
         f"scanner is finished, turn the screw of the tripod in by hand. {screws(TRIPOD_FOOT, TRIPOD)} One screw alone "
-        "holds against turning by friction only: take a head or a quick-release plate with a rubber or cork face."
+        "prevents turning by friction only: use a head or a quick-release plate with a rubber or cork face."
     )
     return PartSpec(
         name=TRIPOD_FOOT,
         turns=False,
         make=partial(tripod_foot, place.deck, p),
-        step=Step("Tripod foot", words, "no screw stands out below the plate, and the nut does not turn"),
+        step=Step("Tripod foot", words, "no screw protrudes below the plate, and the nut does not turn"),
         after=BASE_MOUNT,
         lifted="deck",
         joints=tuple(_joints(place.deck, p)),
@@ -55,7 +47,7 @@ def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
 
 
 def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
-    """The mount on its plate, and that on the tripod."""
+    """Yield the joints of the plate with mount and tripod."""
     R = deck.rotation()
     yield Joint(
         BASE_MOUNT,
@@ -82,19 +74,16 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
 
 
 def tripod_foot(deck: Deck, p: TripodFoot) -> cq.Solid:
-    """Make the plate.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the plate."""
     with building(TRIPOD_FOOT, "plate and pockets", "deck.screw", deck.screw.name) as checked:
         plate = solids.prism(outlines.octagon(*deck.foot), -p.thickness, 0.0)
         cuts = [solids.upright(p.tripod.hole / 2, -p.thickness - 1.0, 1.0)]
         if p.tripod.trap is not None:
-            cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), p.nut_floor, 1.0))
+            cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), FLOOR - p.thickness, 1.0))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(p.mount.hole / 2, -p.thickness - 1.0, 1.0, x, y))
             if p.mount.trap is not None:
-                nut = np.array([x, y]) + outlines.polygon(p.mount.trap.corner, 6, corner_turn((x, y)))
+                turn = math.atan2(y, x) + math.pi / 6  # a flat towards the middle of the plate
+                nut = np.array([x, y]) + outlines.polygon(p.mount.trap.corner, 6, turn)
                 cuts.append(solids.prism(nut, -p.thickness - 1.0, -OVER_NUTS))
         return checked(plate.cut(*cuts).clean().moved(solids.location(deck.rotation(), deck.centre)))

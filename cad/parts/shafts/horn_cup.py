@@ -1,11 +1,9 @@
-"""Horn cup: the shaft of a scanner without ring and bearing, from the servo's horn to the linkage's hub. One print.
+"""Horn cup: the printed shaft of a scanner without ring and bearing, from the servo's horn to the linkage's hub.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. A floor as wide as the hub, with the horn's holes
 and a pocket for its boss; on it a wall around the heads of the horn's screws, whose rim carries the hub and whose flat
-at +y keys it. Two nuts stand in slots of the wall, open above, for the screws that cross from the hub.
+at +y keys it. Two nuts are in slots of the wall, open above, for the screws that cross from the hub.
 """
-
-from __future__ import annotations
 
 import math
 from functools import partial
@@ -27,15 +25,15 @@ from scanwright.design.catalogue.products import Printer
 from scanwright.design.catalogue.servo import Servo
 
 AROUND_BOSS = 0.2  # of the horn
-SEATED_ON_RIM = "the hub sits on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
+SEATED_ON_RIM = "the hub is on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
 LINKAGE_WORDS = (
-    "Lower the hub over the cup until it sits on its rim; the flat of the cup fits one way only, and the groove of the "
-    f"hub then stands above the groove of the cup. {screws(HORN_CUP)}"
+    "Lower the hub over the cup onto its rim; the flat of the cup fits in one position only, and the groove of the hub "
+    f"is then above the groove of the cup. {screws(HORN_CUP)}"
 )
 
 
 def cup_spec(place: Placement) -> PartSpec | None:
-    """The cup of one scanner; None if its shaft is a turned one."""
+    """Return the cup of one scanner; None if its shaft is turned."""
     p, stack, scanner = place.linkage, place.drive.of(DirectStack), place.scanner
     if stack is None or stack.cup_bore == 0:
         return None
@@ -47,7 +45,7 @@ def cup_spec(place: Placement) -> PartSpec | None:
         name=HORN_CUP,
         turns=True,
         make=partial(horn_cup, p, stack, scanner.servo, scanner.printer),
-        step=Step("Cup on the horn", words, "the index groove stands over the middle of the +Y face"),
+        step=Step("Cup on the horn", words, "the index groove is over the middle of the +Y face"),
         sheet=OnSheet((spigot_in_hub(stack.shaft_diameter, p.fit),)),
         shaped_by=HORN,
         joints=(on_horn(scanner.servo, stack, HORN_CUP),),
@@ -56,11 +54,7 @@ def cup_spec(place: Placement) -> PartSpec | None:
 
 
 def horn_cup(p: AlignmentLinkage, stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
-    """Make the cup.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the cup."""
     horn, floor, top = stack.horn, stack.horn + stack.flange_thickness, stack.spigot_top
     radius, bore, seat = stack.shaft_diameter / 2, stack.cup_bore / 2, horn + stack.horn_grip
     with building(HORN_CUP, "floor and wall", "horn_circle_mm", servo.horn_circle_mm) as checked:
@@ -84,7 +78,7 @@ def horn_cup(p: AlignmentLinkage, stack: DirectStack, servo: Servo, printer: Pri
 
 
 def _cross_holes(p: AlignmentLinkage, azimuth: float) -> list[cq.Solid]:
-    """What one cross screw holds in: a hole through the wall, or one to the slot of its nut."""
+    """Return the hole of one cross screw through the wall, or to the slot of its nut."""
     stack, thread = p.stack, p.cross_thread
     assert thread is not None  # as in every cup
     bore, outer, trap = stack.cup_bore / 2, stack.shaft_diameter / 2, thread.trap
@@ -94,7 +88,7 @@ def _cross_holes(p: AlignmentLinkage, azimuth: float) -> list[cq.Solid]:
 
 
 def _slots(p: AlignmentLinkage, trap: Trap, azimuth: float) -> list[cq.Solid]:
-    """That the nut is dropped into before the hub comes, and a narrower one behind it for the screw's end."""
+    """Return the slot of a nut, inserted before the hub, and a narrower one behind it for the screw's end."""
     stack, outer, top = p.stack, p.stack.shaft_diameter / 2 - BEFORE_NUT, p.stack.spigot_top + 1.0
     nut, end = trap.across / 2, p.cross_hole / 2
     cuts = [

@@ -1,11 +1,9 @@
-"""Sleeve of the shaft that the bearing of a tilted axis runs on: turned, since a bearing wants a round journal.
+"""Sleeve of the shaft in the bearing of a tilted axis: turned, since a bearing needs a round journal.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. It slides over the spigot when the ring is on,
-down to a retaining ring, is bonded there, and the hub above keeps it down: no play and no way out. The wires of the
-ring's rotor pass in a channel along it, inside the bearing, under the way out that the hub leaves them.
+Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. It slides over the spigot after the ring, down to
+a retaining ring, is bonded there, and the hub above keeps it down. The wires of the ring's rotor pass in a channel
+along it, inside the bearing, below the channel of the hub.
 """
-
-from __future__ import annotations
 
 import math
 from functools import partial
@@ -23,7 +21,7 @@ from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
 from scanwright.cad.solids import building
 
 SLIDES = 0.02  # in the inner ring: the lower end of g6
-BOND = 0.03  # on the shaft, on the diameter: what a retaining compound fills
+BOND = 0.03  # on the shaft, on the diameter: filled by retaining compound
 UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
 LEAST_HALF_WIDTH, BESIDE_LEADS = 5.0, 0.4  # of the channel, and on either side of the leads in it
 COMPOUND = "retaining compound for metal, medium strength"
@@ -31,14 +29,14 @@ RETAINING = "groove of the shaft, under the bearing's sleeve"
 
 
 def sleeve_spec(place: Placement) -> PartSpec | None:
-    """The sleeve of one scanner; None if no bearing of a cage carries its axis."""
+    """Return the sleeve of one scanner; None if no bearing of a cage carries its axis."""
     stack = place.drive.of(DirectStack)
     if stack is None or stack.bearing is None:
         return None
     words = (
         f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
-        "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's way "
-        "out for the leads; lay the rotor's leads into the channel. Let it set."
+        "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's "
+        "channel for the leads; lay the rotor's leads into it. Let the compound set."
     )
     seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
     bore = ToleratedDiameter(stack.shaft_diameter + BOND, True, "±0.01", "bonded to the shaft")
@@ -49,27 +47,18 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         step=Step("Sleeve of the bearing", words, "the sleeve does not move by hand"),
         process="turned",
         material=TURNED_FROM,
-        why_metal=f"{stack.bearing.name} wants a round seat to g6",
+        why_metal=f"{stack.bearing.name} needs a round seat to g6",
         sheet=OnSheet((seat, bore), ("Bore and outside in one setting: runout 0.01.",)),
         shaped_by=("bearing.bore_mm", "bearing.width_mm", "slip_ring.bore_mm"),
         rows=(
             Row("consumable", "retaining ring", f"retaining ring DIN 471 - {stack.retaining_ring}", RETAINING),
-            Row(
-                "consumable",
-                "retaining compound",
-                COMPOUND,
-                "sleeve on the shaft",
-            ),
+            Row("consumable", "retaining compound", COMPOUND, "sleeve on the shaft"),
         ),
     )
 
 
 def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
-    """Make the sleeve.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the sleeve."""
     assert stack.bearing is not None
     low, high = stack.hub_bottom, stack.shoulder - UNDER_HUB
     assert high > stack.bearing_top > stack.shoulder - BEARING_STEP - 1e-9

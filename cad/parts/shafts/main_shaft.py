@@ -1,11 +1,9 @@
-"""Main shaft of the belt layout: a tube in two bearings, with the spigot that the linkage sits on. One turned part.
+"""Main shaft of the belt layout: a tube in two bearings, with the spigot of the linkage. One turned part.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. The spigot is the one of `servo_shaft`, its flat
-at +y. A collar lies on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave
-through two windows below the web under the spigot.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. The spigot is that of `servo_shaft`, its flat at
++y. A collar rests on the upper bearing and carries the pulley. The capsule's leads come up the bore and leave through
+two windows below the web under the spigot.
 """
-
-from __future__ import annotations
 
 import math
 from functools import partial
@@ -26,16 +24,16 @@ UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
 WEB = 4.0  # between the bore and the spigot
 WINDOW = 8.0  # diameter
 LINKAGE_WORDS = (
-    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one "
-    f"way only. {screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the "
-    "shaft in its loose pulley, until the groove of the hub stands over the groove in the edge of the tower's "
-    "top, and tighten the pulley's two grub screws. Both pulleys have the same number of teeth and turn the "
-    "same way, so from now on the servo's angle is that of the axis."
+    "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only. "
+    f"{screws(MAIN_SHAFT)} Now set the belt: with the servo still at its centre turn the linkage, and the shaft in its "
+    "loose pulley, until the groove of the hub is over the groove in the edge of the tower's top, and tighten the "
+    "pulley's two grub screws. Both pulleys have the same number of teeth and turn in the same direction, so the "
+    "servo's angle is that of the axis."
 )
 
 
 def main_shaft_spec(place: Placement) -> PartSpec | None:
-    """The shaft of one scanner; None if it has another one."""
+    """Return the shaft of one scanner; None without a belt."""
     scanner, stack = place.scanner, place.drive.of(BeltStack)
     if stack is None:
         return None
@@ -45,13 +43,17 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
         name=MAIN_SHAFT,
         turns=True,
         make=partial(main_shaft, stack),
-        step=Step("Shaft into the tower", words, "the shaft turns by a light finger and does not tilt"),
+        step=Step("Shaft into the tower", words, "the shaft turns with one finger and does not tilt"),
         process="turned",
         material=TURNED_FROM,
-        why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm want its seats to f7 (-0.02 to -0.041)",
+        why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm need its seats to f7 (-0.02 to -0.041)",
         sheet=OnSheet(
             (seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
-            (*cross_words(stack), _ring_words()),
+            (
+                *cross_words(stack),
+                f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads "
+                "pass.",
+            ),
         ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft, and the belt set", LINKAGE_WORDS, SEATED)},
@@ -59,11 +61,7 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
 
 
 def main_shaft(stack: BeltStack) -> cq.Solid:
-    """Make the shaft.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the shaft."""
     radius, top = stack.shaft_diameter / 2, stack.hub_bottom - UNDER_HUB
     with building(MAIN_SHAFT, "body", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         body: cq.Shape = solids.upright(stack.seat_diameter / 2, stack.shaft_bottom, top)
@@ -80,8 +78,3 @@ def main_shaft(stack: BeltStack) -> cq.Solid:
         for azimuth in RING_SCREWS_DEG:
             cuts.append(solids.radial(RING_SCREW.core / 2, math.radians(azimuth), stack.ring_screws))
         return checked(body.cut(*cuts).clean())
-
-
-def _ring_words() -> str:
-    """What the sheet says of the threads of `shaft_ring`."""
-    return f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads pass."

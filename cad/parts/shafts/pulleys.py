@@ -1,14 +1,12 @@
 """The two pulleys of the belt layout: one on the shaft, one on the servo's horn, with the same teeth.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. Teeth between two rims; a groove is a half circle
-with flanks that widen to the tips, the belt's own round tooth with the play of a print. Both run with a light press,
-half of the sliding fit: what they stand off their axes turns the angle once per turn (`belt_angle` in `checks.json`).
+with flanks that widen to the tips, the belt's round tooth with the clearance of a print. Both have a light press fit,
+half of the sliding fit: their offset from the axis changes the angle once per turn (`belt_angle` in `checks.json`).
 
-    shaft_pulley  lies on the shaft's collar, held by two grub screws in its boss; the belt is set by turning it
-    drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above; shortens the lever of the belt
+    shaft_pulley  on the shaft's collar, held by two grub screws in its boss; the belt is set by turning it
+    drive_pulley  on the horn, centred by the horn's boss, its screws sunk from above
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import replace
@@ -18,9 +16,10 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import solids
+from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
 from scanwright.cad.layout.belt.plate import pulley_foot_radius
-from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_ROOM, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
 from scanwright.cad.layout.joints import (
     Joint,
     horn_centres,
@@ -30,15 +29,6 @@ from scanwright.cad.layout.joints import (
     round_wall_mm,
     screws,
 )
-from scanwright.cad.layout.names import (
-    BEARING_TOWER,
-    BELT,
-    DRIVE_PLATE,
-    DRIVE_PULLEY,
-    MAIN_SHAFT,
-    SERVO_OUTPUT,
-    SHAFT_PULLEY,
-)
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
 from scanwright.cad.parts.tolerances import OnSheet, no_wider
@@ -46,35 +36,35 @@ from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 
-CHORDS = 4  # of a groove's half circle: within 0.05 mm, which a printer cannot tell
-MOUTH = 0.25  # by which a groove is wider at the tips than below, on each side
-GIVE_MM = 2.0  # of a strand, when the pre-load is felt
-OFF_AXIS = "more play puts the pulley further off its axis than belt_angle of checks.json counts with"
+CHORDS = 4  # of a groove's half circle: within 0.05 mm, below the resolution of a printer
+MOUTH = 0.25  # extra width of a groove at the tips, on each side
+GIVE_MM = 2.0  # movement of a strand in the test of its pre-load
+OFF_AXIS = "more clearance puts the pulley further off its axis than belt_angle of checks.json assumes"
 
 
 def shaft_pulley_spec(place: Placement) -> PartSpec | None:
-    """The pulley on the shaft of one scanner; None without a belt."""
+    """Return the pulley on the shaft of one scanner; None without a belt."""
     stack, printer = place.drive.of(BeltStack), place.scanner.printer
     if stack is None:
         return None
     words = (
-        "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and lay the belt "
+        "Push the pulley over the spigot down to the collar of the shaft, its boss upwards, and put the belt "
         f"around it: {stack.belt.name} of {stack.belt_teeth} teeth ({stack.belt_teeth * stack.belt.pitch_mm:g} mm). "
-        f"{screws(MAIN_SHAFT)} Leave these two loose."
+        f"{screws(names.MAIN_SHAFT)} Leave these two loose."
     )
     fit, grub = no_wider(stack.tube_diameter, printer.fit_clearance_mm, OFF_AXIS), _grub_thread(printer)
     azimuths = (math.radians(azimuth) for azimuth in GRUBS_DEG)
     return PartSpec(
-        name=SHAFT_PULLEY,
+        name=names.SHAFT_PULLEY,
         turns=True,
         make=partial(shaft_pulley, stack, printer),
-        step=Step("Pulley and belt on the shaft", words, "the belt lies between both rims", (BELT,)),
+        step=Step("Pulley and belt on the shaft", words, "the belt is between both rims", (names.BELT,)),
         sheet=OnSheet((fit,), (_teeth_words(stack),)),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
         joints=(
             Joint(
-                SHAFT_PULLEY,
-                MAIN_SHAFT,
+                names.SHAFT_PULLEY,
+                names.MAIN_SHAFT,
                 "grub",
                 GRUB,
                 inward_axes(azimuths, stack.boss_radius, stack.pulley_top - BOSS / 2),
@@ -87,35 +77,36 @@ def shaft_pulley_spec(place: Placement) -> PartSpec | None:
 
 
 def _bore(stack: BeltStack, printer: Printer) -> float:
-    """Radius of the pulley on the shaft: a light press."""
+    """Return the bore radius of the pulley on the shaft: a light press fit."""
     return stack.tube_diameter / 2 + printer.fit_clearance_mm / 4
 
 
 def _grub_thread(printer: Printer) -> Thread:
-    return thread_in_part(GRUB, printer, room_for_nut=False)
+    return thread_in_part(GRUB, printer, nut_fits=False)
 
 
 def drive_pulley_spec(place: Placement) -> PartSpec | None:
-    """The pulley on the horn of one scanner; None without a belt."""
+    """Return the pulley on the horn of one scanner; None without a belt."""
     scanner, stack = place.scanner, place.drive.of(BeltStack)
     if stack is None:
         return None
-    horn = horn_joint(scanner.servo, DRIVE_PULLEY, SERVO_OUTPUT, stack.pulley_seat, stack.pulley_seat - stack.horn)
+    seat, grip = stack.pulley_seat, stack.pulley_seat - stack.horn
+    horn = horn_joint(scanner.servo, names.DRIVE_PULLEY, names.SERVO_OUTPUT, seat, grip)
     push = press_newton(stack, PRELOAD_N, GIVE_MM)
     words = (
-        f"The boss of the horn centres the pulley. {screws(SERVO_OUTPUT)} Hang the servo between the arms of the "
-        "tower, lay the belt around both pulleys, and put in the screws of the slots: "
-        f"{screws(BEARING_TOWER, DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the middle of a "
-        f"strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
-        f"{stack.centre:g} mm apart; the slots give {TRAVEL:g} mm to either side."
+        f"The boss of the horn centres the pulley. {screws(names.SERVO_OUTPUT)} Hang the servo between the arms of the "
+        "tower, put the belt around both pulleys, and insert the screws of the slots: "
+        f"{screws(names.BEARING_TOWER, names.DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the "
+        f"middle of a strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
+        f"{stack.centre:g} mm apart; the slots allow {TRAVEL:g} mm to either side."
     )
     pocket = stack.servo.horn_boss_diameter_mm
     fits = (no_wider(pocket, scanner.printer.fit_clearance_mm, OFF_AXIS),) if pocket > 0 else ()
     return PartSpec(
-        name=DRIVE_PULLEY,
+        name=names.DRIVE_PULLEY,
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer),
-        step=Step("Drive pulley, and the servo beside the shaft", words, "the belt runs a turn in its rims"),
+        step=Step("Drive pulley, and the servo next to the shaft", words, "the belt runs a turn in its rims"),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack),
@@ -124,16 +115,12 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
 
 
 def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the pulley on the shaft.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the pulley on the shaft."""
     bore, grub = _bore(stack, printer), _grub_thread(printer)
-    with building(SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
+    with building(names.SHAFT_PULLEY, "teeth and boss", "teeth", stack.teeth) as checked:
         boss = solids.upright(stack.boss_radius, stack.teeth_top - 0.5, stack.pulley_top)
         body = checked(_toothed(stack, None, boss))
-    with building(SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter) as checked:
+    with building(names.SHAFT_PULLEY, "bore and grub screws", "shaft diameter", stack.tube_diameter) as checked:
         cuts = [solids.upright(bore, stack.teeth_low - 1.0, stack.pulley_top + 1.0)]
         for azimuth in GRUBS_DEG:
             cuts.append(solids.radial(grub.hole / 2, math.radians(azimuth), stack.pulley_top - BOSS / 2))
@@ -141,34 +128,30 @@ def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
 
 
 def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the pulley on the horn.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the pulley on the horn."""
     servo, horn, top = stack.servo, stack.horn, stack.teeth_top + 1.0
     screw, boss = SCREWS[servo.horn_screw], servo.horn_boss_diameter_mm / 2
-    with building(DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
+    with building(names.DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
         foot = solids.upright(pulley_foot_radius(servo), horn, stack.teeth_low + 0.5)
         body = checked(_toothed(stack, foot, None))
-    with building(DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", servo.horn_circle_mm) as checked:
+    with building(names.DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", servo.horn_circle_mm) as checked:
         cuts = []
         for x, y in horn_centres(servo).tolist():
             cuts.append(solids.upright(passing_hole(screw, printer) / 2, horn - 1.0, top, x, y))
-            cuts.append(solids.upright(screw.head_room, stack.pulley_seat, top, x, y))
+            cuts.append(solids.upright(screw.driver_radius, stack.pulley_seat, top, x, y))
         if boss > 0:
             radius = boss + printer.fit_clearance_mm / 4
-            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + HORN_BOSS_ROOM))
+            cuts.append(solids.upright(radius, horn - 1.0, horn + servo.horn_boss_height_mm + HORN_BOSS_GAP))
         made = checked(body.cut(*cuts).clean())
     return made.moved(solids.location(stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0]))
 
 
 def drive_envelope(stack: BeltStack) -> cq.Solid:
-    """What the pulley on the horn fills while it turns about its own axis."""
+    """Return the space that the pulley on the horn fills while it turns about its own axis."""
     rim, tip = stack.rim_radius, stack.tip_radius
     low, high = stack.teeth_low, stack.teeth_top
     foot = solids.upright(pulley_foot_radius(stack.servo), stack.horn, low + 0.5)
-    with building(DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
+    with building(names.DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
         envelope = foot.fuse(
             solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)
         )
@@ -177,7 +160,7 @@ def drive_envelope(stack: BeltStack) -> cq.Solid:
 
 
 def _teeth_words(stack: BeltStack) -> str:
-    """What a pulley's drawing says of its teeth."""
+    """Return the note of a pulley's drawing on its teeth."""
     belt = stack.belt
     return (
         f"{stack.teeth} teeth for {belt.name}, pitch {belt.pitch_mm:g}: pitch diameter {2 * stack.pitch_radius:.2f}, "
@@ -187,9 +170,9 @@ def _teeth_words(stack: BeltStack) -> str:
 
 
 def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -> cq.Shape:
-    """Teeth between two rims about the axis, each rim in one with what is on its far side.
+    """Return teeth between two rims about the axis, each rim joined with the solid on its far side.
 
-    Rims and teeth touch and do not overlap: the kernel then glues them in half the time.
+    Rims and teeth touch without overlap: the kernel then glues them in half the time.
     """
     low, high = stack.teeth_low + RIM, stack.teeth_top - RIM
     teeth = cq.Solid.extrudeLinear(_outline(stack), [], cq.Vector(0, 0, high - low))
@@ -200,7 +183,7 @@ def _toothed(stack: BeltStack, below: cq.Solid | None, above: cq.Solid | None) -
 
 
 def _outline(stack: BeltStack) -> cq.Wire:
-    """Outline of the teeth at z = 0: for each a flank, the groove's half circle in chords, a flank, the tip."""
+    """Return the outline of the teeth at z = 0: a flank, the groove's half circle in chords, a flank, the tip."""
     groove, tip = stack.belt.groove_radius_mm, stack.tip_radius
     centre = tip - stack.belt.tooth_height_mm + groove
     half = (groove + MOUTH) / tip  # rad, of the mouth

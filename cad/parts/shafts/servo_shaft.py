@@ -1,13 +1,10 @@
 """Servo shaft: from the servo's horn through the slip ring to the linkage's hub. One turned part.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Horn flange with the horn's holes and a pocket
-for its boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y. A flange at both ends
-could not pass the ring. Where a bearing holds the shaft, that is longer and has a waist above the collar: horn and
-bearing are never quite in line, and a stiff shaft would turn the error into a moment on the horn. Length and shape do
-not depend on the scan plane: one shaft serves every linkage.
+for its boss, a collar around the pocket, the shaft; the upper end is a spigot with a flat at +y, since a flange could
+not pass the ring. If a bearing holds the shaft, it has a waist above the collar: horn and bearing are never quite in
+line, and a stiff shaft would turn the error into a moment on the horn. One shaft fits every linkage.
 """
-
-from __future__ import annotations
 
 from functools import partial
 
@@ -33,13 +30,13 @@ OF_RING = tuple(
     f"slip_ring.{field}" for field in ("bore_mm", "length_mm", "rotor", "lead_diameter_mm", "lead_bend_radius_mm")
 )
 LINKAGE_ON_SHAFT = (
-    "Lower the hub onto the upper end of the shaft until it sits on the end; the flat of the shaft fits one way only, "
-    f"and the groove of the hub then stands above the groove of the flange. {screws(SERVO_SHAFT)}"
+    "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only, and the groove of "
+    f"the hub is then above the groove of the flange. {screws(SERVO_SHAFT)}"
 )
 
 
 def servo_shaft_spec(place: Placement) -> PartSpec | None:
-    """The shaft of one scanner; None if it has another one."""
+    """Return the shaft of one scanner; None if it has another one."""
     scanner, stack = place.scanner, place.drive.of(DirectStack)
     if stack is None or stack.cup_bore > 0:
         return None
@@ -51,7 +48,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
         f"{screws(SERVO_HORN)}"
     )
-    check = "the index groove stands over the middle of the +Y face"
+    check = "the index groove is over the middle of the +Y face"
     rows: tuple[Row, ...] = ()
     if stack.bearing is not None:
         words += (
@@ -77,16 +74,12 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
 
 
 def on_horn(servo: Servo, stack: DirectStack, part: str) -> Joint:
-    """What is on the axis of the servo on its horn."""
+    """Return the joint of a part on the servo's horn, on the axis."""
     return horn_joint(servo, part, SERVO_HORN, stack.horn + stack.horn_grip, stack.horn_grip)
 
 
 def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
-    """Make the shaft.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
+    """Make the shaft."""
     horn, flange, radius = stack.horn, stack.horn + stack.flange_thickness, stack.shaft_diameter / 2
     with building(SERVO_SHAFT, "body", "shaft diameter", f"{stack.shaft_diameter:g} mm") as checked:
         body: cq.Shape = solids.upright(stack.flange_radius, horn, flange)
@@ -107,13 +100,13 @@ def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
 
 
 def cross_holes(stack: Hub) -> list[cq.Solid]:
-    """Tapped holes of the spigot, drilled through, at all azimuths that a linkage may ask for."""
+    """Return tapped holes through the spigot at all azimuths that a linkage may need."""
     core, reach = CROSS_SCREW.core / 2, stack.shaft_diameter
     return [solids.radial(core, azimuth, stack.cross, -reach, 2 * reach) for azimuth in CROSS_AT[:2]]
 
 
 def cross_words(stack: Hub) -> tuple[str, ...]:
-    """What a shaft's sheet says of them."""
+    """Return the note of a shaft's sheet on its cross holes."""
     down = stack.spigot_top - stack.cross
     return (
         f"2 x {CROSS_SCREW.name} through the spigot, square to each other at 45 deg to the flat, {down:g} below its "
@@ -122,7 +115,7 @@ def cross_words(stack: Hub) -> tuple[str, ...]:
 
 
 def _waist(stack: DirectStack) -> cq.Solid:
-    """What is turned off: its ends slope at 45 deg, an edge would crack."""
+    """Return the cut of the waist; its ends slope at 45 deg, since an edge would crack."""
     radius, waist = stack.shaft_diameter / 2, stack.waist_diameter / 2
     slope = radius - waist
     low = stack.horn + stack.collar_height
@@ -132,7 +125,7 @@ def _waist(stack: DirectStack) -> cq.Solid:
 
 
 def _groove(stack: DirectStack) -> cq.Solid:
-    """Groove of the retaining ring under the bearing's sleeve."""
+    """Return the groove of the retaining ring under the bearing's sleeve."""
     bottom, width = GROOVES[stack.retaining_ring]
     high, outer = stack.hub_bottom, stack.shaft_diameter
     return solids.lathe(
@@ -141,14 +134,14 @@ def _groove(stack: DirectStack) -> cq.Solid:
 
 
 def _waist_words(stack: DirectStack) -> tuple[str, ...]:
-    """What the sheet says of waist and groove."""
+    """Return the notes of the sheet on waist and groove."""
     if stack.bearing is None:
         return ()
     bottom, width = GROOVES[stack.retaining_ring]
     in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_diameter:.2f}"
     return (
-        f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}, nothing else bends enough "
-        "and yields late enough. No other metal.",
+        f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}. No other metal is flexible "
+        "and strong enough.",
         f"Groove \u00d8{bottom:g} 0/-0.1, {width:g} +0.14/0 wide, for DIN 471 - {stack.retaining_ring}.",
         "Flange face square to the spigot and spigot true to it, one setting: 0.02.",
     )

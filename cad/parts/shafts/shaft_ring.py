@@ -1,10 +1,8 @@
-"""Ring under the lower bearing of the belt layout: with the collar above it keeps the shaft where it is.
+"""Ring under the lower bearing of the belt layout: with the collar above it fixes the shaft along its axis.
 
-Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that only the inner ring touches, and two
-screws into threads of the shaft, 90 deg apart; they and a driver pass the window of the tower.
+Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A step that touches only the inner ring, and two
+screws into threads of the shaft, 90 deg apart; a driver reaches them through the window of the tower.
 """
-
-from __future__ import annotations
 
 import math
 from functools import partial
@@ -24,7 +22,7 @@ from scanwright.design.catalogue.products import Printer
 
 
 def shaft_ring_spec(place: Placement) -> PartSpec | None:
-    """The ring of one scanner; None without a belt."""
+    """Return the ring of one scanner; None without a belt."""
     stack, printer = place.drive.of(BeltStack), place.scanner.printer
     if stack is None:
         return None
@@ -32,8 +30,8 @@ def shaft_ring_spec(place: Placement) -> PartSpec | None:
     azimuths = (math.radians(azimuth) for azimuth in RING_SCREWS_DEG)
     words = (
         "From below push the ring up the shaft, its step against the lower bearing and its holes over the threads, so "
-        f"that the shaft has no play along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a driver "
-        "pass the round window in the tower: turn the shaft until the holes show."
+        f"that the shaft has no clearance along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a "
+        "driver pass the round window in the tower: turn the shaft until the holes are visible."
     )
     return PartSpec(
         name=SHAFT_RING,
@@ -59,12 +57,8 @@ def _bore(stack: BeltStack, printer: Printer) -> float:
 
 
 def shaft_ring(stack: BeltStack, printer: Printer) -> cq.Solid:
-    """Make the ring.
-
-    Raises:
-        BuildError: a step did not give one valid solid.
-    """
-    hole, head = passing_hole(RING_SCREW, printer) / 2, RING_SCREW.head_room
+    """Make the ring."""
+    hole, head = passing_hole(RING_SCREW, printer) / 2, RING_SCREW.driver_radius
     with building(SHAFT_RING, "ring", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         low, high = stack.collar_low, stack.collar_low + BOSS
         body = solids.upright(stack.boss_radius, low, high).fuse(

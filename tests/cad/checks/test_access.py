@@ -59,6 +59,6 @@ def test_every_screw_of_a_scanner_is_reached_and_a_roof_over_it_is_an_error_with
     monkeypatch.setattr(access, "KEYS_MM", {name: (radius, 2000.0) for name, (radius, _) in access.KEYS_MM.items()})
     failed = access_checks(assembly)
     assert failed and {check.severity for check in failed} == {"error"}
-    assert all("step " in check.message and "in the way" in check.message for check in failed)
+    assert all("step " in check.message and "blocks it" in check.message for check in failed)
     assert sum(check.value for check in failed) <= sum(joint.count for joint in assembly.layout.joints)
     assert np.isfinite([check.value for check in failed]).all()

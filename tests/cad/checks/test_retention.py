@@ -143,5 +143,5 @@ def test_no_profile_of_plastic_gives_a_carrying_screw_bare_threads(profile):
     for size in ("M2.5", "M3", "M4"):
         thread = thread_in_part(SCREWS[size], printer, carries=True)
         assert thread.trap is not None or thread.insert
-    crowded = thread_in_part(SCREWS["M3"], printer, room_for_nut=False, carries=True)
+    crowded = thread_in_part(SCREWS["M3"], printer, nut_fits=False, carries=True)
     assert crowded.insert

@@ -65,7 +65,7 @@ def test_every_row_has_a_price_or_a_stated_estimate_and_the_total_is_their_range
     for row in rows:
         assert 0 <= float(row["low_usd"]) <= float(row["high_usd"])
         if row["kind"] not in ("printed", "total") and row["total_usd"] == "":
-            assert "estimate of 2026" in row["note"] + row["source"], row
+            assert "usual prices in 2026" in row["note"] + row["source"], row
         if row["total_usd"] and row["kind"] != "total":  # none is both verified and of these years
             assert float(row["low_usd"]) < float(row["total_usd"]) < float(row["high_usd"])
     *parts, total = rows

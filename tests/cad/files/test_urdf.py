@@ -131,5 +131,5 @@ def test_fixed_axis_angles_survive_the_gimbal(pitch):
 def test_an_angle_set_that_names_another_place_is_refused(made, tmp_path):
     wrong = made.scanner.angles.model_copy(update={"t_world_rot_mm": (1.0, 2.0, 3.0)})
     with pytest.raises(BuildError, match=r"t_world_rot_mm = \[1.0, 2.0, 3.0\]"):
-        build_parts(scanner_of(wrong, "fdm-0.4", load_catalogue()), tmp_path, lambda *_: None)
+        build_parts(scanner_of(wrong, "fdm-0.4", load_catalogue()), made.result.assembly, tmp_path, lambda *_: None)
     assert list(tmp_path.iterdir()) == []

@@ -86,7 +86,7 @@ def test_the_words_tell_power_circuits_and_wires():
     assert len(re.findall(r"^- .* to .*: ", text, re.M)) > 20 and "Do not build" not in text
     assert text.index("## Caution") < text.index("## Power") < text.index("## Wires")
     unsure = wiring_files(scanner_for(*SCANNERS["no ring"]), "0" * 12)["wiring.md"].decode()
-    assert "## Not known" in unsure and "Slip ring" not in unsure
+    assert "## Unknown" in unsure and "Slip ring" not in unsure
 
 
 @pytest.mark.parametrize("name", ["a tied pin", "a tied pin and no ring"])

@@ -15,7 +15,7 @@ from scanwright.cad.labels.engrave import engrave, groove_of
 from scanwright.cad.labels.flats import flat_at, flats_of
 from scanwright.cad.labels.glyphs import letters, text_width
 from scanwright.cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
-from scanwright.cad.labels.visibility import room_before
+from scanwright.cad.labels.visibility import free_distance
 from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.solids import box, upright
 from scanwright.design.left_out import LeftOut
@@ -125,7 +125,7 @@ def test_labels_can_be_read_on_the_assembled_scanner(made):
 
 def test_no_room_is_measured_before_faces_that_mate(made):
     assembly = made.result.assembly
-    before, R, seat = room_before(assembly), assembly.layout.stack.R(), assembly.layout.linkage.seat
+    before, R, seat = free_distance(assembly), assembly.layout.stack.R(), assembly.layout.linkage.seat
     on_seat = flat_at(assembly.made["alignment_linkage"], R @ [0.0, 0.0, seat], R[:, 2])
     deck = -np.array(assembly.layout.deck.normal)
     foot = flat_at(assembly.made["base_mount"], np.array(assembly.layout.deck.centre) + 1e-9 * deck, deck)

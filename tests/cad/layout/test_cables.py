@@ -9,7 +9,7 @@ from scanners import avoided
 from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
 from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
 from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.room import room_of
+from scanwright.cad.layout.cables.rotor_space import rotor_space_of
 from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.design.angles import Angles, AngleSet
@@ -85,7 +85,7 @@ def test_every_lead_leaves_the_ring_and_meets_its_cable_in_line(setting):
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_a_lead_turns_above_all_that_stands_still(setting):
     layout = layout_for(setting)
-    room = room_of(layout, avoided(parts_of(layout), turns=True))
+    room = rotor_space_of(layout, avoided(parts_of(layout), turns=True))
     for lead in layout.leads:
         points = lead.path.points(1.0)
         outside = points[np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + lead.diameter]

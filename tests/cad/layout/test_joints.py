@@ -21,7 +21,7 @@ from scanwright.cad.geometry.holes import Piercing, rounds_of
 from scanwright.cad.layout.joints import DECK_MM, shank_mm
 from scanwright.cad.layout.rotor.linkage import CROSS_WASHER_THICK
 from scanwright.cad.parts.all_parts import laid_out
-from scanwright.cad.screws import SCREWS, thread_hole, trap_of
+from scanwright.cad.screws import SCREWS, thread_in_part, trap_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.deck_holes import Rectangle
 from scanwright.design.scanner import Modules
@@ -93,8 +93,7 @@ def screw_for(hole, printer):
 
 def holding_holes(screw, printer):
     """Diameters of all holes in parts that a screw may hold on to."""
-    trap = trap_of(screw, printer, carries=True)
-    return (screw.core, thread_hole(screw, printer)) if trap is None else (screw.core, trap.hole)
+    return screw.core, thread_in_part(screw, printer, carries=True).hole
 
 
 def is_trap(hole, screw, printer):

@@ -30,7 +30,7 @@ STEPS = {
     "placement_of",
     "plate_of",
     "plate_ties_of",
-    "tower_of",
+    "tower_foot_of",
 }
 MAY_CALL = {  # the lists of parts are handed in here; which beams a drive hides in any case is asked before all else
     ("parts/all_parts.py", "layout_of"),
@@ -66,7 +66,7 @@ def test_every_step_of_a_placement_is_worked_out_once(name, monkeypatch):
     placement_of(SCANNERS[name])
     assert {step for step, count in calls.items() if count > 1} == set()
     assert {"envelope_of", "deck_of", "linkage_body_of", "drive_of", "hub_tie_of"} <= calls.keys()
-    assert ("cage_of" in calls, "tower_of" in calls) == (name == "bearing", name == "belt")
+    assert ("cage_of" in calls, "tower_foot_of" in calls) == (name == "bearing", name == "belt")
 
 
 def test_nobody_above_the_layout_works_a_step_out_again():

@@ -27,7 +27,7 @@ from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
 from scanwright.cad.layout.belt.sizing import QUARTERS
 from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
-from scanwright.cad.layout.belt.tower import tower_of
+from scanwright.cad.layout.belt.tower import tower_foot_of
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import ROTOR_LEAD
@@ -213,7 +213,8 @@ def test_index_grooves_of_hub_and_tower_lie_at_plus_y_whatever_the_servos_side(m
         section(made.meshes["bearing_tower"], stack.tower_top - 1.0),
     ]
     for quarter in set(QUARTERS) - {stack.quarter}:
-        mesh = mesh_of(bearing_tower(tower_of(made.scanner, replace(stack, quarter=quarter))))
+        printer, turned = made.scanner.printer, replace(stack, quarter=quarter)
+        mesh = mesh_of(bearing_tower(turned, printer, tower_foot_of(printer, turned)))
         outlines.append(section(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False), stack.tower_top - 1.0))
     assert len(outlines) == 4
     for outline in outlines:
@@ -325,7 +326,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         "280 mm" in text
         and "2048 of 4096" in text
         and "servo-setup PORT --centre" in text
-        and "groove of the hub stands over the groove" in text
+        and "groove of the hub is over the groove" in text
     )
     masses = dict.fromkeys(assembly.made, 1.0)
     rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, "0" * 12)}
@@ -341,7 +342,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     )
     assert "Close a cable tie around shaft and bundles" in text and "behind the plate" not in text
     assert len(set(re.findall(r"by the shaft's window at (\d+) deg", text))) == 2
-    assert "one of its windows" not in text and 'by the one that the step "Leads between lidar and ring" names' in text
+    assert "one of its windows" not in text and 'through the one that the step "Leads between lidar and ring" names' in text
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
@@ -511,7 +512,8 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
         "Slots in the foot for nuts M3: 5.7 wide, from its corners.",
     } <= said
     wide = replace(stack, flange=stack.flange.model_copy(update={"diameter_mm": 58.0}))
-    assert tower_of(scanner, wide).foot.trap is None and tower_of(scanner, stack).foot.trap is not None
+    printer = scanner.printer
+    assert tower_foot_of(printer, wide).trap is None and tower_foot_of(printer, stack).trap is not None
 
 
 def test_the_rails_of_the_mount_leave_the_least_wall_around_the_heads_of_their_screws(made):

@@ -55,7 +55,7 @@ def test_the_tripod_foot_is_made_with_and_left_out_without(on_tripod, parts_of):
     assert "tripod_foot" in on_tripod.made and "tripod_foot" not in without.parts
     assert "tripod_foot" not in [left.what for left in on_tripod.layout.left_out]
     (left,) = [left for left in without.layout.left_out if left.what == "tripod_foot"]
-    assert left.why == "the task does not ask for it by modules.tripod_foot" and left.saved == 1
+    assert left.why == "the task does not require it (modules.tripod_foot)" and left.saved == 1
     assert on_tripod.made["base_mount"].Volume() == pytest.approx(without.made["base_mount"].Volume())
 
 
@@ -123,8 +123,8 @@ def test_a_part_that_no_bed_holds_is_refused_with_its_size_and_what_would_serve(
     with pytest.raises(BuildError) as refused:
         make_parts(small, foot)
     assert str(refused.value) == (
-        "tripod_foot: 100 x 100 x 8 mm as it is printed: the bed of fdm-0.4 is 99 x 200 x 99 mm (bed_mm); a printer "
-        "with bed_mm = [100.0, 100.0, 8.0] would hold it, or a smaller pattern of holes in [deck], or other angles"
+        "tripod_foot: 100 x 100 x 8 mm in its print pose: the bed of fdm-0.4 is 99 x 200 x 99 mm (bed_mm); use a printer "
+        "with bed_mm = [100.0, 100.0, 8.0], or a smaller pattern of holes in [deck], or other angles"
     )
     assert "tripod_foot" in make_parts(on_bed_of(scanner, (100.0, 100.0, 8.0)), foot).made
 

@@ -14,7 +14,7 @@ from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.labels.fit_coupon import fit_coupon
-from scanwright.cad.layout.direct.cage import has_room
+from scanwright.cad.layout.direct.cage import nut_fits
 from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
 from scanwright.cad.screws import SCREWS, thread_in_part, trap_of
@@ -79,12 +79,12 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
     assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their pockets" in text
     assert without_traps(PRINTER, joints) == []
-    core = thread_in_part(M3, PRINTER, room_for_nut=False)
+    core = thread_in_part(M3, PRINTER, nut_fits=False)
     plain = [replace(cage, fixing="thread", thread=core)]
     assert [finding.subject for finding in without_traps(PRINTER, plain)] == [cage.onto]
     stack = assembly.layout.stack
-    assert has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 15.0, 1.2)
-    assert not has_room(trap_of(M3, PRINTER), stack, stack.ring_bottom - 7.0, 1.2)  # the ring comes down to the nut
+    assert nut_fits(trap_of(M3, PRINTER), stack, stack.ring_bottom - 15.0, 1.2)
+    assert not nut_fits(trap_of(M3, PRINTER), stack, stack.ring_bottom - 7.0, 1.2)  # the ring comes down to the nut
 
 
 def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):

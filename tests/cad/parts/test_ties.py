@@ -96,8 +96,8 @@ def test_a_tie_that_went_in_under_the_bar_is_closed_and_no_other_asked_for(tied)
     words = steps[ROTOR_LEADS].words
     waits = COUNTERWEIGHT in steps and "First lay a cable tie" in steps[COUNTERWEIGHT].words
     assert waits == tied.layout.linkage.hub_tie.grooved
-    assert ("Close the cable tie that waits in the groove" in words) == waits
-    assert ("Pull a cable tie through the two slots of the hub's tongue" in words) != waits
+    assert ("Close the cable tie that is in the groove" in words) == waits
+    assert ("Pull a cable tie through the two slots of the hub's tab" in words) != waits
 
 
 def test_what_has_no_tongue_is_told():

@@ -114,7 +114,7 @@ def test_the_angle_set_is_the_optimum_of_its_task(tilted, made):
     assert angles.task_sha256 == load_task(tilted / "task.toml").sha256() == task.sha256()
     found = find_optimum(task, no_progress).angle_set()
     assert angles == found.model_copy(update={"t_world_rot_mm": angles.t_world_rot_mm, "task_sha256": task.sha256()})
-    assert angles.t_world_rot_mm == made.result.t_world_rot_mm
+    assert angles.t_world_rot_mm == made.result.assembly.layout.deck.t_world_rot
 
 
 def test_the_report_of_a_build_has_a_picture_of_every_place_that_a_warning_names(tilted):

@@ -1,9 +1,7 @@
-"""Where a lead may run on the rotor: clear of all that turns with it, above all that does not, out of the fan.
+"""Space for a lead on the rotor: clear of all that turns, above all that does not, out of the fan. Rotation frame, mm.
 
 Rotation frame at gamma = 0, mm.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable
@@ -18,40 +16,29 @@ from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.catalogue.lidar import Lidar
 
-BEAM = 3.0 + 1.0  # around the scan plane: what the laser sends out is taken as 6 mm wide, and it widens
+BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, and it widens
 
 
 @dataclass(frozen=True, slots=True)
-class RotorRoom:
-    """What a lead on the rotor must stay clear of.
+class RotorSpace:
+    """Space for a lead on the rotor."""
 
-    Attributes:
-        shapes: convex shapes that turn.
-        channels: cut from the neck, from their lower ends upwards, in the laser frame.
-        R_rot_laser: shape (3, 3).
-        bearings_rad: first and last beam; None if a lead may be in the fan.
-        hidden_half_angle: of the cone about -z in which no beam sees anything anyway [rad].
-        floor: height of all that does not turn under the rotor.
-        deck: that the rotor turns over.
-        others: middles of leads that run already, shape (n, 3), and how far to keep from them.
-    """
-
-    shapes: tuple[Shape, ...]
-    channels: tuple[Box, ...]
-    R_rot_laser: Array
-    bearings_rad: tuple[float, float] | None
-    hidden_half_angle: float
-    floor: float
-    deck: Deck
-    others: tuple[Array, float]
+    shapes: tuple[Shape, ...]  # convex shapes that turn
+    channels: tuple[Box, ...]  # cut from the neck, from their lower ends upwards, in the laser frame
+    R_rot_laser: Array  # shape (3, 3)
+    bearings_rad: tuple[float, float] | None  # first and last beam; None if a lead may be in the fan
+    hidden_half_angle: float  # of the cone about -z in which all beams are hidden [rad]
+    floor: float  # height of all that does not turn under the rotor
+    deck: Deck  # that the rotor turns over
+    others: tuple[Array, float]  # middles of earlier leads, shape (n, 3), and the distance from them
 
     def free(self, points: Array, half: float, gap: float) -> Mask:
-        """Whether a ball of radius `half` about each point, shape (n, 3), keeps `gap` to everything, shape (n,)."""
-        room = half + gap
-        clear = (points[:, 2] > self.floor + room) & self._over_deck(points, room)
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
+        apart = half + gap
+        clear = (points[:, 2] > self.floor + apart) & self._over_deck(points, apart)
         for is_clear in (  # the cheapest first, and of what is left only
-            lambda some: ~self._in_fan(some, room),
-            lambda some: clear_of(self.shapes, some, room, lambda inside: self._carved(inside, room)),
+            lambda some: ~self._in_fan(some, apart),
+            lambda some: clear_of(self.shapes, some, apart, lambda inside: self._carved(inside, apart)),
             self.clear_of_others,
         ):
             left = np.flatnonzero(clear)
@@ -59,26 +46,26 @@ class RotorRoom:
         return np.asarray(clear)
 
     def clear_of_others(self, points: Array) -> Mask:
-        """Whether each point, shape (n, 3), is far enough from the leads that run already, shape (n,)."""
+        """Return whether each point, shape (n, 3), is far enough from earlier leads, shape (n,)."""
         return farther(points, *self.others)
 
-    def _carved(self, points: Array, room: float) -> Mask:
-        """Whether points are in the channels that the linkage leaves for the cables and for inserting the lidar."""
+    def _carved(self, points: Array, apart: float) -> Mask:
+        """Return whether points are in the linkage's channels for the cables and for inserting the lidar."""
         at = points @ self.R_rot_laser
         inside = [
-            (at > np.array(low) + room).all(axis=1) & (at[:, :2] < np.array(high[:2]) - room).all(axis=1)
+            (at > np.array(low) + apart).all(axis=1) & (at[:, :2] < np.array(high[:2]) - apart).all(axis=1)
             for low, high in self.channels
         ]
         return np.asarray(np.any(inside, axis=0))
 
-    def _over_deck(self, points: Array, room: float) -> Mask:
-        """Whether points are over the foot of the mount in every position of the turn."""
+    def _over_deck(self, points: Array, apart: float) -> Mask:
+        """Return whether points are over the foot of the mount in every position of the turn."""
         normal = np.array(self.deck.normal)
         lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
-        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + room)
+        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + apart)
 
     def _in_fan(self, points: Array, half: float) -> Mask:
-        """Whether a beam would meet a lead at points: lead and beams turn together."""
+        """Return whether a lead at points would meet a beam; both turn together."""
         if self.bearings_rad is None:
             return np.zeros(len(points), dtype=bool)
         x, y, z = (points @ self.R_rot_laser).T
@@ -91,18 +78,13 @@ class RotorRoom:
         return np.asarray(near & (polar > self.hidden_half_angle))
 
 
-def room_of(place: Placement, avoid: Iterable[Shape]) -> RotorRoom:
-    """The room on the rotor of one scanner, no lead in it yet.
-
-    Args:
-        place: where everything is.
-        avoid: what the parts that turn fill.
-    """
+def rotor_space_of(place: Placement, avoid: Iterable[Shape]) -> RotorSpace:
+    """Return the space on the rotor of one scanner, without leads; `avoid` are shapes of parts that turn."""
     stack, envelope, lidar = place.stack, place.drive.envelope, place.scanner.lidar
     R, sub_plate = stack.R(), stack.sub_plate
     boxes = (envelope.body, envelope.plate(sub_plate), envelope.under(sub_plate), *_stubs(lidar))
     bearings = lidar.bearings_rad()
-    return RotorRoom(
+    return RotorSpace(
         shapes=(*(shape_of(box_corners(box) @ R.T) for box in boxes), *avoid),
         channels=envelope.cables,
         R_rot_laser=R,
@@ -115,7 +97,7 @@ def room_of(place: Placement, avoid: Iterable[Shape]) -> RotorRoom:
 
 
 def _stubs(lidar: Lidar) -> list[Box]:
-    """The straight pieces of its cables, in the laser frame."""
+    """Return the straight pieces of its cables, in the laser frame."""
     half, back, z = lidar.cable_diameter_mm / 2, -lidar.body_mm[0] / 2, lidar.cable_z_mm - lidar.optical_height_mm
     return [
         ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm
