@@ -1,6 +1,5 @@
-// The brush of a page, where one is in hand: a ring under the pointer that is the edge of what a touch paints, and a line
-// that says which mode this is. An element of class sw-brush in the panel has both: what is painted, and how wide, on the
-// far wall of a sphere about the origin. The camera is the one that viser keeps for its own tests in a browser.
+// The active brush: a ring under the pointer, the edge of what a touch paints on the walls, and a line that names the
+// mode. Both come from an element of class sw-brush in the panel; the camera is the one that viser exposes for its tests.
 (() => {
   const CORNERS = 72;
   const NAMESPACE = "http://www.w3.org/2000/svg";
@@ -23,16 +22,14 @@
   const unit = (a) => a.map((x) => x / Math.sqrt(dot(a, a)));
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  // Where the pointer's ray meets the far wall, as a unit vector; null if it passes by.
-  const hit = (eye, along, radius) => {
-    const middle = -dot(eye, along);
-    const square = radius ** 2 - dot(eye, eye) + middle ** 2;
-    if (square < 0) return null;
-    const distance = middle + Math.sqrt(square);
-    return distance > 0 ? unit(eye.map((x, k) => x + distance * along[k])) : null;
+  // The direction to the wall that a ray meets last; null if it misses the room.
+  const hit = (eye, along, low, high) => {
+    const ends = eye.map((x, k) => [(low[k] - x) / along[k], (high[k] - x) / along[k]].sort((a, b) => a - b));
+    const distance = Math.min(...ends.map(([, far]) => far));
+    return Math.max(0, ...ends.map(([near]) => near)) < distance ? unit(eye.map((x, k) => x + distance * along[k])) : null;
   };
 
-  // The edge of the cone about a direction on the sphere, in pixels of the window; null where it is not in view.
+  // The edge of the cone about a direction on the walls, in pixels of the window; null if it is not in view.
   const outline = (brush, rect) => {
     const { camera, nodeRefFromName } = window.__viserMutable;
     const world = nodeRefFromName[""];
@@ -42,9 +39,8 @@
     const across = (2 * (pointer.x - rect.left)) / rect.width - 1;
     const up = 1 - (2 * (pointer.y - rect.top)) / rect.height;
     const seen = local(vector.set(across, up, 0.5).unproject(camera));
-    const radius = Number(brush.dataset.sphereM);
-    const along = unit(seen.map((x, k) => x - eye[k]));
-    const middle = hit(eye, along, radius);
+    const [low, high] = [brush.dataset.low, brush.dataset.high].map((corner) => corner.split(",").map(Number));
+    const middle = hit(eye, seen.map((x, k) => x - eye[k]), low, high);
     if (!middle) return null;
     const half = (Number(brush.dataset.radiusDeg) * Math.PI) / 180;
     const side = unit(cross(middle, Math.abs(middle[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]));
@@ -55,7 +51,8 @@
       const edge = middle.map(
         (x, i) => x * Math.cos(half) + (side[i] * Math.cos(turn) + other[i] * Math.sin(turn)) * Math.sin(half),
       );
-      world.localToWorld(vector.fromArray(edge.map((x) => radius * x))).project(camera);
+      const away = Math.min(...edge.map((x, k) => (x > 0 ? high[k] : low[k]) / (x || -1e-12)));
+      world.localToWorld(vector.fromArray(edge.map((x) => away * x))).project(camera);
       corners.push([rect.left + ((1 + vector.x) / 2) * rect.width, rect.top + ((1 - vector.y) / 2) * rect.height]);
     }
     return corners;

@@ -66,6 +66,7 @@ ADDED_TO_PAGE = (
     "mended_page.js",
     "brush_ring.js",
     "fewer_points.js",
+    "wall_pictures.js",
     "state_banner.js",
     "setting_link.js",
 )

@@ -33,9 +33,9 @@ from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.panel.saving import Saving
 from scanwright.studio.searching import Searching
 from scanwright.studio.state import Canvas, Dab, Setting
-from scanwright.studio.view.coloured_sphere import highest_density
 from scanwright.studio.view.latest_only import LatestOnly
-from scanwright.studio.view.view_3d import LOOKS, View3D
+from scanwright.studio.view.outlines import highest_density
+from scanwright.studio.view.view_3d import View3D
 from scanwright.studio.view.workers import Order, Workers
 
 FIRST_S = 30.0  # at most, for the first colours
@@ -51,7 +51,7 @@ class Studio:
         self.facts: Facts | None = None
         self._message_of: tuple[Canvas, Setting] | None = None
         self._searched: dict[Canvas, Optimum] = {}
-        self.view = View3D(server)
+        self.view = View3D(server, loaded.task)
         names = shipped_tasks()
         own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
         self._tasks = [own, *(name for name in names if name != own)]
@@ -180,11 +180,11 @@ class Studio:
         for field in (c.brush, c.radius):
             field.on_update(shown)
         c.task.on_update(self._guarded(self._change_task))
-        c.painting.on_update(self._guarded(self._arm))
+        c.painting.on_update(lambda _: self.brush.arm(self._guarded))
         c.undo_key.on_trigger(self._guarded(self.undo))
         c.redo_key.on_trigger(self._guarded(self.redo))
         c.brush_key.on_trigger(lambda _: put(c.painting, not c.painting.value))
-        c.look.on_update(self._guarded(self._look))
+        c.density.on_update(self._guarded(self._show_density))
         c.scanner.on_update(self._guarded(self._show_scanner))
         c.scene.on_update(self._guarded(self._change_scene))
         for button, act in (
@@ -292,8 +292,9 @@ class Studio:
             "beams per direction, without parts; grey: none; white edge: what matters; red: hidden by the robot",
         )
         self._show_pads()
+        self.view.enter(self.judge.loaded.task)
         self.view.outline(self.judge.problem)
-        self.view.stand_in(self.judge.loaded.task)
+        self.brush.arm(self._guarded)
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
         count = len(self._canvas.dabs)
         self.controls.painted.content = note_html(f"{count} dabs on the task, {masks} of them hide")
@@ -303,18 +304,9 @@ class Studio:
         """The settings that were kept, by the task as it is now."""
         self.kept.rejudge(self.judge)
 
-    def _arm(self) -> None:
-        """Take the brush in hand, or put it away so that dragging turns the view again."""
-        self.brush.arm(self._guarded)
-        if self.controls.painting.value and not self.view.on_sphere:
-            put(self.controls.look, "sphere")  # which is what the brush paints on
-            self._look()
-
-    def _look(self) -> None:
-        if self.controls.look.value in LOOKS:
-            self.view.look(self.controls.look.value)
-            self.brush.show()
-            self.judging.request(self.setting)
+    def _show_density(self) -> None:
+        self.view.show_density(self.controls.density.value)
+        self.judging.request(self.setting)
 
     # Other processes
 

@@ -11,7 +11,6 @@ from scanwright.design.task.task import LoadedTask
 from scanwright.serving.style import banner_html
 from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
-from scanwright.studio.view.view_3d import LOOKS
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
 UNDO, REDO = "Undo", "Redo"
@@ -55,7 +54,7 @@ class Controls:
             self.scale = gui.add_html("")
         with tabs.add_tab("Paint"):
             self.painting = gui.add_checkbox(
-                "brush", initial_value=False, hint="Click or drag on the sphere; off: turn the view"
+                "brush", initial_value=False, hint="Click or drag on the walls; off: turn the view"
             )
             self.brush = gui.add_dropdown("paints", BRUSHES, initial_value=BRUSHES[0])
             self.radius = gui.add_slider("radius [deg]", 1.0, 60.0, 0.5, 12.0)
@@ -67,7 +66,7 @@ class Controls:
             self.kept = gui.add_dropdown("setting", ("rolling",), initial_value="rolling")
             self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
         with tabs.add_tab("View"):
-            self.look = gui.add_dropdown("density", LOOKS, initial_value=LOOKS[0])
+            self.density = gui.add_checkbox("density", initial_value=True)
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
             self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
