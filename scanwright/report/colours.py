@@ -32,11 +32,7 @@ def ramp(level: Array) -> Colours:
 
 @dataclass(frozen=True, slots=True)
 class Bands:
-    """Bands of beam density whose edges double, so that a step of colour is the same ratio everywhere.
-
-    Attributes:
-        edges: beams, rising; what is below the first one is a band too.
-    """
+    """Bands of beam density whose edges double, so that a step of colour is the same ratio everywhere."""
 
     edges: tuple[int, ...]
 

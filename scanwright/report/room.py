@@ -1,4 +1,4 @@
-"""The room about a scanner, and one scan without its devices: what the pages show besides the scanner."""
+"""The room about a scanner, and one simulated scan."""
 
 from __future__ import annotations
 

@@ -24,7 +24,6 @@ class PaintBrush:
     """The brush of a page: while it is active, a drag on the walls paints; otherwise it turns the view."""
 
     def __init__(self, view: View3D, controls: Controls, dabs: Callable[[], tuple[Dab, ...]], paint: Paint) -> None:
-        """`dabs` returns the present ones; `paint` is called with one more."""
         self._view, self._controls, self._dabs, self._paint = view, controls, dabs, paint
         self._strokes = 0
 
@@ -55,11 +54,7 @@ class PaintBrush:
             guarded(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
 
     def dab(self, ray_origin: Any, ray_direction: Any) -> None:
-        """Paint where a ray from the camera leaves the room.
-
-        Raises:
-            TaskError: there is too much paint.
-        """
+        """Paint where a ray from the camera leaves the room."""
         c = self._controls
         hit = self._view.room.beyond(np.asarray(ray_origin, float), np.asarray(ray_direction, float))
         if hit is None or not c.painting.value or c.brush.value not in BRUSHES:
@@ -72,13 +67,7 @@ class PaintBrush:
             self._paint((*dabs, new), self._strokes)
 
     def show(self) -> None:
-        """Show the mode; `brush_ring.js` draws its ring from this."""
-        c, room = self._controls, self._view.room
-        words = f"Painting: {c.brush.value}, {self.radius_deg:g} deg. B turns the brush off"
-        low, high = (",".join(f"{x:g}" for x in corner) for corner in (room.low, room.high))
-        c.mode.content = (
-            f'<div class="sw-brush" hidden data-brush="{escape(str(c.brush.value))}" data-low="{low}" '
-            f'data-high="{high}" data-radius-deg="{self.radius_deg:g}">{escape(words)}</div>'
-            if c.painting.value
-            else ""
-        )
+        """Show the mode; the cursor of the view follows it."""
+        c = self._controls
+        words = f"Painting: {c.brush.value}, {self.radius_deg:g} deg. B turns the brush off."
+        c.mode.content = f'<div class="sw-brush" role="status">{escape(words)}</div>' if c.painting.value else ""

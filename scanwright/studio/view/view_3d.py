@@ -27,13 +27,7 @@ GHOST = 0.25  # opacity of parts that belong to an earlier setting
 
 
 class View3D:
-    """The scene of one page: the room with its densities, the scanner in it, its field of view, a scan.
-
-    Attributes:
-        room: of the task.
-        walls: of the room.
-        points: number of those that are shown.
-    """
+    """The scene of one page: the room with its densities, the scanner in it, its field of view, a scan."""
 
     room: Room
     walls: DensityRoom
