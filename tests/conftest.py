@@ -172,6 +172,7 @@ CHROMIUM = [
 ]
 NOT_OURS = (  # the page server's own drawing library says so
     "THREE.Clock: This module has been deprecated",
+    "KHR_parallel_shader_compile",  # which drawing without a graphics card does not offer
     "glDrawElementsInstanced: Vertex shader input type does not match",  # of one frame, when it changes tiles
 )
 SLOW_FRAMES = """

@@ -37,6 +37,7 @@ from scanwright.design.progress import no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
+from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.answer import answer, problem_as_built
 from scanwright.report.colours import bands_to
@@ -47,7 +48,7 @@ from scanwright.serving.density_room import density_colours
 from scanwright.studio.panel.facts import Judge
 from scanwright.studio.panel.panel_html import facts_html, kept_html
 from scanwright.studio.state import Setting
-from scanwright.studio.view.coloured_sphere import edges, hexagons, highest_density
+from scanwright.studio.view.outlines import SAMPLES, edges, highest_density
 
 TOLERANCE = 0.1  # of J: what is shown of it is looked at, not how exact it is
 FULL = 25  # one of so many tasks
@@ -151,7 +152,7 @@ def _studio(drawn: RandomTask, _: Path) -> None:
         facts_html(facts)
     kept_html({"A": settled, "B": quick})
     highest = highest_density(judge.problem, setting.angles_rad)
-    density = mean_density_at(judge.problem, setting.angles_rad, hexagons().directions)
+    density = mean_density_at(judge.problem, setting.angles_rad, spiral(SAMPLES))
     density_colours(density, bands_to(highest))
     edges(judge.problem.field)
 

@@ -213,7 +213,7 @@ def _listen(socket: ClientConnection, facts: str, told: SimpleQueue[tuple[float,
         for message in inner["messages"]:
             if message.get("uuid") == facts and "content" in message.get("updates", {}):
                 told.put((now, "facts"))
-            if message.get("name") in ("/room", "/sphere") and "batched_colors" in message.get("updates", {}):
+            if message.get("name") == "/room/5" and "_data" in message.get("updates", {}):
                 told.put((now, "colours"))
             if message["type"] == "MeshMessage":
                 told.put((now, message["name"].split("/")[2]))

@@ -14,7 +14,7 @@ import viser
 from jaxtyping import Int64
 from numpy import ndarray
 
-from scanwright.design.arrays import Array, Float32s, Vector
+from scanwright.design.arrays import Float32s, Vector
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import write_clouds
 from scanwright.firmware_io.scan.live_feed import CloudGrowth
@@ -22,7 +22,7 @@ from scanwright.firmware_io.scan.scan_end import LOST, ScanEnd
 from scanwright.live.ruler import Ruler
 from scanwright.live.saved_page import saved_page
 from scanwright.report.colours import COLOUR_STOPS, Bands, Colours, ramp
-from scanwright.serving.density_room import RoomTiles, density_colours, lit, unlit
+from scanwright.serving.density_room import DensityRoom, lit
 from scanwright.serving.style import banner_html, key_html, note_html
 
 ColourBy = Literal["height", "range", "intensity", "time"]
@@ -52,7 +52,7 @@ class CloudView:
     ) -> None:
         """`name` is that of saved files, `centre_m` the optical centre; `full_scan_s` is None if it is unknown."""
         self._full_scan_s, self._latest_s = full_scan_s, 0.0
-        self._server, self._name, self._centre_m = server, name, centre_m
+        self.server, self._name, self.centre_m = server, name, centre_m
         self._lowest_m = np.inf
         self.chunks: deque[_Chunk] = deque()
         self._number = 0
@@ -74,7 +74,7 @@ class CloudView:
         self.cut = server.gui.add_slider(
             "cut above [m]", 0.0, NO_CUT_M, 0.1, NO_CUT_M, hint="Over the lowest point: takes the ceiling off"
         )
-        self.room: viser.BatchedMeshHandle | None = None
+        self._walls: DensityRoom | None = None
         self._expected = server.gui.add_checkbox("expected density", initial_value=True, visible=False)
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
@@ -85,34 +85,22 @@ class CloudView:
             save = server.gui.add_button(name, hint="Into the downloads of your browser")
             save.on_click(partial(self._save, suffix=suffix))
 
-    def expect(self, tiles: RoomTiles, density: Array, bands: Bands) -> None:
-        """Show tiles of the room in the colour of the beams that a full scan sends there."""
-        self.room = self._server.scene.add_batched_meshes_simple(
-            "/expected",
-            tiles.corners_m,
-            tiles.faces,
-            tiles.wxyz,
-            tiles.middles_m + self._centre_m,
-            batched_colors=unlit(density_colours(density, bands), tiles.normals),
-            opacity=0.6,
-            side="front",
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+    def expect(self, walls: DensityRoom, bands: Bands) -> None:
+        """Offer to show walls in the colours of the beams that a full scan sends there."""
+        self._walls = walls
         self._key.content = key_html(bands, "expected beams per direction in one full scan")
         self._expected.visible = True
 
     def _show_expected(self) -> None:
-        if self.room is not None:
-            self.room.visible = self._expected.value
+        if self._walls is not None:
+            self._walls.frame.visible = self._expected.value
 
     def add(self, growth: CloudGrowth) -> None:
         """Show new points and messages of the scan."""
         if len(growth.points_m):
             values: dict[ColourBy, Float32s] = {
                 "height": growth.points_m[:, 2],
-                "range": np.linalg.norm(growth.points_m - self._centre_m, axis=1).astype(np.float32),
+                "range": np.linalg.norm(growth.points_m - self.centre_m, axis=1).astype(np.float32),
                 "intensity": growth.intensity,
                 "time": growth.time_s,
             }
@@ -173,7 +161,7 @@ class CloudView:
         kept = points[:, 2] <= self._highest_m
         ends = f"{by}: {low:.1f}{UNITS[by]}", f"{high:.1f}{UNITS[by]}"
         level = (values[kept] - low) / max(high - low, 1e-6)
-        return saved_page(f"Scan of {self._name}", points[kept], level, ends, self._centre_m)
+        return saved_page(f"Scan of {self._name}", points[kept], level, ends, self.centre_m)
 
     @property
     def _by(self) -> ColourBy:
@@ -206,7 +194,7 @@ class CloudView:
 
     def _draw(self, chunk: _Chunk) -> None:
         order = self._shown(chunk)
-        chunk.handle = self._server.scene.add_point_cloud(
+        chunk.handle = self.server.scene.add_point_cloud(
             chunk.name,
             chunk.points_m[order],
             self._colours(chunk, order),

@@ -204,13 +204,6 @@ def foxglove_server(
 ) -> Iterator[FoxgloveServer]:
     """Serve channels to Foxglove while the body runs.
 
-    Args:
-        name: what Foxglove shows.
-        channels: topic -> name and definition of its ROS 2 message.
-        port: on this computer; 0 for any that is free.
-        progress: progress callback; gets the address.
-        allow_origins: pages that may look, beside Foxglove's own and programs that are no browser.
-
     Raises:
         TaskError: the port is taken.
     """

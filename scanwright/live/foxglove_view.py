@@ -49,15 +49,6 @@ def view_recording(
 ) -> None:
     """Serve a recording at its own pace to each viewer, until Ctrl-C.
 
-    Args:
-        recording: MCAP recording.
-        angles: angle set of the scanner; `scanner.urdf` and `own_body.npz` are looked for beside it.
-        progress: progress callback; called with the address, in words, first.
-        port: on this computer; 0 for any that is free.
-        rate: how many times as fast as it was recorded.
-        allow_origins: pages that may look, beside Foxglove's own, such as "https://viewer.example.org".
-        announce: called with the address.
-
     Raises:
         RecordingError: the recording is unreadable.
         TaskError: the port is taken.

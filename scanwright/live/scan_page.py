@@ -38,6 +38,7 @@ _LOG = logging.getLogger(__name__)
 ALONE_S = 10.0  # without a visitor; a page that is reloaded returns sooner
 SERVED_S = 60.0  # at most until the page is served, on a computer that has much else to do
 _CLOSED_S = 1.0  # for the page to end if no browser is connected
+EXPECTED_OPACITY = 0.6
 OPENED_S = 15.0  # at most until the browser has it
 
 
@@ -121,21 +122,23 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
 
 
 def _expect(view: CloudView, folder: Path, angles: AngleSet) -> None:
-    """Show the density that a full scan has where the task looks."""
+    """Show the beam density of a full scan on the walls, in the region of interest."""
     from scanwright.report.answer import mounting_rad, problem_as_built
     from scanwright.report.density_sphere import DENSEST
     from scanwright.report.room import room_about
-    from scanwright.serving.density_room import room_tiles
+    from scanwright.serving.density_room import DensityRoom
 
     own_body = folder / "own_body.npz"
     try:
         loaded = load_task(folder / "task.toml")
         problem = problem_as_built(loaded, angles)
-        tiles = room_tiles(room_about(loaded.task))
-        tiles = tiles.where(problem.field.weight_at(tiles.directions) > 0)
+        walls = DensityRoom(view.server.scene, room_about(loaded.task), view.centre_m)
+        weighted = problem.field.weight_at(walls.directions) > 0
         shadow = load_self_occlusion(own_body)[0] if own_body.is_file() else None
-        density = mean_density_at(problem, mounting_rad(angles), tiles.directions, shadow)
+        density = mean_density_at(problem, mounting_rad(angles), walls.directions, shadow)
     except ScanwrightError as error:
         _LOG.warning("live: no expected density: %s", error)
         return
-    view.expect(tiles, density, bands_to(float(np.quantile(density, DENSEST))))
+    bands = bands_to(float(np.quantile(density[weighted], DENSEST)))
+    walls.colour(density, bands, EXPECTED_OPACITY * weighted)
+    view.expect(walls, bands)

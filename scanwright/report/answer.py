@@ -1,4 +1,4 @@
-"""The result of a build from its files: what it sees with its parts, what stays blind, what the parts block."""
+"""The result of a build, computed from its files."""
 
 from __future__ import annotations
 
@@ -22,29 +22,20 @@ from scanwright.design.task.task import LoadedTask
 
 @dataclass(frozen=True, slots=True)
 class BuildAnswer:
-    """What a mount sees, computed from `task.toml`, `angles.json` and `own_body.npz`.
+    """The result of a build, from its files."""
 
-    Attributes:
-        as_built: what it sees with its parts, and the reference mounts.
-        ball_deg: within which a beam counts for a direction.
-        cloud: error, gaps and points to expect.
-        masked_fraction: share of the sphere that the robot hides.
-        lines: of one full scan.
-        beams: of one line.
-    """
-
-    as_built: AsBuilt
-    ball_deg: float
-    cloud: ExpectedCloud
-    masked_fraction: float
-    lines: int
-    beams: int
+    as_built: AsBuilt  # what it sees with its parts, and the reference mounts
+    ball_deg: float  # within which a beam counts for a direction
+    cloud: ExpectedCloud  # error, gaps and points to expect
+    masked_fraction: float  # share of the sphere that the robot hides
+    lines: int  # of one full scan
+    beams: int  # of one line
 
 
 def answer(
     loaded: LoadedTask, angles: AngleSet, shadow: SelfOcclusion | None = None, checks: Sequence[Finding] = ()
 ) -> BuildAnswer:
-    """Judge the angle set on its task, without the beams that `shadow` blocks; `checks` are those of its parts.
+    """Judge an angle set on its task, without the beams that `shadow` blocks; `checks` are of its parts.
 
     Raises:
         BuildError: the shadow is of another number of beams.
@@ -72,11 +63,7 @@ def task_as_built(loaded: LoadedTask, angles: AngleSet) -> LoadedTask:
 
 
 def problem_as_built(loaded: LoadedTask, angles: AngleSet) -> Problem:
-    """Return the same as numbers.
-
-    Raises:
-        TaskError: no direction of the task has a weight.
-    """
+    """Return the numbers of the task as built."""
     return problem_of(task_as_built(loaded, angles))
 
 

@@ -1,7 +1,6 @@
 """The bodies that a check is about, and a small picture of the scanner with them in front.
 
-The named bodies are dark, and show through bodies before them in a lighter shade; all others are pale. The pictures
-are legible in grey. They are cast like beams, in a parallel projection from where the 3D view of the page starts.
+Named bodies are dark, in a lighter shade behind other bodies; all others are pale. The view is that of the page.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from scanwright.design.arrays import Array
-from scanwright.design.scene.parallel_view import in_front, view_of
+from scanwright.design.scene.parallel_view import Shown, in_front, view_of
 from scanwright.design.scene.ray_caster import build_scene
 from scanwright.report.build_files import png_uri
 
@@ -33,30 +32,17 @@ PREFIXES["bearing"] = ("bearing_outer", "bearing_inner")
 
 @dataclass(frozen=True, slots=True)
 class PlacedBody:
-    """One body of the scanner in its place.
+    """One body of the scanner in its place."""
 
-    Attributes:
-        triangles_m: corners of its triangles [m], shape (t, 3, 3).
-        turns: whether it turns with the axis.
-        colour: sRGB, 0 to 1.
-    """
-
-    triangles_m: Array
-    turns: bool
-    colour: tuple[float, ...] = (0.6, 0.6, 0.6)
+    triangles_m: Array  # corners of its triangles [m], shape (t, 3, 3)
+    turns: bool  # whether it turns with the axis
+    colour: tuple[float, ...] = (0.6, 0.6, 0.6)  # sRGB, 0 to 1
 
 
 def bodies_named(
     code: str, subject: str, bodies: Mapping[str, PlacedBody], bought: Mapping[str, str]
 ) -> tuple[str, ...]:
-    """Return the bodies that a check is about, in alphabetical order.
-
-    Args:
-        code: of the check.
-        subject: of the check: bodies or groups of bodies, joined by "and".
-        bodies: of the scanner.
-        bought: lidar, servo, slip ring or bearing by the number of the product, as in the parts list.
-    """
+    """Return the bodies that a check is about, in alphabetical order."""
     names: set[str] = set()
     for word in [LIDAR] if code in BEAM_CODES else subject.split(" and "):
         kind = bought.get(word, word)
@@ -73,22 +59,19 @@ def bodies_named(
 
 def still(bodies: Mapping[str, PlacedBody]) -> str:
     """Return a picture of the scanner in its colours, PNG as a data address: for a page that cannot draw in 3D."""
-    width, height = STILL_PX
-    view = view_of(_corners(bodies), STILL_PX, YAW_RAD, PITCH_RAD, MARGIN)
-    each = [view.shown(build_scene(body.triangles_m)) for body in bodies.values()]
-    first_m, colour = in_front(each).away_m, np.full((width * height, 3), 255.0)
-    for shown, body in zip(each, bodies.values(), strict=True):
+    each = _shown(bodies, STILL_PX)
+    first_m, colour = in_front(list(each.values())).away_m, np.full((STILL_PX[0] * STILL_PX[1], 3), 255.0)
+    for name, shown in each.items():
         front = np.isfinite(first_m) & (shown.away_m <= first_m + 1e-6)
-        colour[front] = 255 * shown.brightness[front, None] * np.array(body.colour)
-    return png_uri(Image.fromarray(colour.reshape(height, width, 3).round().astype(np.uint8)).quantize(COLOURS))
+        colour[front] = 255 * shown.brightness[front, None] * np.array(bodies[name].colour)
+    return _png(colour.reshape(STILL_PX[1], STILL_PX[0], 3))
 
 
 class CheckPictures:
     """Pictures of one scanner, each drawn once."""
 
     def __init__(self, bodies: Mapping[str, PlacedBody]) -> None:
-        view = view_of(_corners(bodies), (SIZE_PX[0] * FINER, SIZE_PX[1] * FINER), YAW_RAD, PITCH_RAD, MARGIN)
-        self._each = {name: view.shown(build_scene(body.triangles_m)) for name, body in bodies.items()}
+        self._each = _shown(bodies, (SIZE_PX[0] * FINER, SIZE_PX[1] * FINER))
         self._all = in_front(list(self._each.values()))
         self._drawn: dict[tuple[str, ...], str] = {}
 
@@ -106,9 +89,14 @@ class CheckPictures:
         strong = shown.brightness[:, None] * NAMED
         colour = np.where(front, strong, np.where(named, THROUGH * strong + (1 - THROUGH) * pale, pale))
         width, height = SIZE_PX
-        fine = colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3))
-        return png_uri(Image.fromarray(fine.round().astype(np.uint8)).quantize(COLOURS))
+        return _png(colour.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3)))
 
 
-def _corners(bodies: Mapping[str, PlacedBody]) -> Array:
-    return np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
+def _shown(bodies: Mapping[str, PlacedBody], size_px: tuple[int, int]) -> dict[str, Shown]:
+    corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
+    view = view_of(corners, size_px, YAW_RAD, PITCH_RAD, MARGIN)
+    return {name: view.shown(build_scene(body.triangles_m)) for name, body in bodies.items()}
+
+
+def _png(colour: Array) -> str:
+    return png_uri(Image.fromarray(colour.round().astype(np.uint8)).quantize(COLOURS))

@@ -32,11 +32,7 @@ def ramp(level: Array) -> Colours:
 
 @dataclass(frozen=True, slots=True)
 class Bands:
-    """Bands of beam density whose edges double, so that a step of colour is the same ratio everywhere.
-
-    Attributes:
-        edges: beams, rising; what is below the first one is a band too.
-    """
+    """Bands of beam density whose edges double, so that a step of colour is the same ratio everywhere."""
 
     edges: tuple[int, ...]
 
@@ -44,10 +40,15 @@ class Bands:
         """Return the band of each density as a share of the colour scale, 0 for the lowest, 1 for the highest."""
         return np.searchsorted(self.edges, density, side="right") / len(self.edges)
 
+    def colours(self, density: ArrayLike) -> Colours:
+        """Return the colour of each density."""
+        shades = ramp(np.linspace(0, 1, len(self.edges) + 1))
+        return shades[np.searchsorted(self.edges, density, side="right")]
+
     def key(self) -> list[tuple[str, str]]:
         """Return the colour of each band and the fewest beams in it, the lowest first."""
         words = [f"<{self.edges[0]}", *map(str, self.edges)]
-        colours = ramp(np.linspace(0, 1, len(words)))
+        colours = self.colours([0, *self.edges])
         return [("#" + bytes(colour).hex(), word) for colour, word in zip(colours, words, strict=True)]
 
 

@@ -39,12 +39,7 @@ Indices = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class SphereMap:
-    """One picture of the sphere.
-
-    Attributes:
-        title: what it shows.
-        picture: PNG as a data address.
-    """
+    """One picture of the sphere."""
 
     title: str
     picture: str
@@ -52,19 +47,12 @@ class SphereMap:
 
 @dataclass(frozen=True, slots=True)
 class DensitySphere:
-    """The pictures of one build.
+    """The pictures of one build."""
 
-    Attributes:
-        maps: at least one.
-        bands: colour scale of the density maps.
-        middle: mean direction of the weight, of length 1; (0, 0, 0) if it is all around.
-        below: share of the weight below the horizon.
-    """
-
-    maps: tuple[SphereMap, ...]
-    bands: Bands
-    middle: tuple[float, ...]
-    below: float
+    maps: tuple[SphereMap, ...]  # at least one
+    bands: Bands  # colour scale of the density maps
+    middle: tuple[float, ...]  # mean direction of the weight, of length 1; (0, 0, 0) if it is all around
+    below: float  # share of the weight below the horizon
 
 
 def density_sphere(

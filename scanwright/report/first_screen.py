@@ -34,14 +34,7 @@ class Card:
 
 @dataclass(frozen=True, slots=True)
 class ToDo:
-    """One thing to do.
-
-    Attributes:
-        title: what to do, in a few words.
-        text: why, or how.
-        files: of the build folder that it needs, or sections of the page, which begin with "#".
-        findings: the values that it is about.
-    """
+    """One thing to do."""
 
     title: str
     text: str
@@ -148,11 +141,12 @@ def _sees(answer: BuildAnswer) -> Card:
 def _gain(built: AsBuilt) -> Card:
     first, *others = (mount.gain for mount in built.mounts)
     unit = "" if first.factor is None else "Beams per direction. "
-    fewer = first.factor is not None and first.factor < 2 - AS_GOOD
-    better = " It has more beams than this scanner." if fewer else ""
+    better = ""
+    if first.factor is not None and first.factor < 2 - AS_GOOD:
+        better = f": {1 / first.factor:.2f} times the beams of this scanner"
     flaws = f" But: {first.flaws}." if first.flaws else ""
     rest = ", ".join(f"{gain.value} {gain.mount.name}" for gain in others)
-    text = f"{unit}Best of {len(built.mounts)} mounts without parts.{better}{flaws} The others: {rest}."
+    text = f"{unit}Best of {len(built.mounts)} mounts without parts{better}.{flaws} The others: {rest}."
     return Card("Compared with usual mounts", f"{first.value} {first.mount.name}", text)
 
 

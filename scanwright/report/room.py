@@ -1,4 +1,4 @@
-"""The room about a scanner, and one scan without its devices: what the pages show besides the scanner."""
+"""The room about a scanner, and one simulated scan."""
 
 from __future__ import annotations
 
@@ -44,6 +44,17 @@ class Room:
             along_m = np.where(directions > 0, self.high, self.low) / directions
         away_m = np.where(directions == 0, np.inf, along_m).min(axis=-1, keepdims=True)
         return np.asarray(away_m * directions)
+
+    def beyond(self, eye_m: Vector, along: Vector) -> Vector | None:
+        """Return the direction from the optical centre to where a ray leaves the room; None if it misses the room."""
+        if not (np.isfinite([eye_m, along]).all() and np.any(along)):
+            return None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            near, far = np.sort([(self.low - eye_m) / along, (self.high - eye_m) / along], axis=0)
+        if not max(0.0, np.nanmax(near)) < np.nanmin(far):
+            return None
+        point = eye_m + np.nanmin(far) * along
+        return np.asarray(point / np.linalg.norm(point))
 
 
 def room_about(task: Task) -> Room:

@@ -64,8 +64,8 @@ ICON = (
 ADDED_TO_PAGE = (
     "mended_page.css",
     "mended_page.js",
-    "brush_ring.js",
     "fewer_points.js",
+    "wall_pictures.js",
     "state_banner.js",
     "setting_link.js",
 )
@@ -75,14 +75,7 @@ Answer = Callable[[ServerConnection, Request], Response | None]
 
 
 class Gate:
-    """The access checks of one page.
-
-    Attributes:
-        title: of the page.
-        token: of its address.
-        port: on 127.0.0.1.
-        refused: number of rejections by reason.
-    """
+    """The access checks of one page."""
 
     def __init__(self, port: int, title: str, *, recall: bool = False) -> None:
         self.title = title

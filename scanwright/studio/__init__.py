@@ -1,1 +1,1 @@
-"""The studio: a page in which a person drags the angles or paints what matters, and sees what it comes to."""
+"""The studio: drag the angles or paint the region of interest, and see the result."""

@@ -1,4 +1,4 @@
-"""The brush: what it paints on the sphere, and how the page shows that it is in hand."""
+"""The brush: what it paints on the walls, and how the page shows that it is active."""
 
 from __future__ import annotations
 
@@ -11,21 +11,19 @@ import viser
 
 from scanwright.studio.panel.controls import BRUSHES, Controls
 from scanwright.studio.state import Dab
-from scanwright.studio.view.coloured_sphere import RADIUS_M, direction_hit
 from scanwright.studio.view.view_3d import View3D
 
 STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
 LEAST_DEG, MOST_DEG = 1.0, 60.0  # radius of a dab; as the slider
 
 Paint = Callable[[tuple[Dab, ...], int], None]
-"""Takes all dabs as they are now, and the number of the stroke that laid the last one."""
+"""Called with all dabs and the number of the last stroke."""
 
 
 class PaintBrush:
-    """The brush of a page: in hand it paints, put away a drag turns the view again."""
+    """The brush of a page: while it is active, a drag on the walls paints; otherwise it turns the view."""
 
     def __init__(self, view: View3D, controls: Controls, dabs: Callable[[], tuple[Dab, ...]], paint: Paint) -> None:
-        """`dabs` tells those that are there, `paint` takes them with one more."""
         self._view, self._controls, self._dabs, self._paint = view, controls, dabs, paint
         self._strokes = 0
 
@@ -35,33 +33,30 @@ class PaintBrush:
         return float(np.clip(self._controls.radius.value, LEAST_DEG, MOST_DEG))
 
     def arm(self, guarded: Callable[[Callable[[], Any]], Callable[[Any], None]]) -> None:
-        """Take it in hand, or put it away; `told` wraps what may be refused."""
-        sphere = self._view.sphere
-        sphere.remove_click_callback()
-        sphere.remove_drag_callback()
+        """Follow the checkbox of the brush; `guarded` shows errors of a handler."""
         self.show()
-        if not self._controls.painting.value:
-            return
+        for wall in (each.handle for each in self._view.walls.walls):
+            wall.remove_click_callback()
+            wall.remove_drag_callback()
+            if self._controls.painting.value:
+                self._arm(wall, guarded)
 
-        @sphere.on_click
+    def _arm(self, wall: viser.ImageHandle, guarded: Callable[[Callable[[], Any]], Callable[[Any], None]]) -> None:
+        @wall.on_click
         async def _(event: Any) -> None:
             self._strokes += 1
             guarded(lambda: self.dab(event.ray_origin, event.ray_direction))(event)
 
-        @sphere.on_drag
+        @wall.on_drag
         async def _(event: viser.SceneNodeDragEvent[Any]) -> None:
             self._strokes += event.phase == "start"
             eye = np.asarray(event.client.camera.position)
             guarded(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
 
     def dab(self, ray_origin: Any, ray_direction: Any) -> None:
-        """Touch the sphere where a ray from the camera meets it.
-
-        Raises:
-            TaskError: there is too much paint.
-        """
+        """Paint where a ray from the camera leaves the room."""
         c = self._controls
-        hit = direction_hit(ray_origin, ray_direction)
+        hit = self._view.room.beyond(np.asarray(ray_origin, float), np.asarray(ray_direction, float))
         if hit is None or not c.painting.value or c.brush.value not in BRUSHES:
             return
         x, y, z = (float(value) for value in hit)
@@ -72,12 +67,7 @@ class PaintBrush:
             self._paint((*dabs, new), self._strokes)
 
     def show(self) -> None:
-        """Tell the page what its ring and its line of mode are to show: `brush_ring.js` reads this."""
+        """Show the mode; the cursor of the view follows it."""
         c = self._controls
-        words = f"Painting: {c.brush.value}, {self.radius_deg:g} deg. B puts the brush away"
-        c.mode.content = (
-            f'<div class="sw-brush" hidden data-brush="{escape(str(c.brush.value))}" data-sphere-m="{RADIUS_M}" '
-            f'data-radius-deg="{self.radius_deg:g}">{escape(words)}</div>'
-            if c.painting.value
-            else ""
-        )
+        words = f"Painting: {c.brush.value}, {self.radius_deg:g} deg. B turns the brush off."
+        c.mode.content = f'<div class="sw-brush" role="status">{escape(words)}</div>' if c.painting.value else ""

@@ -1,4 +1,4 @@
-"""What was done in the studio, step by step, so that it can be undone and done again."""
+"""Undo and redo of the studio."""
 
 from __future__ import annotations
 
@@ -10,20 +10,13 @@ from threading import Lock
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.studio.state import Canvas, Setting
 
-JOINED_S = 1.0  # changes of one thing that follow each other this closely are one step: a slider that is dragged
-MOST_STEPS = 500  # more than a person takes back
+JOINED_S = 1.0  # changes of one control within this time are one step: a slider that is dragged
+MOST_STEPS = 500
 
 
 @dataclass(frozen=True, slots=True)
 class PageState:
-    """All that a person changes on the page, as it stood at one time.
-
-    Attributes:
-        canvas: the task, and the paint on it.
-        setting: the angles.
-        kept: the settings under Compare, by name.
-        fields: what stands in the other controls, by label.
-    """
+    """All that a person changes on the page: canvas, angles, kept settings by name, other controls."""
 
     canvas: Canvas
     setting: Setting
@@ -32,7 +25,7 @@ class PageState:
 
 
 def difference(before: PageState, after: PageState) -> str:
-    """What was done between two moments, in words."""
+    """Return the change between two states, in words."""
     if after.canvas.base is not before.canvas.base:
         return f"task {before.canvas.base.task.name} to {after.canvas.base.task.name}"
     angles = [
@@ -43,21 +36,25 @@ def difference(before: PageState, after: PageState) -> str:
     if len(angles) > 1:
         angles = [f"angles to {', '.join(f'{angle:g}' for angle in after.setting.angles_deg)} deg"]
     kept, were = dict(after.kept), dict(before.kept)
-    fields, stood = dict(after.fields), dict(before.fields)
+    fields, previous = dict(after.fields), dict(before.fields)
     return "; ".join(
         [
             *angles,
             *_painted(len(after.canvas.dabs) - len(before.canvas.dabs), len(after.canvas.dabs)),
             *(f"keep {name}" for name in kept if name not in were),
             *(f"remove {name}" for name in were if name not in kept),
-            *(f"{name} {_text(stood[name])} to {_text(new)}" for name, new in fields.items() if new != stood[name]),
+            *(
+                f"{name} {_text(previous[name])} to {_text(new)}"
+                for name, new in fields.items()
+                if new != previous[name]
+            ),
         ]
     )
 
 
 def _painted(more: int, left: int) -> list[str]:
     if more < 0:
-        return ["clear paint" if left == 0 else f"{-more} dabs less"]
+        return ["clear paint" if left == 0 else f"{-more} dabs fewer"]
     return [f"paint {more} dab{'s' if more > 1 else ''}"] if more else []
 
 
@@ -68,55 +65,48 @@ def _text(value: object) -> str:
 
 
 class History:
-    """Steps that were done, and those that were undone; told of every change, in the order in which they come."""
+    """Steps that were done, and those that were undone."""
 
     def __init__(self, first: PageState, clock_s: Callable[[], float] = time.monotonic) -> None:
-        """`first` is where it begins, `clock_s` a time in seconds that never runs back."""
         self._clock_s = clock_s
         self._done, self._undone = [first], list[PageState]()
         self._of: Hashable = None
         self._noted_s = 0.0
         self._lock = Lock()
 
-    def note(self, moment: PageState, of: Hashable, joined_s: float = JOINED_S) -> None:
-        """Something was changed, and this is how it stands now.
-
-        Args:
-            moment: how it stands.
-            of: what was changed: one step with the last one, if that was of the same and not long ago; None never is.
-            joined_s: how long ago that may be.
-        """
+    def note(self, state: PageState, of: Hashable, joined_s: float = JOINED_S) -> None:
+        """Add a step; it joins the last one if both are `of` the same thing, not None, within `joined_s`."""
         with self._lock:
             now_s = self._clock_s()
             same = of is not None and of == self._of
             joins = same and now_s - self._noted_s <= joined_s and len(self._done) > 1
-            if moment == self._done[-1]:
+            if state == self._done[-1]:
                 return
             self._of, self._noted_s = of, now_s
             if joins:
                 self._done.pop()
             self._undone.clear()
-            if moment != self._done[-1]:  # a slider that is back where it was has done nothing
-                self._done.append(moment)
+            if state != self._done[-1]:  # a slider that is back at its start changes nothing
+                self._done.append(state)
             del self._done[:-MOST_STEPS]
 
     def undo(self) -> PageState | None:
-        """How it stood before the last step; None where there is none."""
+        """Return the state before the last step; None if there is none."""
         return self._step(self._done, self._undone, 1)
 
     def redo(self) -> PageState | None:
-        """How it stood after the step that was undone last; None where none was."""
+        """Return the state after the step that was undone last; None if there is none."""
         return self._step(self._undone, self._done, 0)
 
     @property
     def undoes(self) -> str:
-        """What `undo` would take back, in words; empty where there is nothing."""
+        """The step that `undo` takes back, in words; empty if there is none."""
         with self._lock:
             return difference(*self._done[-2:]) if len(self._done) > 1 else ""
 
     @property
     def redoes(self) -> str:
-        """What `redo` would do again, in words; empty where there is nothing."""
+        """The step that `redo` repeats, in words; empty if there is none."""
         with self._lock:
             return difference(self._done[-1], self._undone[-1]) if self._undone else ""
 
@@ -124,6 +114,6 @@ class History:
         with self._lock:
             if len(steps) <= stays:
                 return None
-            self._of = None  # what follows is a step of its own
+            self._of = None
             to.append(steps.pop())
             return self._done[-1]

@@ -1,8 +1,7 @@
-"""The studio: a person drags the angles or paints what matters, and sees at once what it comes to.
+"""The page of the studio.
 
-Three threads follow the hand, each doing only the newest wish: one judges the setting (J, gaps, the colours of the
-sphere), one takes paint into the task, the workers have parts and scans made in other processes. The search and a build
-run beside them. Everybody who has the page sees and moves the same setting.
+Threads do the newest request only: one judges the setting, one adds paint to the task, the workers make parts and scans
+in other processes. All visitors see and move the same setting.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.panel.saving import Saving
 from scanwright.studio.searching import Searching
 from scanwright.studio.state import Canvas, Dab, Setting
-from scanwright.studio.view.coloured_sphere import highest_density
 from scanwright.studio.view.latest_only import LatestOnly
-from scanwright.studio.view.view_3d import LOOKS, View3D
+from scanwright.studio.view.outlines import highest_density
+from scanwright.studio.view.view_3d import View3D
 from scanwright.studio.view.workers import Order, Workers
 
 FIRST_S = 30.0  # at most, for the first colours
@@ -51,7 +50,7 @@ class Studio:
         self.facts: Facts | None = None
         self._message_of: tuple[Canvas, Setting] | None = None
         self._searched: dict[Canvas, Optimum] = {}
-        self.view = View3D(server)
+        self.view = View3D(server, loaded.task)
         names = shipped_tasks()
         own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
         self._tasks = [own, *(name for name in names if name != own)]
@@ -61,15 +60,17 @@ class Studio:
         self.kept = KeptSettings(self.controls, self.move, self.judge)
         self.saving = Saving(self.controls, saved_to, out)
         self.judging: LatestOnly[Setting] = LatestOnly("judge", self._follow, self._rest)
-        self.painting: LatestOnly[Canvas] = LatestOnly("paint", self._take, self._rejudge)
-        self.workers = Workers(self.view, self._show_making)
+        self.painting: LatestOnly[Canvas] = LatestOnly("paint", self._take, lambda _: self.kept.rejudge(self.judge))
+        self.workers = Workers(
+            self.view, lambda text, bad: setattr(self.controls.making, "content", note_html(text, bad=bad))
+        )
         self.history = History(self._state())
         self.searching = Searching(
             self.controls, self.show, lambda: (self._canvas, self.setting), self._use_optimum, self.move
         )
         self._connect()
         self._task_changed()
-        self.judging.settled(FIRST_S)  # nobody is shown a picture without its colours
+        self.judging.settled(FIRST_S)  # the first picture has its colours
 
     def close(self) -> None:
         """End the threads, the processes and a build that runs."""
@@ -79,16 +80,16 @@ class Studio:
 
     @property
     def setting(self) -> Setting:
-        """Where the sliders stand."""
+        """The angles of the sliders."""
         return Setting.within_bounds(slider.value for slider in self.controls.angles)
 
     def show(self, text: str, bad: bool = False) -> None:
-        """One line under the facts."""
-        self._message_of = (self._canvas, self.setting)  # it goes with this state
+        """Show a message, until the state of the page changes."""
+        self._message_of = (self._canvas, self.setting)
         self.controls.note.content = note_html(text, bad=bad)
 
-    def _stood(self) -> None:
-        """Show the angles as text, and take away a message of another state."""
+    def _update_text(self) -> None:
+        """Show the angles as text, and remove a message of another state."""
         put(self.controls.typed, self.setting.text)
         self.controls.typed_error.content = ""
         if self.controls.note.content and self._message_of != (self._canvas, self.setting):
@@ -98,19 +99,9 @@ class Studio:
         """Move the sliders; moves `of` the same thing within `joined_s` of each other are one step of undo."""
         for slider, angle in zip(self.controls.angles, setting.angles_deg, strict=True):
             put(slider, angle)
-        self._stood()
+        self._update_text()
         self.judging.request(setting)
         self._note(of, joined_s)
-
-    def undo(self) -> None:
-        """Take the last step back."""
-        self._stand_as(self.history.undo())
-
-    def redo(self) -> None:
-        """Take the step again that was taken back."""
-        self._stand_as(self.history.redo())
-
-    # What can be undone
 
     def _state(self) -> PageState:
         fields = tuple((name, control.value) for name, control in self.controls.fields.items())
@@ -120,15 +111,16 @@ class Studio:
         self.history.note(self._state(), of, joined_s)
         self.controls.show_steps(self.history.undoes, self.history.redoes)
 
-    def _stand_as(self, moment: PageState | None) -> None:
-        if moment is None:
+    def _go_to(self, step: Callable[[], PageState | None]) -> None:
+        """Undo or redo."""
+        if (moment := step()) is None:
             return
         before, self._canvas = self._canvas, moment.canvas
         for name, value in moment.fields:
             put(self.controls.fields[name], value)
         for slider, angle in zip(self.controls.angles, moment.setting.angles_deg, strict=True):
             put(slider, angle)
-        self._stood()
+        self._update_text()
         if moment.canvas.base is not before.base:
             self._offer_scenes()
             put(self.controls.task, next(name for name, task in self._opened.items() if task is self._canvas.base))
@@ -151,11 +143,13 @@ class Studio:
     def _connect(self) -> None:
         c = self.controls
 
+        undo, redo = partial(self._go_to, self.history.undo), partial(self._go_to, self.history.redo)
+
         async def moved(event: viser.GuiEvent[Any]) -> None:
             self.judging.request(self.setting)
             noted(event)
             if event.client is not None:
-                self._stood()
+                self._update_text()
 
         async def typed(event: viser.GuiEvent[Any]) -> None:
             if event.client is None:
@@ -166,11 +160,8 @@ class Studio:
                 c.typed_error.content = note_html(str(error), bad=True)
 
         def noted(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:  # else it is the program that moves it
+            if event.client is not None:  # otherwise the program moves it
                 self._note(event.target.label)
-
-        def shown(_: viser.GuiEvent[Any]) -> None:
-            self.brush.show()
 
         for slider in c.angles:
             slider.on_update(moved)
@@ -178,20 +169,20 @@ class Studio:
         for field in c.fields.values():
             field.on_update(noted)
         for field in (c.brush, c.radius):
-            field.on_update(shown)
+            field.on_update(lambda _: self.brush.show())
         c.task.on_update(self._guarded(self._change_task))
-        c.painting.on_update(self._guarded(self._arm))
-        c.undo_key.on_trigger(self._guarded(self.undo))
-        c.redo_key.on_trigger(self._guarded(self.redo))
+        c.painting.on_update(lambda _: self.brush.arm(self._guarded))
+        c.undo_key.on_trigger(self._guarded(undo))
+        c.redo_key.on_trigger(self._guarded(redo))
         c.brush_key.on_trigger(lambda _: put(c.painting, not c.painting.value))
-        c.look.on_update(self._guarded(self._look))
+        c.density.on_update(self._guarded(self._show_density))
         c.scanner.on_update(self._guarded(self._show_scanner))
         c.scene.on_update(self._guarded(self._change_scene))
         for button, act in (
             (c.optimise, self.searching.begin),
             (c.keep, self._keep),
-            (c.undo, self.undo),
-            (c.redo, self.redo),
+            (c.undo, undo),
+            (c.redo, redo),
             (c.clear, lambda: self._paint(())),
             (c.restore, self.kept.restore),
             (c.remove, self._remove),
@@ -216,13 +207,11 @@ class Studio:
 
         return guarded
 
-    # The setting
-
     def _follow(self, setting: Setting) -> None:
         judge = self.judge
         self._tell(judge.quick(setting))
         self.view.colour(judge.problem, setting, self._bands)
-        self._server.flush()  # else they wait for the next of its times
+        self._server.flush()  # at once, not at the next interval
 
     def _rest(self, setting: Setting) -> None:
         self._order()
@@ -235,26 +224,24 @@ class Studio:
         self.controls.facts.content = panel_html.facts_html(facts, self.controls.typed._impl.uuid)
         self._server.flush()
 
-    # The task and the paint on it
-
     def _change_task(self) -> None:
         name = self.controls.task.value
-        if name not in self._tasks:  # a page could ask for any file of this computer
-            raise TaskError(f"task '{name}': none of those that can be chosen")
+        if name not in self._tasks:  # a page could name any file of this computer
+            raise TaskError(f"task '{name}': not in the list")
         if name not in self._opened:
             self._opened[name] = load_task(Path(name))
         if self._opened[name] is self._canvas.base:
             return
         self._canvas = Canvas(self._opened[name])
-        self.kept.take(())  # another task asks for other angles
-        self._stood()
+        self.kept.take(())  # of the previous task
+        self._update_text()
         self._offer_scenes()
         put(self.controls.name, name_of_copy(self._canvas.base))
         self.painting.request(self._canvas)
         self._note()
 
     def _use_optimum(self, optimum: Optimum) -> None:
-        """Judge by the task whose period was found."""
+        """Judge by the task with the period of the optimum."""
         self.judge = replace(self.judge, loaded=optimum.loaded, problem=optimum.problem)
         self._searched[self._canvas] = optimum
         self._show_pads()
@@ -269,9 +256,9 @@ class Studio:
 
     def _paint(self, dabs: tuple[Dab, ...], stroke: int | None = None) -> None:
         canvas = Canvas(self._canvas.base, dabs)
-        canvas.painted()  # refuses what no task could hold
+        canvas.painted()  # rejects an invalid task
         self._canvas = canvas
-        self._stood()
+        self._update_text()
         self.painting.request(canvas)
         self._note(("stroke", stroke) if stroke is not None else None, math.inf)
 
@@ -289,42 +276,25 @@ class Studio:
         self._bands = bands_to(max(highest_density(self.judge.problem, angles) for angles in settings))
         self.controls.scale.content = key_html(
             self._bands,
-            "beams per direction, without parts; grey: none; white edge: what matters; red: hidden by the robot",
+            "beams per direction, without parts; grey: none; white: region of interest; red: hidden by the robot",
         )
         self._show_pads()
+        self.view.enter(self.judge.loaded.task)
         self.view.outline(self.judge.problem)
-        self.view.stand_in(self.judge.loaded.task)
+        self.brush.arm(self._guarded)
         masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
         count = len(self._canvas.dabs)
-        self.controls.painted.content = note_html(f"{count} dabs on the task, {masks} of them hide")
+        self.controls.painted.content = note_html(f"{count} dabs, {masks} of them hide directions")
         self.judging.request(self.setting)
 
-    def _rejudge(self, _: Canvas) -> None:
-        """The settings that were kept, by the task as it is now."""
-        self.kept.rejudge(self.judge)
-
-    def _arm(self) -> None:
-        """Take the brush in hand, or put it away so that dragging turns the view again."""
-        self.brush.arm(self._guarded)
-        if self.controls.painting.value and not self.view.on_sphere:
-            put(self.controls.look, "sphere")  # which is what the brush paints on
-            self._look()
-
-    def _look(self) -> None:
-        if self.controls.look.value in LOOKS:
-            self.view.look(self.controls.look.value)
-            self.brush.show()
-            self.judging.request(self.setting)
-
-    # Other processes
+    def _show_density(self) -> None:
+        self.view.show_density(self.controls.density.value)
+        self.judging.request(self.setting)
 
     def _order(self) -> None:
         scene = {NO_SCENE: "", TASK_SCENE: "task"}.get(self.controls.scene.value, "room")
         loaded, problem = self.judge.loaded, self.judge.problem
         self.workers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
-
-    def _show_making(self, text: str, bad: bool) -> None:
-        self.controls.making.content = note_html(text, bad=bad)
 
     def _show_scanner(self) -> None:
         self.view.show_scanner(self.controls.scanner.value)

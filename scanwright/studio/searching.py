@@ -1,4 +1,4 @@
-"""The search of the studio: the optimum of what is on the page, looked for beside everything else."""
+"""The search of the studio, in its own thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scanwright.pipeline.build import setting_built
 from scanwright.studio.panel.controls import Controls, put
 from scanwright.studio.state import Canvas, Setting
 
-SEARCH_STEPS = 9  # lines that a search says
+SEARCH_STEPS = 9  # progress lines of a search
 
 
 class Searching:
@@ -32,7 +32,7 @@ class Searching:
         self._controls, self._show, self._now, self._use, self._move = controls, show, now, use, move
 
     def begin(self) -> None:
-        """Search all angles of the task, and move the sliders to what is found; one search at a time."""
+        """Search all angles of the task, and move the sliders to the optimum; one search at a time."""
         c = self._controls
         if c.optimise.disabled:
             return
@@ -55,7 +55,7 @@ class Searching:
                 return
             self._use(optimum)
             if setting != self._now()[1]:
-                self._show("the optimum is known; Optimise moves the sliders there")
+                self._show("optimum found; Optimise moves the sliders there")
                 return
             step = object()  # both moves are one
             bare = Setting.within_bounds(optimum.search.best[0].angles_deg)

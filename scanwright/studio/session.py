@@ -1,4 +1,4 @@
-"""The server of the studio: its page ends some minutes after the last visitor."""
+"""Serve the studio until some minutes after the last visitor."""
 
 from __future__ import annotations
 
@@ -18,18 +18,7 @@ ALONE_S = 300.0  # without a visitor; a browser that restarts returns sooner
 def run_studio(
     loaded: LoadedTask, *, port: int, out: Path, progress: Progress, announce: Callable[[str], None]
 ) -> None:
-    """Serve the studio of a task; task files are saved to the working folder.
-
-    Args:
-        loaded: first task.
-        port: of 127.0.0.1; 0 chooses a free one.
-        out: parent of the build folders.
-        progress: progress callback.
-        announce: called with the address of the page.
-
-    Raises:
-        TaskError: the port is taken, or the task has no region.
-    """
+    """Serve the studio of a task; task files are saved to the working folder."""
     with guarded_server(f"Scanwright: {loaded.task.name}", port, recall=True) as (server, gate):
         progress("reading the task (first run: compiling, about 5 s)")
         studio = Studio(server, loaded, Path.cwd(), out)

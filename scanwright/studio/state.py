@@ -1,7 +1,6 @@
-"""What a person makes of a task in the studio: angles, and paint on the sphere.
+"""What a person changes in the studio: angles, and paint on the walls.
 
-Paint is laid down in dabs. Each is a cone that joins the task's regions as the last one, so what is painted last wins,
-as in every task file: nothing of the studio is lost when the file is written, and the file says nothing else.
+Paint is a sequence of dabs. Each is a cone after the regions of the task, so that later paint wins.
 """
 
 from __future__ import annotations
@@ -19,10 +18,8 @@ from scanwright.design.files.faults import format_validation_error
 from scanwright.design.task.shapes import ConeRegion, MaskRegion, Region
 from scanwright.design.task.task import LoadedTask
 
-BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0
-"""Of the mounting angles: what a task file may say."""
-MOST_DABS = 60
-"""Beyond it J takes its time: every edge of a region is a break of its quadrature."""
+BOUNDS_DEG = 180.0, 90.0, 90.0, 90.0  # of the mounting angles in a task file
+MOST_DABS = 60  # with more, J is slow: each edge of a region is a break of its quadrature
 DECIMALS = 4  # of an axis in the task file: 0.006 deg
 
 Brush = Literal["matters", "does not matter", "hidden"]
@@ -30,21 +27,13 @@ Brush = Literal["matters", "does not matter", "hidden"]
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """The four mounting angles.
-
-    Attributes:
-        angles_deg: in the order of `design.task.task.NAMES`.
-    """
+    """The four mounting angles."""
 
     angles_deg: tuple[float, float, float, float]
 
     @classmethod
     def within_bounds(cls, angles_deg: Iterable[float]) -> Setting:
-        """Four numbers as a setting, each within what a task file may say and rounded to its 0.01 deg.
-
-        Raises:
-            ValueError: they are not four finite numbers.
-        """
+        """Return a setting, each angle within its bounds and rounded to 0.01 deg."""
         angles = np.array([float(angle) for angle in angles_deg])
         if angles.shape != (4,) or not np.isfinite(angles).all():
             raise ValueError(f"{angles.tolist()}: not four finite angles")
@@ -56,11 +45,7 @@ class Setting:
 
     @classmethod
     def read(cls, text: str) -> Setting:
-        """Return the setting that a text states.
-
-        Raises:
-            TaskError: it is not four numbers within the bounds.
-        """
+        """Return the setting that a text states."""
         try:
             angles = [float(part) for part in text.replace(",", " ").split()]
             setting = cls.within_bounds(angles)
@@ -78,33 +63,26 @@ class Setting:
 
     @property
     def angles_rad(self) -> Array:
-        """The same in radians, shape (4,)."""
+        """The angles [rad], shape (4,)."""
         return np.radians(self.angles_deg)
 
 
 @dataclass(frozen=True, slots=True)
 class Dab:
-    """One touch of the brush.
+    """One touch of the brush."""
 
-    Attributes:
-        direction: unit vector in the world.
-        radius_deg: of the cone.
-        brush: what it paints.
-        value: weight, of what matters.
-    """
-
-    direction: tuple[float, float, float]
-    radius_deg: float
-    brush: Brush
-    value: float = 1.0
+    direction: tuple[float, float, float]  # unit vector in the world
+    radius_deg: float  # of the cone
+    brush: Brush  # what it paints
+    value: float = 1.0  # weight, of what matters
 
     @property
     def paints(self) -> tuple[float, Brush, float]:
-        """All of it but where."""
+        """All but the direction."""
         return self.radius_deg, self.brush, self.value
 
     def cone(self) -> ConeRegion:
-        """The region of a task file that says the same."""
+        """Return the region of a task file."""
         axis = tuple(round(float(x), DECIMALS) + 0.0 for x in self.direction)
         value = {"matters": self.value, "does not matter": 0.0, "hidden": 1.0}[self.brush]
         return ConeRegion(shape="cone", axis=axis, half_angle_deg=self.radius_deg, value=value)
@@ -112,12 +90,7 @@ class Dab:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Canvas:
-    """What is being judged; equal to another where it is the same paint on the same loaded task.
-
-    Attributes:
-        base: the task.
-        dabs: the paint on it.
-    """
+    """The task that is judged: equal for the same paint on the same loaded task."""
 
     base: LoadedTask
     dabs: tuple[Dab, ...] = ()
@@ -129,18 +102,12 @@ class Canvas:
         return hash((id(self.base), self.dabs))
 
     def painted(self) -> LoadedTask:
-        """The task with the paint, as `painted`."""
+        """Return the task with the paint."""
         return painted(self.base, self.dabs)
 
 
 def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
-    """The task with paint on it. Dabs that hide join the masks, the others the weights.
-
-    A task that weighs no region weighs everything (its `background`); the paint then stands on that.
-
-    Raises:
-        TaskError: there are more than `MOST_DABS`, or a dab is none that a task file could hold.
-    """
+    """Return the task with paint: dabs that hide join the masks, the others the weights."""
     if len(dabs) > MOST_DABS:
         raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; use a wider brush, or a map")
     task = loaded.task

@@ -1,4 +1,4 @@
-"""The task file of what a person made in the studio: one folder is written to, and no other."""
+"""Write the task file of the studio."""
 
 from __future__ import annotations
 
@@ -20,17 +20,7 @@ NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]{0,63}")  # as `Task.name`; it become
 
 
 def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None) -> str:
-    """The task file as it stands in a folder: what is at its default is left out, file names lead from there.
-
-    Args:
-        loaded: the task.
-        folder: where the text is to be written.
-        name: of the task.
-        fixed: angles to write as values in place of the ranges to search.
-
-    Raises:
-        TaskError: the name cannot be one.
-    """
+    """Return the text of the task file for a folder: without defaults, with file names relative to the folder."""
     if not NAME.fullmatch(name):
         raise TaskError(f"name: use letters, digits, _ and -, at most 64, a letter or digit first (got '{name}')")
     table = loaded.task.model_dump(mode="json", exclude_defaults=True, exclude_none=True) | {"name": name}
@@ -48,13 +38,8 @@ def task_text(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None
 
 
 def save_task(loaded: LoadedTask, folder: Path, name: str, fixed: Setting | None, *, overwrite: bool) -> Path:
-    """Write `name.toml` into a folder and read it back; nothing is written anywhere else.
-
-    Raises:
-        TaskError: the name is not one of a task, the file exists and is not to be overwritten, or what was written
-            does not read as a task.
-    """
-    text = task_text(loaded, folder, name, fixed)  # refuses a name that leads elsewhere
+    """Write `name.toml` into a folder, and read it back."""
+    text = task_text(loaded, folder, name, fixed)  # rejects a name that is a path
     path = folder / f"{name}.toml"
     if path.is_symlink():
         raise TaskError(f"{path}: is a symbolic link; choose another name")

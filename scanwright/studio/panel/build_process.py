@@ -19,7 +19,7 @@ class BuildProcess:
         self, task_file: Path, out: Path, progress: Callable[[float, str], None], done: Callable[[int, str], None]
     ) -> None:
         self._progress, self._done = progress, done
-        # what a person would type, with this very interpreter; -P: no module of the folder it runs in
+        # -P: import no module from the working folder
         command = [sys.executable, "-P", "-m", "scanwright", "build", str(task_file), "--out", str(out)]
         self._process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
@@ -29,11 +29,11 @@ class BuildProcess:
 
     @property
     def runs(self) -> bool:
-        """Whether it is still at work."""
+        """Whether it is still running."""
         return self._process.poll() is None
 
     def stop(self) -> None:
-        """End it; what it made so far is thrown away by the build itself, which writes its folder last."""
+        """End the build, which then leaves no files."""
         if self.runs:
             self._process.terminate()
         self._thread.join()

@@ -1,4 +1,4 @@
-"""The panel: every control of the studio, where it stands and what it may hold. What they do is in `page`."""
+"""The controls of the panel; `page` connects them."""
 
 from __future__ import annotations
 
@@ -11,33 +11,25 @@ from scanwright.design.task.task import LoadedTask
 from scanwright.serving.style import banner_html
 from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.state import BOUNDS_DEG, Brush, Setting
-from scanwright.studio.view.view_3d import LOOKS
 
 NO_SCENE, ROOM, TASK_SCENE = "none", "furnished room", "scene of the task"
 UNDO, REDO = "Undo", "Redo"
-LOST = "The studio has ended: nothing on this page is current.", "Start it again, and reload this page."
-QUIET: Literal["gray"] = "gray"  # every button but the one that a tab is for
+LOST = "The studio has ended: this page is out of date.", "Start it again, then reload this page."
+QUIET: Literal["gray"] = "gray"  # secondary buttons
 BRUSHES: tuple[Brush, ...] = get_args(Brush)
 
 
 class Controls:
-    """Handles of all controls, put up for a task with the angles of a setting.
-
-    Args:
-        gui: of the page.
-        loaded: the task.
-        tasks: names of those that can be chosen, the present one first.
-        setting: where the sliders stand.
-    """
+    """Handles of all controls, put up for a task with the angles of a setting."""
 
     def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Setting) -> None:
-        self.mode, self.facts = gui.add_html(banner_html("running", (), lost=LOST)), gui.add_html("")
-        self.note, self.making = gui.add_html(""), gui.add_html("")
+        self.banner = gui.add_html(banner_html("running", (), lost=LOST))
+        self.facts, self.mode, self.note, self.making = (gui.add_html("") for _ in range(4))
         self.undo = gui.add_button(UNDO, icon=viser.Icon.ARROW_BACK_UP, color=QUIET, disabled=True)
         self.redo = gui.add_button(REDO, icon=viser.Icon.ARROW_FORWARD_UP, color=QUIET, disabled=True)
         self.undo_key = gui.add_command(UNDO, hotkey="Z", modifier="cmd/ctrl", disabled=True)
         self.redo_key = gui.add_command(REDO, hotkey="Z", modifier="cmd/ctrl+shift", disabled=True)
-        self.brush_key = gui.add_command("Brush", description="Take it in hand, or put it away", hotkey="B")
+        self.brush_key = gui.add_command("Brush", description="Turn the brush on or off", hotkey="B")
         tabs = gui.add_tab_group()
         with tabs.add_tab("Angles"):
             self.task = gui.add_dropdown("task", tasks, initial_value=tasks[0])
@@ -46,16 +38,18 @@ class Controls:
                 gui.add_slider(name, -bound, bound, 0.01, angle)
                 for name, bound, angle in zip(NAMES, BOUNDS_DEG, setting.angles_deg, strict=True)
             )
-            self.typed = gui.add_text("angles [deg]", setting.text, hint="All four: a link to this page has them too")
+            self.typed = gui.add_text("angles [deg]", setting.text, hint="All four; a link to this page contains them")
             self.typed_error = gui.add_html("")
             self.link = gui.add_button("Copy link", hint="It opens this setting, also after a restart", color=QUIET)
-            self.optimise = gui.add_button("Optimise", hint="Search all angles of the task, and move the sliders there")
+            self.optimise = gui.add_button(
+                "Optimise", hint="Search all angles of the task, and move the sliders to the optimum"
+            )
             self.progress = gui.add_progress_bar(0.0, visible=False)
-            self.keep = gui.add_button("Keep this setting", hint="Put it into the table under Compare", color=QUIET)
+            self.keep = gui.add_button("Keep this setting", hint="Add it to the table under Compare", color=QUIET)
             self.scale = gui.add_html("")
         with tabs.add_tab("Paint"):
             self.painting = gui.add_checkbox(
-                "brush", initial_value=False, hint="Click or drag on the sphere; off: turn the view"
+                "brush", initial_value=False, hint="Click or drag on the walls; off: turn the view"
             )
             self.brush = gui.add_dropdown("paints", BRUSHES, initial_value=BRUSHES[0])
             self.radius = gui.add_slider("radius [deg]", 1.0, 60.0, 0.5, 12.0)
@@ -67,14 +61,14 @@ class Controls:
             self.kept = gui.add_dropdown("setting", ("rolling",), initial_value="rolling")
             self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
         with tabs.add_tab("View"):
-            self.look = gui.add_dropdown("density", LOOKS, initial_value=LOOKS[0])
+            self.density = gui.add_checkbox("density", initial_value=True)
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
             self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
             self.name = gui.add_text("name", name_of_copy(loaded))
             self.name_error = gui.add_html("")
             self.fixed = gui.add_checkbox(
-                "fix these angles", initial_value=False, hint="Write the angles in place of ranges"
+                "fix these angles", initial_value=False, hint="Write these angles instead of ranges to search"
             )
             self.overwrite = gui.add_checkbox("overwrite", initial_value=False)
             self.save, self.build = gui.add_button("Save task", color=QUIET), gui.add_button("Save and build")
@@ -91,7 +85,7 @@ class Controls:
         }
 
     def show_steps(self, undoes: str, redoes: str) -> None:
-        """Say what undo would take back and redo do again; empty where there is nothing."""
+        """Label undo and redo with their steps; an empty step disables them."""
         for button, key, name, words in (
             (self.undo, self.undo_key, UNDO, undoes),
             (self.redo, self.redo_key, REDO, redoes),
@@ -101,15 +95,15 @@ class Controls:
 
 
 def put(control: Any, value: object) -> None:
-    """Set what a control holds; viser declares that in a way that type checkers take for read-only."""
+    """Set the value of a control, which viser declares as read-only."""
     control.value = value
 
 
 def scan_scenes(loaded: LoadedTask) -> tuple[str, ...]:
-    """What a scan can be simulated of."""
+    """Return the scenes that can be scanned."""
     return (NO_SCENE, ROOM, TASK_SCENE) if loaded.task.scene is not None else (NO_SCENE, ROOM)
 
 
 def name_of_copy(loaded: LoadedTask) -> str:
-    """The name that a changed task is saved under if no other is typed."""
+    """Return the suggested name of a changed task."""
     return f"{loaded.task.name}_mine"[:64]

@@ -1,7 +1,6 @@
-"""What the studio tells of a setting, without parts, fast enough to follow a hand.
+"""The figures that the studio shows of a setting, without parts.
 
-While an angle is dragged J is the real one, mean of g over true counts, on fewer nodes: it carries a larger error, and
-that is shown. When the hand rests it is `design.objective.score.score`, the number that `scanwright evaluate` prints.
+While an angle is dragged, J is from fewer nodes, with a larger error; at rest it is that of `scanwright evaluate`.
 """
 
 from __future__ import annotations
@@ -28,38 +27,22 @@ WALL_M = 10.0  # range at which gaps are given in millimetres
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """A setting judged.
-
-    Attributes:
-        setting: the angles.
-        J: and its error.
-        exact: whether J is the one that `evaluate` prints; else it stands on fewer nodes.
-        blind_cone_deg: half angle of the wider one about the axis.
-        gap_deg: widest distance between neighbouring scan lines.
-        blind_weight: share of the weight that is never seen.
-        period_s: shortest turn with `density` beams everywhere; NaN if none has or the servo sweeps, None if unknown.
-        density: beams per ball that the period is for.
-        mounts: J of the reference mounts for the same task, the best one first.
-        least: fewest beams per ball where it counts.
-        limits: of the task.
-        log: whether J is the mean of -ln(1 + d): differences of J are ratios of beams.
-        planes: each plane of the task in words, and what a full scan leaves on it in metres; None while not known.
-    """
+    """The figures of a setting without parts."""
 
     setting: Setting
     J: float
     J_error: float
-    exact: bool
-    blind_cone_deg: float
-    gap_deg: float
-    blind_weight: float
-    period_s: float | None
-    density: int
-    mounts: dict[str, float]
-    planes: tuple[tuple[str, PlaneFigures | None], ...]
-    least: int
+    exact: bool  # the J that `evaluate` prints; otherwise from fewer nodes
+    blind_cone_deg: float  # half angle of the wider one about the axis
+    gap_deg: float  # widest distance between neighbouring scan lines
+    blind_weight: float  # share of the weight that is never seen
+    period_s: float | None  # shortest turn with `density` beams everywhere; NaN if there is none, None if unknown
+    density: int  # beams per ball that the period is for
+    mounts: dict[str, float]  # J of the reference mounts for the same task, the best one first
+    planes: tuple[tuple[str, PlaneFigures | None], ...]  # of the task in words, and a full scan on each if known
+    least: int  # fewest beams per ball in the region of interest
     limits: Limits
-    log: bool
+    log: bool  # J is the mean of -ln(1 + d), so that differences of J are ratios of beams
 
     @property
     def ratio(self) -> float:
@@ -68,7 +51,7 @@ class Facts:
         return math.exp(min(best - self.J, 50.0)) if self.log and math.isfinite(best - self.J) else math.nan
 
     def asked(self) -> list[tuple[str, bool, str]]:
-        """What the task asks for: in words, whether it is met without parts, and the value."""
+        """Return the limits of the task in words, whether they are met without parts, and the values."""
         limits, blind = self.limits, f"{percent(self.blind_weight)} blind"
         rows = [("no blind spot", self.blind_weight <= (limits.max_blind_weight or NO_BLIND_WEIGHT), blind)]
         if (fewest := limits.min_density) is not None:
@@ -89,7 +72,7 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Judge:
-    """A task ready to judge settings: its numbers, and the reference mounts, the best one first."""
+    """A task, its numbers, and its reference mounts, the best one first."""
 
     loaded: LoadedTask
     problem: Problem
@@ -97,11 +80,7 @@ class Judge:
 
     @classmethod
     def for_task(cls, loaded: LoadedTask) -> Judge:
-        """Tune the reference mounts once; they stay while the task does.
-
-        Raises:
-            TaskError: no direction of the task has a weight.
-        """
+        """Return the judge of a task, with its reference mounts tuned."""
         problem = problem_of(loaded)
         mounts = sorted(reference_mounts(problem, loaded.task), key=lambda mount: mount.score.J)
         return cls(loaded, problem, tuple(mounts))
@@ -111,15 +90,15 @@ class Judge:
         return {mount.name: Setting.within_bounds(np.degrees(mount.angles_rad)) for mount in self.mounts}
 
     def quick(self, setting: Setting) -> Facts:
-        """While the hand moves."""
+        """Return the figures from fewer nodes, for a slider that moves."""
         return self._facts(setting, score_on(self.problem, setting.angles_rad, DRAG_NODES), exact=False)
 
     def exact(self, setting: Setting) -> Facts:
-        """When it rests."""
+        """Return the figures with the J of `evaluate`."""
         return self._facts(setting, score(self.problem, setting.angles_rad), exact=True)
 
     def settled(self, facts: Facts) -> Facts:
-        """Add the shortest period, whose search computes J many times, and what planes get in metres."""
+        """Add what takes longest: the shortest period, and the figures of planes."""
         turns = self.loaded.task.motion.mode in ("spin", "shortest")
         period_s = self._period_s(facts.setting) if facts.blind_weight == 0 and turns else math.nan
         planes = on_planes(self.loaded, self.problem, facts.setting.angles_rad)

@@ -15,11 +15,7 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 class KeptSettings:
-    """The table under Compare.
-
-    Settings are kept and removed by the threads of the page while another one judges them by a changed task: whoever
-    judges has the table to itself, so that nothing vanishes and all stand there by the same task.
-    """
+    """The table under Compare; the lock makes sure that all rows are judged by the same task."""
 
     def __init__(self, controls: Controls, move: Callable[[Setting], None], judge: Judge) -> None:
         self._controls, self._move = controls, move
@@ -28,11 +24,7 @@ class KeptSettings:
         self.rejudge(judge)
 
     def keep(self, setting: Setting) -> str:
-        """Put a setting into the table; its name there.
-
-        Raises:
-            TaskError: the table is full.
-        """
+        """Add a setting to the table, and return its name there."""
         with self._table:
             name = next((letter for letter in LETTERS if letter not in self._facts), None)
             if name is None:
@@ -43,16 +35,12 @@ class KeptSettings:
         return name
 
     def restore(self) -> None:
-        """Move the sliders to the setting that is chosen."""
+        """Move the sliders to the selected setting."""
         if facts := self._facts.get(self._controls.kept.value):
             self._move(facts.setting)
 
     def remove(self) -> None:
-        """Take the one that is chosen out of the table.
-
-        Raises:
-            TaskError: it is a reference mount.
-        """
+        """Remove the selected setting."""
         name = self._controls.kept.value
         if name in self._judge.references():
             raise TaskError(f"compare: {name} cannot be removed: others are compared with it")
@@ -62,16 +50,16 @@ class KeptSettings:
 
     @property
     def settings(self) -> tuple[tuple[str, Setting], ...]:
-        """Those that were kept, by name, without the reference mounts."""
+        """The kept settings by name, without the reference mounts."""
         return tuple((name, facts.setting) for name, facts in self._facts.items() if name in LETTERS)
 
     def take(self, settings: tuple[tuple[str, Setting], ...]) -> None:
-        """Have these in place of those that were kept."""
+        """Replace the kept settings."""
         with self._table:
             self._judge_all(dict(settings))
 
     def rejudge(self, judge: Judge) -> None:
-        """Judge all again, and from now on, by a task that has changed."""
+        """Judge all by a changed task."""
         with self._table:
             self._judge = judge
             self._judge_all(dict(self.settings))

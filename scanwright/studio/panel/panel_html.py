@@ -69,7 +69,7 @@ def kept_html(kept: Mapping[str, Facts]) -> str:
 
 
 def _on_plane(region: str, figures: PlaneFigures | None) -> str:
-    """Two lines, whether it is known yet or not, so that nothing below them moves."""
+    """Return two lines, known or not, so that nothing below them moves."""
     words = figures.words() if figures else f"{region}: ..."
     return f'<div style="font-size:12px;line-height:1.35;min-height:2.7em;margin:0 12px 6px">{escape(words)}</div>'
 

@@ -1,4 +1,4 @@
-"""Save: the task file of what is on the page, and the build of it."""
+"""Save and build the task of the page."""
 
 from __future__ import annotations
 
@@ -21,14 +21,10 @@ class Saving:
         self._building: BuildProcess | None = None
 
     def save(self, loaded: LoadedTask, setting: Setting) -> Path:
-        """Write the task file, with the angles fixed at the setting where that is ticked.
-
-        Raises:
-            TaskError: as `save_task`; a file that says the same already is as good as written.
-        """
+        """Write the task file, with the angles fixed at the setting where that is ticked."""
         c = self._controls
         name, fixed = c.name.value, setting if c.fixed.value else None
-        text = task_text(loaded, self._folder, name, fixed)  # refuses a name that is a path
+        text = task_text(loaded, self._folder, name, fixed)  # rejects a name that is a path
         path = self._folder / f"{name}.toml"
         if not (path.is_file() and path.read_text(encoding="utf-8") == text):
             save_task(loaded, self._folder, name, fixed, overwrite=c.overwrite.value)
@@ -36,11 +32,7 @@ class Saving:
         return path
 
     def build(self, loaded: LoadedTask, setting: Setting) -> None:
-        """Save, and build the file in a process of its own.
-
-        Raises:
-            TaskError: as `save`, or one is being built.
-        """
+        """Save, and build the file in a process of its own."""
         c = self._controls
         if self._building is not None and self._building.runs:
             raise TaskError("build: one runs already")

@@ -9,14 +9,11 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
-REST_S = 0.25  # without a request: the hand has let go
+REST_S = 0.25  # without a request: the slider is at rest
 
 
 class LatestOnly(Generic[T]):
-    """A thread that does the newest request, and other work once no request has come for a while.
-
-    A request waits while another one is being done; the next one replaces a request that waits.
-    """
+    """A thread that does the newest request, and `rest` once none has come for `rest_s`."""
 
     def __init__(
         self, name: str, work: Callable[[T], None], rest: Callable[[T], None] | None = None, rest_s: float = REST_S
@@ -37,12 +34,12 @@ class LatestOnly(Generic[T]):
             self._changed.notify_all()
 
     def settled(self, timeout_s: float) -> bool:
-        """Wait until all is done; False where that takes longer."""
+        """Wait until all is done; return False if it takes longer."""
         with self._changed:
             return self._changed.wait_for(lambda: self._idle and not self._waiting, timeout_s)
 
     def close(self) -> None:
-        """Finish what is being done, and end."""
+        """Finish the present request, and end."""
         with self._changed:
             self._open = False
             self._changed.notify_all()
@@ -69,7 +66,7 @@ class LatestOnly(Generic[T]):
 
 
 def _guarded(work: Callable[[T], None], request: T) -> None:
-    """Print the fault of a request; the thread goes on."""
+    """Print the error of a request, and continue."""
     try:
         work(request)
     except Exception:

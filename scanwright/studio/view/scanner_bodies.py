@@ -13,28 +13,18 @@ from scanwright.design.scanner import Scanner
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyMesh:
-    """One body of the scanner, in the rotation frame at gamma = 0.
+    """One body of the scanner, in the rotation frame at gamma = 0."""
 
-    Attributes:
-        name: of the part.
-        vertices_m: shape (n, 3).
-        faces: shape (m, 3).
-        colour: sRGB, 0 .. 255.
-    """
-
-    name: str
-    vertices_m: NDArray[np.float32]
-    faces: NDArray[np.uint32]
-    colour: tuple[int, int, int]
+    name: str  # of the part
+    vertices_m: NDArray[np.float32]  # shape (n, 3)
+    faces: NDArray[np.uint32]  # shape (m, 3)
+    colour: tuple[int, int, int]  # sRGB, 0 .. 255
 
 
 def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
     """The parts that turn with the horn, or those that stand still: two halves for two cores.
 
     The linkage, which takes the kernel longer than all others together, is a draft of the same shapes.
-
-    Raises:
-        BuildError: a part cannot be made.
     """
     from scanwright.cad.assembly.linkage_preview import coarse_mesh, draft_linkage
     from scanwright.cad.assembly.make import make_parts

@@ -1,7 +1,6 @@
-"""The processes that make parts and scans for the page: newest wish first, and none of it in the page's own process.
+"""Three processes that make parts and scans for the page, each the newest order only.
 
-Three workers run side by side, each with a process that stays, since the CAD kernel holds the interpreter: what turns
-with the horn, what stands still, and scans. None waits for another, and each does only the newest order.
+They are processes because the CAD kernel holds the interpreter.
 """
 
 from __future__ import annotations
@@ -30,15 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What is to be made.
-
-    Attributes:
-        loaded: the task.
-        problem: its numbers.
-        setting: the angles.
-        bodies: whether those of the scanner are wanted.
-        scene: whose scan is wanted: "" none, "task" the task's, else the furnished room.
-    """
+    """What is to be made."""
 
     loaded: LoadedTask
     problem: Problem
@@ -47,39 +38,35 @@ class Order:
     scene: str
 
     def scanner(self) -> Scanner:
-        """The scanner of the setting, its optical centre at the world's origin.
-
-        Raises:
-            TaskError: a product is not in the catalogue.
-        """
+        """Return the scanner with its optical centre at the origin of the world."""
         return self.loaded.scanner(self.loaded.angle_set(self.setting.angles_deg))
 
 
 class Workers:
-    """Orders in, bodies and points into the view; `show` gets what is being made and whether it was refused."""
+    """Workers for both halves of the scanner and for scans; `show` gets a message and whether it is an error."""
 
     def __init__(self, view: View3D, show: Callable[[str, bool], None]) -> None:
         self._view = view
         self._shown: dict[bool, Scanner] = {}
         status = _StatusLine(show)
         self._workers = (
-            _Worker("what turns", lambda worker, order: self._half(worker, order, turning=True), status),
-            _Worker("what stands", lambda worker, order: self._half(worker, order, turning=False), status),
+            _Worker("turning half", lambda worker, order: self._half(worker, order, turning=True), status),
+            _Worker("fixed half", lambda worker, order: self._half(worker, order, turning=False), status),
             _Worker("scan", self._scan, status),
         )
 
     def order(self, order: Order) -> None:
-        """Make this, and nothing that was ordered before and has not begun."""
+        """Make this, in place of an order that has not begun."""
         for worker in self._workers:
             worker.orders.request(order)
 
     def settled(self, timeout_s: float) -> bool:
-        """Wait until all is made; False where that takes longer."""
+        """Wait until all is made; return False if it takes longer."""
         end = time.monotonic() + timeout_s
         return all(worker.orders.settled(max(0.0, end - time.monotonic())) for worker in self._workers)
 
     def close(self) -> None:
-        """End the processes at once: nobody waits for what they make."""
+        """End the processes at once."""
         for worker in self._workers:
             worker.close()
 
@@ -92,7 +79,7 @@ class Workers:
             bodies = worker.ask("making the parts ...", make_bodies, scanner, turning)
         except ScanwrightError:
             self._shown.pop(turning, None)
-            self._view.show_bodies(order.setting, turning, ())  # what stood there was another setting's
+            self._view.show_bodies(order.setting, turning, ())  # of another setting
             raise
         self._view.show_bodies(order.setting, turning, bodies)
         self._shown[turning] = scanner
@@ -107,7 +94,7 @@ class Workers:
 
 
 class _Worker:
-    """A process that stays, and the thread that hands it the newest order."""
+    """A process, and the thread that gives it the newest order."""
 
     def __init__(self, name: str, work: Callable[[_Worker, Order], None], status: _StatusLine) -> None:
         self._name, self._work, self._status = name, work, status
@@ -115,12 +102,12 @@ class _Worker:
         self.orders: LatestOnly[Order] = LatestOnly(name, self._follow)
 
     def ask(self, word: str, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Have the process call a function, and say so meanwhile."""
+        """Call a function in the process, and show a message meanwhile."""
         self._status.show(self._name, word)
         return self._pool.submit(function, *args, **kwargs).result()
 
     def close(self) -> None:
-        """Kill the process, and end the thread."""
+        """End the process and the thread."""
         self._open = False
         kill(self._pool)
         self.orders.close()
@@ -135,10 +122,10 @@ class _Worker:
             self._status.show(self._name, str(error), bad=True)
         except BrokenExecutor:
             if self._open:
-                self._status.show(self._name, f"{self._name}: its process ended; the next one begins", bad=True)
+                self._status.show(self._name, f"{self._name}: its process ended; a new one was started", bad=True)
                 self._pool = spawn_pool()
         except Exception:
-            self._status.show(self._name, f"{self._name}: a fault of the program: see the terminal", bad=True)
+            self._status.show(self._name, f"{self._name}: internal error, see the terminal", bad=True)
             raise
 
 

@@ -389,12 +389,16 @@ def test_the_expected_density_lies_in_the_room_about_the_scanner(tmp_path, cheap
     with guarded_server("a page") as (server, _):
         view = CloudView(server, "scan", angles.T_world_rot(0.0)[:3, 3])
         scan_page._expect(view, tmp_path, angles)
-        places = np.asarray(view.room.batched_positions)
-        np.testing.assert_allclose(places.min(axis=0), [-1.9, -2, -0.7], atol=0.1)
-        assert places[:, 2].max() < 2.3  # the ceiling is none of its business: the task looks to the sides
-        assert len(np.unique(view.room.batched_colors, axis=0)) > 2
+        np.testing.assert_allclose(view._walls.frame.position, [0.1, 0, 0.3])
+        pictures = [wall.handle for wall in view._walls.walls]
+        *_, floor, ceiling = pictures
+        assert floor.position[2] == pytest.approx(-1.0)
+        rows, columns = ceiling.image.shape[:2]
+        assert ceiling.image[rows // 2, columns // 2, 3] == 0  # the task looks to the sides
+        shown = [wall.image[..., :3][wall.image[..., 3] > 0] for wall in pictures]
+        assert len(np.unique(np.concatenate(shown), axis=0)) > 2
         view._expected.value = False
-        assert not view.room.visible
+        assert not view._walls.frame.visible
 
 
 def test_the_ruler_takes_the_point_that_is_meant():

@@ -49,7 +49,7 @@ def test_cards_state_the_numbers_of_the_records(built):
     )
     factor, name = min((each.factor, each.name) for each in mounts)
     assert gain.headline == f"{factor:.2f} x {name}"
-    assert ("It has more beams than this scanner." in gain.text) == (factor < 0.98)
+    assert (f": {1 / factor:.2f} times the beams of this scanner." in gain.text) == (factor < 0.98)
     assert all(f"{each.factor:.2f} x {each.name}" in gain.text for each in mounts[1:])
     assert scan.headline == "18 s, 778,320 beams"
     assert scan.text == "Expect about 10 mm at 3 m. One turn at constant speed: 720 lines of 1,081."

@@ -1,41 +1,57 @@
-"""The room of studio and live page in tiles."""
+"""The walls of studio and live page as pictures."""
 
 import numpy as np
-from hypothesis import given
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scanwright.report.colours import Bands, ramp
+from scanwright.report.colours import Bands
 from scanwright.report.room import Room
-from scanwright.serving.density_room import ACES_IN, ACES_OUT, BLIND, TILES, density_colours, room_tiles, unlit
+from scanwright.serving.density_room import BLIND, FINER, NODES, DensityRoom, density_colours
+from scanwright.serving.page_server import guarded_server
 
 sizes = st.tuples(*[st.floats(0.4, 8)] * 6)
 
 
-@given(sizes)
-def test_tiles_lie_on_the_walls_and_look_into_the_room(sizes):
-    room = Room(-np.array(sizes[:3]), np.array(sizes[3:]))
-    tiles = room_tiles(room)
-    on = np.isclose(tiles.middles_m, room.low) | np.isclose(tiles.middles_m, room.high)
-    assert on.any(axis=1).all()
-    inward = Rotation.from_quat(tiles.wxyz, scalar_first=True).apply([0, 0, 1])
-    np.testing.assert_allclose(tiles.normals, inward, atol=1e-12)
-    assert (np.sum(inward * tiles.middles_m, axis=1) < 0).all()  # the scanner is on their front
-    np.testing.assert_allclose(room.walls_along(tiles.directions), tiles.middles_m, atol=1e-9)
+@pytest.fixture(scope="module")
+def scene():
+    with guarded_server("a page") as (server, _):
+        yield server.scene
 
 
+@settings(max_examples=20)
 @given(sizes)
-def test_no_seam_shows_and_no_tile_reaches_far_out(sizes):
+def test_pictures_lie_on_the_walls_face_the_room_and_show_each_band_where_it_is(scene, sizes):
     room = Room(-np.array(sizes[:3]), np.array(sizes[3:]))
-    tiles = room_tiles(room)
-    assert TILES <= len(tiles.middles_m) < 1.5 * TILES
-    half = tiles.corners_m.max()
-    seeds = np.random.default_rng(1).uniform(room.low, room.high, (300, 3))
-    seeds[:, 2] = room.low[2]
-    floor = tiles.middles_m[tiles.normals[:, 2] > 0.5]
-    away = abs(seeds[:, None, :2] - floor[None, :, :2]).max(axis=2).min(axis=1)
-    assert (away <= half).all()
-    assert (abs(tiles.middles_m) <= np.maximum(-room.low, room.high) + 1e-9).all()
+    walls = DensityRoom(scene, room)
+    assert NODES / 2 < len(walls.directions) < 2 * NODES
+    walls.colour(np.where(walls.directions[:, 0] > 0, 15.0, 0.0), Bands((10, 20)))
+    for wall in (each.handle for each in walls.walls):
+        R = Rotation.from_quat(wall.wxyz, scalar_first=True).as_matrix()
+        assert R[:, 2] @ wall.position > 0  # the front, at -z, is towards the scanner
+        rows, columns = wall.image.shape[:2]
+        row, column = np.meshgrid(np.linspace(-0.5, 0.5, rows), np.linspace(-0.5, 0.5, columns), indexing="ij")
+        across = np.stack([column * wall.render_width, row * wall.render_height, 0 * row], axis=-1)
+        points = across @ R.T + wall.position
+        on = np.isclose(points, room.low) | np.isclose(points, room.high)
+        assert on.any(axis=-1).all()
+        blind = (wall.image[..., :3] == BLIND).all(axis=-1)
+        step_m = 1.01 * max(wall.render_width / (columns / FINER - 1), wall.render_height / (rows / FINER - 1))
+        assert blind[points[..., 0] < -step_m].all() and not blind[points[..., 0] > step_m].any()
+        assert (wall.image[..., 3] == 255).all()
+
+
+@given(sizes, st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 3), st.floats(0.01, 0.9))
+def test_a_ray_from_outside_meets_the_far_wall(sizes, target, along):
+    room = Room(-np.array(sizes[:3]), np.array(sizes[3:]))
+    inside = np.where(np.array(target) > 0, room.high, room.low) * np.abs(target) * 0.9
+    eye = 3 * room.walls_along(np.array([np.cos(along), np.sin(along), along]))
+    far = room.beyond(eye, inside - eye)
+    point = room.walls_along(far)
+    np.testing.assert_allclose(np.cross(point - eye, inside - eye), 0, atol=1e-6)
+    assert (point - eye) @ (inside - eye) >= (inside - eye) @ (inside - eye) - 1e-9  # beyond what is inside
+    assert room.beyond(eye, eye) is None and room.beyond(eye, np.zeros(3)) is None
 
 
 def test_rays_along_an_axis_meet_the_wall_across_it():
@@ -49,15 +65,3 @@ def test_colours_are_pale_exactly_where_no_beam_comes():
     assert [tuple(colour) == BLIND for colour in colours] == [True, True, False, False, False, False]
     assert len(np.unique(colours, axis=0)) == 4
     np.testing.assert_array_equal(colours[3], colours[4])
-
-
-def test_tiles_are_shown_in_the_colours_of_the_key():
-    """Through the light and the tone mapping of the page, here written anew; the brightest are beyond what it shows."""
-    colours = ramp(np.linspace(0, 0.9, 40))
-    for normal in ([0.0, 0, -1], [0.0, 0, 1]):
-        lamp = 0.7 * max(0.0, normal[2] * 2 / np.sqrt(1 + 0.36 + 4)) / np.pi
-        c = unlit(colours, np.tile(normal, (40, 1))) / 255 * (1 + lamp) / 0.6 @ ACES_IN.T
-        c = (c * (c + 0.0245786) - 0.000090537) / (c * (0.983729 * c + 0.4329510) + 0.238081) @ ACES_OUT.T
-        c = np.clip(c, 0, 1)
-        shown = 255 * np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
-        np.testing.assert_allclose(shown, colours, atol=12)  # of 8 bits in linear light

@@ -34,8 +34,8 @@ from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.state import MOST_DABS, Canvas, Dab, Setting, painted
 from scanwright.studio.task_file import save_task, task_text
 from scanwright.studio.view import workers
-from scanwright.studio.view.coloured_sphere import RADIUS_M, direction_hit, edges
 from scanwright.studio.view.latest_only import LatestOnly
+from scanwright.studio.view.outlines import edges
 from scanwright.studio.view.scanner_bodies import BodyMesh
 from scanwright.studio.view.view_3d import GHOST, View3D
 from scanwright.studio.view.workers import Order, Workers
@@ -189,19 +189,6 @@ def test_edges_lie_on_the_cones_of_the_task(loaded):
     np.testing.assert_allclose(weight @ np.array([1, 0, -1]) / 2**0.5, math.cos(math.radians(40)), atol=0.012)
 
 
-@given(azimuth=st.floats(-3, 3), height=st.floats(-0.9, 0.9), off=st.floats(0, 0.95))
-def test_a_ray_meets_the_far_wall(azimuth, height, off):
-    eye = 3 * RADIUS_M * np.array([math.cos(azimuth), math.sin(azimuth), height])
-    aside = np.cross(eye, [0.0, 0.0, 1.0])
-    ray = off * RADIUS_M * aside / np.linalg.norm(aside) - eye
-    far = direction_hit(eye, ray)
-    assert np.linalg.norm(far) == pytest.approx(1)
-    np.testing.assert_allclose(np.cross(RADIUS_M * far - eye, ray), 0, atol=1e-9)
-    assert (RADIUS_M * far - eye) @ ray > -eye @ ray  # beyond the middle
-    assert direction_hit(eye, eye) is None
-    assert direction_hit(eye, (0.0, 0.0, 0.0)) is None
-
-
 def test_of_many_wishes_the_last_is_done_and_then_the_rest():
     gate, begun, done, rested = threading.Event(), threading.Event(), [], []
 
@@ -328,7 +315,7 @@ def test_parts_and_scans_are_made_side_by_side_and_a_refusal_is_said(loaded, tmp
 def test_parts_of_an_earlier_setting_are_ghosts_until_the_new_ones_stand():
     body = (BodyMesh("box", np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32), (1, 2, 3)),)
     with guarded_server("a page") as (server, _):
-        view = View3D(server)
+        view = View3D(server, load_task(Path("ground_ahead")).task)
         view.show_bodies(SETTING, True, body)
         assert [handle.opacity for handle in view._bodies[True]] == [None]
         view.fade_bodies(True)
