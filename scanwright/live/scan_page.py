@@ -1,7 +1,6 @@
 """The page of a scan, in a separate process so that the scan never waits for a browser.
 
-The page is served, and said where, before any device is opened; on a terminal the browser is opened too, and given some
-seconds, so that the first scan is already seen.
+The page is served before any device is opened, so that it shows the first scan.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
     Args:
         folder: of the build.
         wanted: whether there is a page.
-        browse: opens an address; None for the person's browser where this runs on a terminal.
+        browse: opens an address; None for the default browser, on a terminal only.
 
     Raises:
         ScanwrightError: the page cannot be served.

@@ -1,8 +1,4 @@
-"""The assembly steps as HTML: only the Markdown that `assembly.md` uses.
-
-Headings, paragraphs, lists with `-`, pictures alone in a block, and in a line `**bold**` and backticks; anything else
-stays the text it is.
-"""
+"""The assembly steps as HTML: the Markdown that `assembly.md` uses, other text unchanged."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The scanner in 3D for the report: bodies of `assembly.glb`, their places in `exploded.glb`, axis, field of view.
+"""The scanner in 3D for the report: bodies, their exploded places, axis, field of view.
 
-The page draws this and reads no files: matrices are column by column, arrays little-endian in base64, all in the world
-frame in metres. Corners are in 65,535 steps of the body's box, and its matrices start from there.
+Matrices are column by column, arrays little-endian in base64, in the world frame in metres. Corners are in 65,535 steps
+of the box of the body, and its matrices start from there.
 """
 
 from __future__ import annotations

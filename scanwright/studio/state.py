@@ -88,24 +88,6 @@ class Dab:
         return ConeRegion(shape="cone", axis=axis, half_angle_deg=self.radius_deg, value=value)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Canvas:
-    """The task that is judged: equal for the same paint on the same loaded task."""
-
-    base: LoadedTask
-    dabs: tuple[Dab, ...] = ()
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Canvas) and self.base is other.base and self.dabs == other.dabs  # its maps are arrays
-
-    def __hash__(self) -> int:
-        return hash((id(self.base), self.dabs))
-
-    def painted(self) -> LoadedTask:
-        """Return the task with the paint."""
-        return painted(self.base, self.dabs)
-
-
 def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
     """Return the task with paint: dabs that hide join the masks, the others the weights."""
     if len(dabs) > MOST_DABS:

@@ -22,7 +22,7 @@ BRUSHES: tuple[Brush, ...] = get_args(Brush)
 class Controls:
     """Handles of all controls, put up for a task with the angles of a setting."""
 
-    def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Setting) -> None:
+    def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, setting: Setting) -> None:
         self.banner = gui.add_html(banner_html("running", (), lost=LOST))
         self.facts, self.mode, self.note, self.making = (gui.add_html("") for _ in range(4))
         self.undo = gui.add_button(UNDO, icon=viser.Icon.ARROW_BACK_UP, color=QUIET, disabled=True)
@@ -32,7 +32,6 @@ class Controls:
         self.brush_key = gui.add_command("Brush", description="Turn the brush on or off", hotkey="B")
         tabs = gui.add_tab_group()
         with tabs.add_tab("Angles"):
-            self.task = gui.add_dropdown("task", tasks, initial_value=tasks[0])
             self.pads = gui.add_html(pads_html(None))
             self.angles = tuple(
                 gui.add_slider(name, -bound, bound, 0.01, angle)

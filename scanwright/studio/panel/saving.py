@@ -21,7 +21,7 @@ class Saving:
         self._building: BuildProcess | None = None
 
     def save(self, loaded: LoadedTask, setting: Setting) -> Path:
-        """Write the task file, with the angles fixed at the setting where that is ticked."""
+        """Write the task file, with fixed angles if that is ticked."""
         c = self._controls
         name, fixed = c.name.value, setting if c.fixed.value else None
         text = task_text(loaded, self._folder, name, fixed)  # rejects a name that is a path
