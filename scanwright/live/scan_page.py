@@ -45,12 +45,8 @@ OPENED_S = 15.0  # at most until the browser has it
 def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | None = None) -> Iterator[Viewer]:
     """Serve the page of a build folder's scanner while the body runs; nothing if it is not wanted.
 
-    When the end of the scan was given to the viewer, this waits until no page is open, or for Ctrl-C.
-
-    Args:
-        folder: of the build.
-        wanted: whether there is a page.
-        browse: opens an address; None for the default browser, on a terminal only.
+    After the end of the scan this waits until no page is open, or for Ctrl-C. `browse` opens an address; None is the
+    default browser, on a terminal only.
 
     Raises:
         ScanwrightError: the page cannot be served.

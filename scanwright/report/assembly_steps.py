@@ -8,12 +8,7 @@ from collections.abc import Callable
 
 
 def steps_html(text: str, address: Callable[[str], str | None] = lambda _: None) -> str:
-    """Return HTML of the steps without the title; headings begin at the third level.
-
-    Args:
-        text: Markdown.
-        address: returns the address of a picture, None if there is none.
-    """
+    """Return HTML of the steps without the title, headings from the third level; `address` is that of a picture."""
     blocks = []
     for block in re.split(r"\n\s*\n", text.strip()):
         heading = re.fullmatch(r"(#+) (.*)", block)

@@ -61,13 +61,7 @@ def density_sphere(
     mounts: Iterable[TunedMount],
     shadow: SelfOcclusion | None = None,
 ) -> DensitySphere:
-    """Draw density of the scanner and of the reference mounts on one scale.
-
-    Args:
-        problem: the task, `problem_as_built`.
-        angles: what was built.
-        mounts: the reference mounts.
-        shadow: beams that the parts of the scanner block; None if they are not known.
+    """Draw the density of the scanner, without the beams that `shadow` blocks, and of the mounts, on one scale.
 
     Raises:
         BuildError: the shadow is of another number of beams.

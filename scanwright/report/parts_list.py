@@ -24,7 +24,7 @@ OTHERS = "Others"
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Rows of one kind, and the range of what they cost."""
+    """Rows of one kind."""
 
     title: str
     rows: tuple[Row, ...]

@@ -339,16 +339,21 @@ const inflated = async (text) => {
     leads.append(lead);
     return { body, mark, lead };
   });
+  // on a phone the column of names and the buttons have no room for another word
+  const mark = (word, point, both) => {
+    const [x, y] = point ? onPicture(both, point) : [0, 0];
+    const [left, top] = [x * canvas.clientWidth, y * canvas.clientHeight];
+    const taken = view === "scanner" && (left < 110 || (left > canvas.clientWidth - 170 && top > canvas.clientHeight - 70));
+    word.hidden = !point || (canvas.clientWidth < 520 && taken);
+    [word.style.left, word.style.top] = [`${left.toFixed(1)}px`, `${top.toFixed(1)}px`];
+  };
   // names are in a column next to the scanner, in the order of the heights of their parts
   const name = (both, turn) => {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     const tip = view === "scanner" ? grid?.tip : [scene.centre[0] + 1.4, scene.centre[1], scene.level];
-    ahead.hidden = !tip || (view === "scanner" && value("apart", 0) > 0);
-    if (!ahead.hidden) [ahead.style.left, ahead.style.top] = onPicture(both, tip).map((share) => `${(100 * share).toFixed(2)}%`);
     const shown = view === "scanner" && !picked && !spinning;
-    const axisMark = element("axis-mark");
-    axisMark.hidden = !shown;
-    if (shown) [axisMark.style.left, axisMark.style.top] = onPicture(both, product(scene.axis, scaled([0, 0, scene.reach], [1, 1, 1])).slice(12, 15)).map((share) => `${(100 * share).toFixed(2)}%`);
+    mark(ahead, view === "scanner" && value("apart", 0) > 0 ? null : tip, both);
+    mark(element("axis-mark"), shown && product(scene.axis, scaled([0, 0, scene.reach], [1, 1, 1])).slice(12, 15), both);
     const placed = labels.map(({ body, mark, lead }) => {
       const place = placeOf(body, turn);
       const at = [0, 1, 2].map((k) => (place[k] + place[4 + k] + place[8 + k]) / 2 + place[12 + k]); // of its box

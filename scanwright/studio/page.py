@@ -166,7 +166,7 @@ class Studio:
             field.on_update(noted)
         for field in (c.brush, c.radius):
             field.on_update(lambda _: self.brush.show())
-        c.painting.on_update(lambda _: self.brush.arm(self._guarded))
+        c.painting.on_update(self._guarded(self._arm))
         c.undo_key.on_trigger(self._guarded(undo))
         c.redo_key.on_trigger(self._guarded(redo))
         c.brush_key.on_trigger(lambda _: put(c.painting, not c.painting.value))
@@ -258,6 +258,12 @@ class Studio:
         masks = sum(dab.brush == "hidden" for dab in self._dabs)
         self.controls.painted.content = note_html(f"{len(self._dabs)} dabs, {masks} of them hide directions")
         self.judging.request(self.setting)
+
+    def _arm(self) -> None:
+        self.brush.arm(self._guarded)
+        if self.controls.painting.value and not self.controls.density.value:
+            put(self.controls.density, True)  # the brush paints on what is shown
+            self._show_density()
 
     def _show_density(self) -> None:
         self.view.show_density(self.controls.density.value)
