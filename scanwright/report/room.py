@@ -94,18 +94,15 @@ def one_scan(
     shadow: SelfOcclusion | None = None,
     most_rays: int = MOST_RAYS,
 ) -> Float32s:
-    """Return points of one full scan with the noise of the data sheet, thinned evenly.
+    """Return points of one full scan with the noise of the data sheet in the world [m], thinned evenly, shape (n, 3).
 
     Args:
-        scanner: its optical centre is the origin of the world.
+        scanner: with the optical centre at the origin of the world.
         joint_rad: axis angle of each line, shape (lines,).
-        placed: the scene; None for a furnished room.
-        folder: of the scene's file.
+        placed: the scene, in a file of `folder`; None for a furnished room.
+        folder: of the scene.
         shadow: beams that the parts of the scanner block; None if unknown.
         most_rays: largest number of rays.
-
-    Returns:
-        In the world [m], shape (n, 3).
 
     Raises:
         SceneError: the scene cannot be read.

@@ -6,6 +6,7 @@ in other processes. All visitors see and move the same setting.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
@@ -18,9 +19,11 @@ import viser
 
 from scanwright.design.angles import STANDARD_DEG, standard_settings
 from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.progress import Progress
 from scanwright.design.search.optimum import Optimum
 from scanwright.design.task.task import LoadedTask
 from scanwright.report.colours import bands_to
+from scanwright.serving.page_server import guarded_server, wait_until_alone
 from scanwright.serving.style import key_html, note_html
 from scanwright.studio.brush import PaintBrush
 from scanwright.studio.history import JOINED_S, History, PageState
@@ -37,6 +40,8 @@ from scanwright.studio.view.outlines import highest_density
 from scanwright.studio.view.view_3d import View3D
 from scanwright.studio.view.workers import Order, Workers
 
+_LOG = logging.getLogger(__name__)
+ALONE_S = 300.0  # without a visitor; a browser that restarts returns sooner
 FIRST_S = 30.0  # at most, for the first colours
 
 
@@ -275,10 +280,28 @@ class Studio:
         self.workers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
 
     def _show_scanner(self) -> None:
-        self.view.show_scanner(self.controls.scanner.value)
+        self.view.scanner.visible = self.controls.scanner.value
         self._order()
 
     def _change_scene(self) -> None:
         if self.controls.scene.value == NO_SCENE:
             self.view.show_points(np.empty((0, 3)))
         self._order()
+
+
+def run_studio(
+    loaded: LoadedTask, *, port: int, out: Path, progress: Progress, announce: Callable[[str], None]
+) -> None:
+    """Serve the studio until some minutes after the last visitor; raise TaskError if the port is taken."""
+    with guarded_server(f"Scanwright: {loaded.task.name}", port, recall=True) as (server, gate):
+        progress("reading the task (first run: compiling, about 5 s)")
+        studio = Studio(server, loaded, Path.cwd(), out)
+        try:
+            announce(gate.address)
+            studio.searching.begin()
+            progress(f"press Ctrl-C to end; without a visitor the studio ends after {ALONE_S / 60:g} minutes")
+            wait_until_alone(gate, ALONE_S)
+        finally:
+            studio.close()
+        for why, count in gate.refused.items():
+            _LOG.warning("refused %d requests: %s", count, why)

@@ -59,12 +59,13 @@ class Controls:
             self.table = gui.add_html("")
             self.kept = gui.add_dropdown("setting", ("rolling",), initial_value="rolling")
             self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
+        scenes = (NO_SCENE, ROOM) if loaded.task.scene is None else (NO_SCENE, ROOM, TASK_SCENE)
         with tabs.add_tab("View"):
             self.density = gui.add_checkbox("density", initial_value=True)
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
-            self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
+            self.scene = gui.add_dropdown("scan of", scenes, initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
-            self.name = gui.add_text("name", name_of_copy(loaded))
+            self.name = gui.add_text("name", f"{loaded.task.name}_mine"[:64])
             self.name_error = gui.add_html("")
             self.fixed = gui.add_checkbox(
                 "fix these angles", initial_value=False, hint="Write these angles instead of ranges to search"
@@ -96,13 +97,3 @@ class Controls:
 def put(control: Any, value: object) -> None:
     """Set the value of a control, which viser declares as read-only."""
     control.value = value
-
-
-def scan_scenes(loaded: LoadedTask) -> tuple[str, ...]:
-    """Return the scenes that can be scanned."""
-    return (NO_SCENE, ROOM, TASK_SCENE) if loaded.task.scene is not None else (NO_SCENE, ROOM)
-
-
-def name_of_copy(loaded: LoadedTask) -> str:
-    """Return the suggested name of a changed task."""
-    return f"{loaded.task.name}_mine"[:64]

@@ -38,7 +38,7 @@ class View3D:
         self.points = 0
         lit(self._scene)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
-        self._scanner = self._scene.add_frame("/scanner", show_axes=False)
+        self.scanner = self._scene.add_frame("/scanner", show_axes=False)
         self.room = room_about(task)
         self.walls = DensityRoom(self._scene, self.room)
         x, y, z = self.room.high - self.room.low
@@ -84,7 +84,7 @@ class View3D:
     def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:
         """Show the half of the scanner that turns, or the one that is fixed, in place of the previous one."""
         half = "turning" if turning else "standing"
-        self._scanner.wxyz = viser.transforms.SO3.from_matrix(R_world_rot(*setting.angles_rad[:2])).wxyz
+        self.scanner.wxyz = viser.transforms.SO3.from_matrix(R_world_rot(*setting.angles_rad[:2])).wxyz
         new = {f"/scanner/{half}/{body.name}": body for body in bodies}
         for handle in self._bodies[turning]:
             if handle.name not in new:
@@ -100,10 +100,6 @@ class View3D:
         """Show one half of the scanner as of an earlier setting, until `show_bodies` replaces it."""
         for handle in self._bodies[turning]:
             handle.opacity = GHOST
-
-    def show_scanner(self, visible: bool) -> None:
-        """Show or hide the scanner."""
-        self._scanner.visible = visible
 
     def show_points(self, points_m: Array) -> None:
         """Show a scan, coloured by height."""

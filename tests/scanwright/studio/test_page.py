@@ -19,7 +19,7 @@ from scanwright.report.colours import ramp
 from scanwright.serving import density_room
 from scanwright.serving.page_server import guarded_server
 from scanwright.studio.page import Studio
-from scanwright.studio.panel.build_process import BuildProcess
+from scanwright.studio.panel.saving import BuildProcess
 from scanwright.studio.state import Dab, Setting, painted
 from scanwright.studio.view import workers
 from scanwright.studio.view.scanner_bodies import BodyMesh
