@@ -30,7 +30,7 @@ COLOUR_BY: tuple[ColourBy, ...] = get_args(ColourBy)
 UNITS: dict[ColourBy, str] = {"height": " m", "range": " m", "intensity": "", "time": " s"}
 NO_CUT_M = 10.0  # of the slider: nothing is cut away
 CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
-MOST_POINTS = 5_000_000  # the page drops the oldest beyond, and says so
+MOST_POINTS = 5_000_000  # the page drops the oldest beyond
 POINT_M = 0.012  # 12 mm; the slider offers 2 to 50
 
 
@@ -72,13 +72,13 @@ class CloudView:
         self._key = server.gui.add_html("")
         self._size = server.gui.add_slider("point size [mm]", 2.0, 50.0, 1.0, 1000 * POINT_M)
         self.cut = server.gui.add_slider(
-            "cut above [m]", 0.0, NO_CUT_M, 0.1, NO_CUT_M, hint="Over the lowest point: takes the ceiling off"
+            "cut above [m]", 0.0, NO_CUT_M, 0.1, NO_CUT_M, hint="Above the lowest point: removes the ceiling"
         )
         self._walls: DensityRoom | None = None
         self._expected = server.gui.add_checkbox("expected density", initial_value=True, visible=False)
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
-        self.cut.on_update(lambda _: self._draw_all())
+        self.cut.on_update(lambda _: [self._draw(chunk) for chunk in list(self.chunks)])
         self._expected.on_update(lambda _: self._show_expected())
         self.ruler = Ruler(server, lambda: [chunk.points_m for chunk in list(self.chunks)])
         for name, suffix in (("Save as PLY", ".ply"), ("Save as web page", ".html")):
@@ -203,10 +203,6 @@ class CloudView:
             point_shading="flat",
             precision="float32",
         )
-
-    def _draw_all(self) -> None:
-        for chunk in list(self.chunks):
-            self._draw(chunk)
 
     def _shown(self, chunk: _Chunk) -> Int64[ndarray, " n"]:
         """Return the points below the cut, in a random order: the first of them are a thinned cloud."""

@@ -24,7 +24,7 @@ AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # three.js: a body has its 
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class WallPicture:
     """One picture; `rows` and `columns` interpolate between its nodes."""
 
     handle: viser.ImageHandle
@@ -49,7 +49,7 @@ class DensityRoom:
         self.frame = scene.add_frame("/room", show_axes=False, position=np.zeros(3) if centre_m is None else centre_m)
         size, middle = room.high - room.low, (room.low + room.high) / 2
         side = np.sqrt(2 * (size * np.roll(size, 1)).sum() / NODES)
-        self.walls, nodes = list[Wall](), []
+        self.walls, nodes = list[WallPicture](), []
         for axis, sign in ((axis, sign) for axis in range(3) for sign in (-1, 1)):
             right = np.eye(3)[(axis + 1) % 3]
             z = sign * np.eye(3)[axis]  # a picture is seen from its -z side
@@ -70,7 +70,7 @@ class DensityRoom:
                 cast_shadow=False,
                 receive_shadow=False,
             )
-            self.walls.append(Wall(handle, _finer(len(rows)), _finer(len(columns))))
+            self.walls.append(WallPicture(handle, _finer(len(rows)), _finer(len(columns))))
         points = np.concatenate(nodes)
         self.directions = points / np.linalg.norm(points, axis=1, keepdims=True)
         self._ends = np.cumsum([len(each) for each in nodes])[:-1]

@@ -133,7 +133,7 @@ def test_the_search_goes_on_to_the_next_setting_where_a_bed_is_too_small():
     setting_deg = (0, 40, -20, -70)
     scanner = on_bed_of(scanner_at(setting_deg, **SMALL), (60.0, 60.0, 60.0))
     answer = PartsWorkshop(scanner).shadow(np.radians(setting_deg))
-    assert isinstance(answer, Refused) and "as it is printed: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason
+    assert isinstance(answer, Refused) and "in its print pose: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason
 
 
 def test_a_module_that_the_task_requires_and_that_has_no_place_is_an_error():
