@@ -78,7 +78,7 @@ class CloudView:
         self._expected = server.gui.add_checkbox("expected density", initial_value=True, visible=False)
         self.by.on_update(lambda _: self._recolour())
         self._size.on_update(lambda _: self._resize())
-        self.cut.on_update(lambda _: [self._draw(chunk) for chunk in list(self.chunks)])
+        self.cut.on_update(lambda _: self._draw_all())
         self._expected.on_update(lambda _: self._show_expected())
         self.ruler = Ruler(server, lambda: [chunk.points_m for chunk in list(self.chunks)])
         for name, suffix in (("Save as PLY", ".ply"), ("Save as web page", ".html")):
@@ -203,6 +203,10 @@ class CloudView:
             point_shading="flat",
             precision="float32",
         )
+
+    def _draw_all(self) -> None:
+        for chunk in list(self.chunks):
+            self._draw(chunk)
 
     def _shown(self, chunk: _Chunk) -> Int64[ndarray, " n"]:
         """Return the points below the cut, in a random order: the first of them are a thinned cloud."""
