@@ -80,7 +80,7 @@ class PlaneFigures:
         gaps = f"gaps of {rounded(self.gap_cm)} {at}"
         if self.gap_off_axis_cm < SPOT * self.gap_cm:
             gaps = f"gaps of {rounded(self.gap_off_axis_cm)} {at}, {rounded(self.gap_cm)} around the axis"
-        twice = f"an object {rounded(self.twice_cm)} cm wide is hit twice at any place"
+        twice = f"an object {rounded(self.twice_cm)} cm wide is hit twice even at the worst place"
         return f"{self.region}: {part}{rounded(self.points_per_m2)} points per m2, {gaps}; {twice}"
 
 
