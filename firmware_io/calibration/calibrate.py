@@ -91,8 +91,8 @@ def calibrate_recordings(
     opened = [open_recording(path) for path in recordings]
     beams, left_out = gather(opened, one_place=one_place, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
     mount, start = Mount.of(angles), start_vector(angles)
-    remarks = {line for each in opened for line in about_sensor(each, angles.sensor)}
-    sensor = sorted(line.partition(": ")[2] for line in remarks)
+    remarks = sorted({line for each in opened for line in about_sensor(each, angles.sensor)})
+    sensor = [line.removeprefix("warning: ") for line in remarks if line.startswith("warning: ")]
     progress(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
     try:
         result = estimate(beams, mount, start)
