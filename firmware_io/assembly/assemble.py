@@ -228,8 +228,9 @@ def about_sensor(source: Recording, sensor: str) -> Iterator[str]:
     """Warn of scans that are not of the sensor of the angle set, whose cloud would be distorted."""
     lidars = {name: lidar for name, lidar in load_catalogue().products.items() if isinstance(lidar, Lidar)}
     if sensor not in lidars:
-        near = suggest(sensor, lidars)
-        yield f"note: sensor '{sensor}' is no lidar of the catalogue{near}: its beams and range limits are not compared"
+        near, known = suggest(sensor, lidars), "; known: "
+        near = near if known not in near else ""
+        yield f"note: sensor '{sensor}' is no lidar of the catalogue{near}: its beams are not compared"
         return
     named = lidars[sensor]
     # a scan can be incomplete: packets are lost
