@@ -29,6 +29,7 @@ from scanwright.design.angles import load_angles
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording
 from scanwright.firmware_io.calibration import entropy
+from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 from scanwright.firmware_io.calibration.estimate import estimate
 from scanwright.firmware_io.calibration.model import PARAMETERS, gather
 from scanwright.firmware_io.recording.importer import import_bag
@@ -228,6 +229,13 @@ def test_the_same_beams_do_not_count_twice(room, tmp_path, command):
     code, _, complaints = command("calibrate", room[0], room[0], "--angles", room[1], "-o", tmp_path / "a.json")
     assert (code, len(complaints)) == (2, 1)
     assert "given twice" in complaints[0]
+
+
+def test_scans_of_another_lidar_than_that_of_the_angle_set_are_named(tmp_path):
+    recording = write(tmp_path / "r.mcap", simulate(FURNISHED, HALF, Truth()))
+    angles = designed(HALF).model_copy(update={"sensor": "URG-04LX"})
+    with pytest.raises(RecordingError, match=r"seen twice: .* of URG-04LX from .*: use the angle set of the scanner"):
+        calibrate_recordings([recording], angles, tmp_path / "a.json")
 
 
 def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, command):
