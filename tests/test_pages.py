@@ -1,5 +1,6 @@
 """The front page keeps its promises: short, its Python runs, its links and commands exist."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -58,3 +59,17 @@ def test_paths_of_the_project_exist(page):
 
 def test_pictures_are_small():
     assert all(picture.stat().st_size <= 500_000 for picture in (ROOT / "docs/pictures").iterdir())
+
+
+def test_the_angle_set_of_a_page_is_valid_and_its_comparison_runs(tmp_path, capsys, monkeypatch):
+    (block,) = re.findall(r"```json\n(.*?)```", (ROOT / "docs/how-to/a-bag.md").read_text(), re.DOTALL)
+    (tmp_path / "mine.json").write_text(block)
+    assert sw.load_angles(tmp_path / "mine.json").t_rot_laser_mm == (0, -80, 0)
+    (tmp_path / "out" / "ground_ahead").mkdir(parents=True)
+    moving = json.loads(block) | {"sensor": "LD19", "motion": {"mode": "spin", "period_s": 4}}
+    (tmp_path / "out" / "ground_ahead" / "angles.json").write_text(json.dumps(moving))
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/how-to/calibrate.md").read_text(), re.DOTALL)
+    exec(compile(code, "calibrate.md", "exec"), {})
+    median_mm = float(capsys.readouterr().out.split()[1])
+    assert 1 < median_mm < 30  # of 0.5 deg at most in a room of some metres

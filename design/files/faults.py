@@ -30,7 +30,7 @@ class Fault:
     message: str
 
     def __str__(self) -> str:
-        return f"{'.'.join(self.path) or '(entire file)'}{self.message}"
+        return f"{'.'.join(self.path) or '(entire file)'}{self.message}".removeprefix("(entire file): ")
 
 
 def format_validation_error(error: ValidationError, source: Path | str, model: type[BaseModel]) -> str:

@@ -169,7 +169,7 @@ def assemble_recording(
         left_out=_left_out(counts),
         notes=(
             notes,
-            *_about_sensor(source, angles.sensor),
+            *about_sensor(source, angles.sensor),
             *(*_about_gaps(source), *_about_poses(platform), *_about_own_body(own_body, source)),
             *_about_slivers(clouds, per),
         ),
@@ -224,11 +224,15 @@ def _extent_rad(scan: Scan) -> float:
     return float(np.ptp(scan.bearing_rad)) if scan.bearing_rad.size else 0.0
 
 
-def _about_sensor(source: Recording, sensor: str) -> Iterator[str]:
+def about_sensor(source: Recording, sensor: str) -> Iterator[str]:
     """Warn of scans that are not of the sensor of the angle set, whose cloud would be distorted."""
-    named = load_catalogue().products.get(sensor)
-    if not isinstance(named, Lidar):
+    lidars = {name: lidar for name, lidar in load_catalogue().products.items() if isinstance(lidar, Lidar)}
+    if sensor not in lidars:
+        near, known = suggest(sensor, lidars), "; known: "
+        near = near if known not in near else ""
+        yield f"note: sensor '{sensor}' is no lidar of the catalogue{near}: its beams are not compared"
         return
+    named = lidars[sensor]
     # a scan can be incomplete: packets are lost
     scan = max(islice(source.scans(), _FIRST_SCANS), key=_extent_rad)
     own_deg, scan_deg = np.degrees(named.bearings_rad()), np.degrees(np.sort(scan.bearing_rad))

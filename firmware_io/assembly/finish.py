@@ -59,7 +59,7 @@ def finish_clouds(
         target = out.with_name(f"{path.stem}{out.suffix}")
         wrote = write_clouds(target, [cloud], organised=options.organised)
         rows += wrote.rows
-        notes += [line for line in wrote.notes if line not in notes]
+        notes += [line for each in wrote.notes if (line := f"note: {each}") not in notes]
         written += wrote.paths
     return replace(
         summary,

@@ -16,6 +16,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.design.progress import Progress, no_progress
+from scanwright.firmware_io.assembly.assemble import about_sensor
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.entropy import witness
 from scanwright.firmware_io.calibration.estimate import Estimate, estimate
@@ -90,13 +91,15 @@ def calibrate_recordings(
     opened = [open_recording(path) for path in recordings]
     beams, left_out = gather(opened, one_place=one_place, own_body=own_body, gamma_rot_rad=gamma_rot_rad)
     mount, start = Mount.of(angles), start_vector(angles)
+    remarks = sorted({line for each in opened for line in about_sensor(each, angles.sensor)})
+    sensor = [line.removeprefix("warning: ") for line in remarks if line.startswith("warning: ")]
     progress(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
     try:
         result = estimate(beams, mount, start)
     except RecordingError as refusal:
         progress("estimating the time offset of the angles")
         named = ", ".join(str(path) for path in recordings)
-        raise RecordingError(f"{named}: {refusal}{_late(opened)}") from refusal
+        raise RecordingError(f"{named}: {'. '.join([str(refusal) + _late(opened), *sensor])}") from refusal
     progress("comparing with the entropy of the cloud")
     seen = witness(mount, beams, fan_side(beams, mount), start, result.x, result.noise_m)
     record = {
@@ -104,6 +107,7 @@ def calibrate_recordings(
         "left_out": left_out,
         **calibration_report(result, start, mount, beams, seen),
     }
+    record["notes"] += sensor
     calibration = Calibration(calibrated(angles, result), record, out)
     with atomic_write(report_path(out), RecordingError) as part:
         part.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
@@ -119,7 +123,7 @@ def _late(opened: Sequence[Recording]) -> str:
         with suppress(RecordingError):
             lag = find_lag(recording)
             if abs(lag.late_s) < 2 * lag.sd_s:
-                return f". Its angles are late by 0 within the error of {lag.sd_s:.3f} s"
+                return f". Its angles show no delay, with an uncertainty of {lag.sd_s:.3f} s"
             return (
                 f". There and back, {recording.path.name} agrees best with angles {lag.late_s:.3f} +- {lag.sd_s:.3f} s "
                 f"late, in which 0.1 deg of backlash would be {math.radians(0.05) / lag.speed_rad_s:.3f} s"

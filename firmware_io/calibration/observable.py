@@ -86,7 +86,9 @@ def choose_observable(
             f"too little is seen twice: {twice:.1%} of the flat surface is seen by both sides of the fan (needed: "
             f"{_TWICE:.0%}); the axis turned {turned_deg:.0f} deg. Mounting errors then look like another shape of the "
             "scene: record a full turn. A scanner that can only tilt shows them only if both ends of its fan see the "
-            f"same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches"
+            f"same walls. The ranges scatter by {1e3 * tiles.noise_m:.1f} mm on flat patches: if that is far above the "
+            "noise of the lidar, times or bearings were wrong, or the base moved; wrong angles or lever arms do not "
+            "show in it"
         )
     free = np.array(MOUNT)
     sd = _sd(reduced(normal, grouping, free, BUILDERS_BULGE_M), free)

@@ -204,4 +204,4 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
         yield f"error: {fault}"
     for entry in record["parameters"]:
         if entry["name"] == "lag_s" and abs(entry["value"]) > _SURE * entry["sd"]:
-            yield f"the angles are late: lag_s = {entry['value'] / 1e3:.6f} corrects them"
+            yield f"the angles of these recordings are late: lag_s = {entry['value'] / 1e3:.6f} corrects them"

@@ -19,7 +19,6 @@ from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
 from scanwright.firmware_io.tables import csv_rows
 
-IMU = "sensor_msgs/msg/Imu"
 STATIC = "/tf_static"
 _COLUMNS = {
     f"w{axis}": {f"w{axis}", f"gyro_{axis}", f"w_rs_s_{axis}", f"angular_velocity_{axis}", f"omega_{axis}"}
@@ -33,14 +32,18 @@ def load_gyro(spec: str, recording: Path) -> Gyro:
     if path.is_file():
         return _sorted(spec, list(csv_rows(path, _COLUMNS)), "")
     topics = read_topics(recording)
-    if topics.get(spec) != IMU:
-        known = {name for name, kind in topics.items() if kind == IMU}
-        is_what = f"{topics[spec]}, not {IMU}" if spec in topics else f"neither a file nor a topic of {recording}"
+    if topics.get(spec) != ros_messages.IMU:
+        known = {name for name, kind in topics.items() if kind == ros_messages.IMU}
+        is_what = (
+            f"{topics[spec]}, not {ros_messages.IMU}"
+            if spec in topics
+            else f"neither a file nor a topic of {recording}"
+        )
         raise RecordingError(f"imu {spec}: {is_what}{suggest(spec, known) if known else ', which has no Imu'}")
     rows: list[tuple[int, tuple[float, ...]]] = []
     frames: set[str] = set()
     for _, data in read_messages(recording, {spec}):
-        message = foreign(f"{recording}: a message of {spec}", ros_messages.decode_message, data, IMU)
+        message = foreign(f"{recording}: a message of {spec}", ros_messages.decode_message, data, ros_messages.IMU)
         if message.angular_velocity_covariance[0] == -1:  # REP 145: not measured
             raise RecordingError(f"{recording}: {spec}: this IMU measures no rate of turn")
         rate = message.angular_velocity

@@ -20,6 +20,7 @@ from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.bags import Source, numbers_at
+from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
 from scanwright.firmware_io.tables import csv_rows
 
@@ -112,24 +113,32 @@ def read_table(text: str) -> tuple[Times, Floats]:
     return time_ns, angle
 
 
-def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[str]:
-    """Yield evidence for another unit: wraps, speed, range, integers; `log`: `angle` unwrapped."""
+def unit_doubts(time_ns: Times, angle: Floats, log: JointLog, angle_unit: str) -> Iterator[tuple[str, str]]:
+    """Yield evidence for another unit (wraps, speed, range, integers) and a hint; `log`: `angle` unwrapped."""
     counts = _counts_of_turn(angle)
     if counts and angle_unit in ("deg", "rad"):
-        yield f"angles are integers from 0 to nearly {counts}: is the unit {counts}/turn?"
+        yield f"angles are integers from 0 to nearly {counts}: is the unit {counts}/turn?", _unit(f"{counts}/turn")
         return
     if angle_unit not in ("deg", "rad"):
         return
-    yield from _unlikely_motion(time_ns, angle, log, angle_unit)
+    other = "deg" if angle_unit == "rad" else "rad"
+    for doubt in _unlikely_motion(time_ns, angle, log, angle_unit):
+        yield doubt, _unit(other)
     if np.any(angle != np.round(angle)):
         return
     if angle_unit == "rad":
-        yield "every angle is a whole number of radians: is the unit deg?"
+        yield "every angle is a whole number of radians: is the unit deg?", _unit(other)
     else:
         yield (
             "every angle is a whole number of degrees, as a commanded angle is: the rounding alone moves points by up "
-            "to 9 mm per metre of range, in addition to the delay from command to motion"
+            f"to {1000 * AT_M * math.radians(0.5):.0f} mm at {AT_M:g} m, in addition to the delay from command to "
+            "motion",
+            "publish the measured angle, with its fractions of a degree",
         )
+
+
+def _unit(name: str) -> str:
+    return f"if so, angle_unit = {name}"
 
 
 def _counts_of_turn(angle: Floats) -> int:

@@ -112,9 +112,12 @@ def _overlap(a_ns: Times, b_ns: Times) -> bool:
     return bool(max(a_ns.min(), b_ns.min()) <= min(a_ns.max(), b_ns.max()))
 
 
-def gap_warnings(log: JointLog) -> Iterator[str]:
-    """Yield a warning of a long gap between two angles."""
+def gap_warnings(log: JointLog) -> Iterator[tuple[str, float]]:
+    """Yield a warning of a long gap between two angles, and the gap [s]."""
     gaps_s = np.diff(log.time_ns) / 1e9
     if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
         usual = f"usually {np.median(gaps_s):.3f} s"
-        yield f"between two angles lie up to {gaps_s.max():.2f} s ({usual}): the angle goes straight across"
+        yield (
+            f"between two angles lie up to {gaps_s.max():.2f} s ({usual}): the angle goes straight across",
+            float(gaps_s.max()),
+        )

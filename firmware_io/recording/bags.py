@@ -12,7 +12,7 @@ import math
 import re
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,9 @@ from scanwright.firmware_io.recording.mcap_chunks import profile_of, unchunked_m
 _STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
 _SEQUENCES = (list, tuple, np.ndarray)
 _SUFFIXES = (".bag", ".mcap", ".db3")
+_NUMBERS = ("a float", "a int", ros_messages.QUATERNION)
+_MOST_USES = 3  # of a topic
+_COPIED = {ros_messages.IMU: "--imu", "nav_msgs/msg/Odometry": "--poses", "geometry_msgs/msg/PoseStamped": "--poses"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,19 @@ class Bag:
                     "does not come with it; record it again as MCAP, which holds definitions"
                 )
 
+    def lines(self) -> list[str]:
+        """Return a line for each topic: type, count, rate and the options that can use it."""
+        rows = []
+        for topic, kind in sorted(self.topics.items()):
+            count = sum(each.msgcount for each in self._reader.connections if each.topic == topic)
+            rate_hz = 1e9 * count / max(self._reader.duration, 1)
+            uses = list[str]()
+            with suppress(RecordingError):  # a type that cannot be decoded has no use
+                uses = _uses(topic, next(self.messages({topic})).body) if count else []
+            rows.append((topic, kind, f"{count:,}", f"{rate_hz:.1f} Hz", " or ".join(uses)))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:4]
+        return ["  ".join([*map(str.ljust, row, widths), row[4]]).rstrip() for row in rows]
+
     def messages(self, topics: set[str]) -> Iterator[Message]:
         """Yield the decoded messages of these topics in the order of recording."""
         self.check(topics)
@@ -111,10 +127,32 @@ def open_bag(path: Path, *more: Path) -> Iterator[Bag]:
         reader.close()
 
 
-def topics_in(paths: Sequence[Path]) -> str:
-    """Return the topics of a bag with their types, in words; raises as `open_bag`."""
+def topic_lines(paths: Sequence[Path]) -> list[str]:
+    """Return the topics of a bag with type, count, rate and the options that can use them; raises as `open_bag`."""
     with open_bag(*paths) as bag:
-        return ", ".join(f"{topic} ({kind})" for topic, kind in sorted(bag.topics.items())) or "no topic"
+        return bag.lines() or ["no topic"]
+
+
+def _uses(topic: str, body: Any) -> list[str]:
+    """Return options of `import` for a topic with such messages."""
+    kind, uses = _kind(body), list[str]()
+    if kind in (ros_messages.LASER_SCAN, ros_messages.MULTI_ECHO):
+        return [f"--scan {topic}"]
+    if kind == ros_messages.JOINT_STATE:
+        return [f"--angle {topic}:{name}" for name in body.name[:_MOST_USES]]
+    if kind == ros_messages.TRANSFORMS:
+        frames = dict.fromkeys((each.header.frame_id, each.child_frame_id) for each in body.transforms)
+        return [f"--angle {topic}:{parent}:{child}" for parent, child in list(frames)[:_MOST_USES]]
+    if kind in _COPIED:
+        return [f"--also {topic}, for assemble {_COPIED[kind]} {topic}"]
+    for name in _fields(body):
+        value = getattr(body, name)
+        if _kind(value) in (ros_messages.LASER_SCAN, ros_messages.MULTI_ECHO):
+            uses.append(f"--scan {topic}:{name}")
+        elif _kind(value) in _NUMBERS or (isinstance(value, np.ndarray) and 0 < value.size <= _MOST_USES):
+            item = "[0]" if isinstance(value, np.ndarray) else ""
+            uses.append(f"--angle {topic}" if name == "data" and not item else f"--angle {topic}:{name}{item}")
+    return uses
 
 
 def _bag_file(path: Path) -> Path:
@@ -229,8 +267,7 @@ def numbers_at(body: Any, source: Source, bag: Path) -> tuple[tuple[float, ...],
         return (float(value.x), float(value.y), float(value.z), float(value.w)), stamp_ns
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         path = f"{source}." if source.field else f"{source.topic}:"
-        usable = ("a float", "a int", ros_messages.QUATERNION)
-        numbers = [f"{path}{name}" for name in _fields(value) if _kind(getattr(value, name)) in usable]
+        numbers = [f"{path}{name}" for name in _fields(value) if _kind(getattr(value, name)) in _NUMBERS]
         hint = f"; did you mean '{numbers[0]}'?" if numbers else "; name one number in it, for example position[0]"
         raise RecordingError(f"{bag}: {source} is {_kind(value)}, not a number{hint}")
     return (float(value),), stamp_ns

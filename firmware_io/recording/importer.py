@@ -34,6 +34,8 @@ from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, op
 from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
 from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, without_far
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
+from scanwright.firmware_io.recording.import_checks.headers import AT_M
+from scanwright.firmware_io.recording.import_checks.imu import imu_findings
 from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
 from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
@@ -47,6 +49,9 @@ from scanwright.firmware_io.recording.recording import (
 from scanwright.firmware_io.samples import JointLog, with_all_echoes
 
 _AS_IT_IS = Corrections()
+_DELAY = "stamp scans and angles with one clock; scan_offset_s = 0.01 delays scans, calibrate estimates the delay"
+_ZERO_BEYOND = 0.2  # of the sweep
+_PER_SCAN = 1.2  # angles per scan; fewer are one for each scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,7 @@ class ImportSummary:
         angle_deg: smallest and largest angle of the joint log.
         left_out: dropped scans or angles, reason -> count.
         findings: of the checks.
+        geometry: of the scans, as one line.
     """
 
     out: Path
@@ -72,6 +78,7 @@ class ImportSummary:
     angle_deg: tuple[float, float]
     left_out: dict[str, int]
     findings: tuple[Finding, ...]
+    geometry: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -91,6 +98,7 @@ class ImportSummary:
         ]
         return [
             *texts,
+            *([f"scans: {self.geometry}"] if self.geometry else []),
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
             f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
             f"{high:z.2f} deg, {self.duration_s:.1f} s, to {self.out}",
@@ -153,16 +161,20 @@ def import_bag(
             raise RecordingError(f"{parts[0]}: no scan falls into the time of the angles: {spans}")
         log, left_out = _joint_log(clock, survey, unit_rad, corrections)
         still = hold or rests_in_scans(note_in(opened))
-        findings = [_remark("clock", note) for note in (clock.note, survey.angle_note) if note]
-        unit_notes = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
-        findings += [_remark("angle_unit", note) for note in unit_notes]
+        speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
+        cost = f"; 10 ms of it are {10 * AT_M * speed_rad_s:,.0f} mm at {AT_M:g} m at this speed" if speed_rad_s else ""
+        findings = [_remark("clock", clock.note + cost, _DELAY)] if clock.note else []
+        if survey.angle_note:
+            findings.append(_remark("angle_zero", survey.angle_note, "angle_zero sets the joint position 0"))
+        doubts = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
+        findings += [_remark("angle_unit", doubt, hint) for doubt, hint in doubts]
         findings += sample_findings(
             headers.corrected(increment_s, corrections),
             Stamps(clock.scan_ns, survey.scan_stamps.receive_ns),
             survey.angle_stamps,
             clock.angle_ns,
             survey.angle * unit_rad,
-            0.0 if still else usual_speed_rad_s(log),
+            speed_rad_s,
             at_rest=still,
             dropped=corrections.drop_outliers,
             stamped=not clock.note and corrections.stamp != "receipt",
@@ -170,19 +182,21 @@ def import_bag(
             same_clock=angle_source is not None and angle_source.topic == scan_source.topic,
         )
         findings += _scan_findings(survey)
+        findings += imu_findings(opened, survey.angle_stamps.receive_ns, np.unwrap(survey.angle * unit_rad), also)
+        findings += _zero_outside(log, unit_rad, corrections)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"
-            findings.append(_remark("clock", also_note))
+            findings.append(_remark("also_clock", also_note, "give them, the scans and the angles stamps of one clock"))
         if outside.any():
             none = f"{np.sum(outside)} scans begin before the first or after the last angle: no point of them"
-            findings.append(_remark("scans_outside", none))
+            findings.append(_remark("scans_outside", none, "record the angles from before the first scan to its end"))
         if hold:
             log, cut = log_at_rest(log, clock.scan_ns, arc_ns)
             if cut:
                 short = f"{cut} scans end after the next one begins: their last beams take its angle"
-                findings.append(_remark("scans_overlap", short))
+                findings.append(_remark("scans_overlap", short, 'time_increment = "auto" if that of the scans is long'))
         if not still:
-            findings += [_remark("angle_gaps", gap) for gap in gap_warnings(log)]
+            findings += _between_angles(log, clock.scan_ns, speed_rad_s)
         note = {
             "schema": "scanwright/recording/1",
             "source": parts[0].name,
@@ -203,7 +217,20 @@ def import_bag(
         angle_deg=(math.degrees(log.position_rad.min()), math.degrees(log.position_rad.max())),
         left_out=dict(left_out),
         findings=tuple(findings),
+        geometry=_geometry(survey),
     )
+
+
+def _geometry(survey: BagSurvey) -> str:
+    """Describe the scans by what identifies a lidar."""
+    headers = survey.headers
+    low, high = int(headers.beams.min()), int(headers.beams.max())
+    beams = f"{low:,}" if low == high else f"{low:,} to {high:,}"
+    span_deg, step_deg = (math.degrees(float(np.median(np.abs(x)))) for x in (headers.span_rad, headers.step_rad))
+    turn_s = headers.mirror_turn_s
+    rate = f", a turn in {turn_s:.4g} s" if turn_s else ""
+    limits = f"range limits {survey.range_limits_m[0]:.4g} to {survey.range_limits_m[1]:.4g} m"
+    return f"{beams} beams over {span_deg:.5g} deg, step {step_deg:.4g} deg{rate}, {limits}"
 
 
 def _check_target(out: Path, bags: Sequence[Path]) -> None:
@@ -239,20 +266,58 @@ def _corrected(clock: OneClock, survey: BagSurvey, arc_ns: Times, corrections: C
     return OneClock(scan_ns + round(1e9 * corrections.scan_offset_s), angle_ns, note)
 
 
-def _remark(code: str, message: str) -> Finding:
-    return Finding(code, "warning", "recording", message)
+def _remark(code: str, message: str, hint: str) -> Finding:
+    return Finding(code, "warning", "recording", message, hint=hint)
 
 
 def _scan_findings(survey: BagSurvey) -> Iterator[Finding]:
     beams = survey.headers.beams
     if survey.left_out["empty_scan"]:
-        yield _remark("empty_scans", f"{survey.left_out['empty_scan']} scans have no beam and are left out")
+        none = f"{survey.left_out['empty_scan']} scans have no beam and are left out: no points at their angles"
+        yield _remark("empty_scans", none, "check the connection of the lidar; a few at its start do no harm")
     if np.ptp(beams):
-        many = f"scans have {beams.min()} to {beams.max()} beams: beam i is not the same direction in each"
-        yield _remark("ragged_scans", many)
+        many = f"scans have {beams.min()} to {beams.max()} beams; each is placed by its own header"
+        if np.ptp(survey.headers.step_rad):
+            yield Finding("ragged_scans", "note", "recording", many)
+        else:
+            lost_mm = 1000 * AT_M * float(np.ptp(beams) * np.median(np.abs(survey.headers.step_rad)))
+            lost = f"{many}, all with one angle_increment: if beams are missing inside a scan, those after them are off"
+            hint = 'bearings = "limits" if all scans cover the same angle'
+            yield _remark("ragged_scans", f"{lost} by up to {lost_mm:,.0f} mm at {AT_M:g} m", hint)
     if survey.endless:
         none = f"{survey.endless} scans have a range_max not above range_min: no longest range is applied"
-        yield _remark("no_range_max", none)
+        yield _remark("no_range_max", none, "no_return_from_m = 30 drops ranges from the longest one of the lidar on")
+
+
+def _zero_outside(log: JointLog, unit_rad: float, corrections: Corrections) -> Iterator[Finding]:
+    """Note that a sweep never comes near joint position 0, at which the angle set describes the scanner."""
+    low, high = float(log.position_rad.min()), float(log.position_rad.max())
+    beyond = max(low, -high) > _ZERO_BEYOND * (high - low)
+    if beyond and not corrections.angle_zero and high - low < 2 * math.pi:
+        middle = (low + high) / 2 / corrections.angle_scale
+        square = round(middle / (math.pi / 2)) * math.pi / 2
+        zero = (square if abs(square - middle) < (high - low) / 4 else middle) / unit_rad
+        yield Finding(
+            "zero_outside",
+            "note",
+            "angle",
+            "the axis never comes near joint position 0, at which the angle set describes the scanner",
+            hint=f"angle_zero = {zero:.6g} if it is level there",
+        )
+
+
+def _between_angles(log: JointLog, scan_ns: Times, speed_rad_s: float) -> Iterator[Finding]:
+    """Report sparse angles: with gaps, or only one for each scan."""
+    for gap, gap_s in gap_warnings(log):
+        off_mm = 1000 * AT_M * speed_rad_s * gap_s / 2
+        cost = f", up to {off_mm:,.0f} mm off at {AT_M:g} m at this speed if it turned back" if off_mm else ""
+        yield _remark("angle_gaps", gap + cost, "publish angles at 50 Hz or more; distrust walls seen at these times")
+    moving = np.abs(np.diff(log.position_rad)) > 0
+    if log.time_ns.size <= _PER_SCAN * scan_ns.size and moving.any():
+        step_mm = 1000 * AT_M * float(np.median(np.abs(np.diff(log.position_rad))[moving]))
+        one = f"{log.time_ns.size:,} angles for {scan_ns.size:,} scans: the axis is taken to turn evenly between them"
+        cost = f"; if it rested during each scan, beams are up to {step_mm:,.0f} mm off at {AT_M:g} m"
+        yield _remark("angles_sparse", one + cost, "hold = true if the axis rested; otherwise publish angles at 50 Hz")
 
 
 def _write(

@@ -25,6 +25,7 @@ QUATERNION = "geometry_msgs/msg/Quaternion"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
+IMU = "sensor_msgs/msg/Imu"
 TEXT = "std_msgs/msg/String"
 POINT_FIELD_TYPES = {"<f8": 8, "<f4": 7, "<u4": 6, "<u2": 4}
 """`sensor_msgs/PointField`: FLOAT64, FLOAT32, UINT32, UINT16."""

@@ -64,11 +64,13 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
     with ThreadPoolExecutor(max(len(examinations), 1)) as together:  # as a scan reads them
         for findings in together.map(list[Finding], examinations):
             yield from findings
+    elsewhere = [file.parent for file in sorted(Path("out").glob("*/emulated.json")) if emulated(file.parent)]
+    named = "".join(f"; an emulated scanner runs: name its build folder {folder}" for folder in elsewhere)
     if not lidars:
-        hint = "plug it in, power it, or name its port or HOST:PORT"
+        hint = "plug it in, power it, or name its port or HOST:PORT" + named
         yield Finding("lidar_absent", "error", "lidar", "no lidar with a USB id of the catalogue", hint=hint)
     if not servos:
-        hint = "plug in its U2D2 or USB2Dynamixel, or name the port of another adapter"
+        hint = "plug in its U2D2 or USB2Dynamixel, or name the port of another adapter" + named
         yield Finding("servo_absent", "error", "servo", "no adapter of a servo on USB", hint=hint)
 
 

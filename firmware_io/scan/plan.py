@@ -50,7 +50,7 @@ class ScanPlan:
         """Describe the plan."""
         emulated = f" (emulated by process {self.ports.pid})" if self.ports.pid else ""
         each = f"{self.motion.mode} of {self.motion.duration_s:g} s"
-        recorded = [f"{self.turns} x {each}: {self.duration_s:g} s of recording", f"recording {self.recording}"]
+        recorded = [f"{self.turns} x {each}: {self.duration_s:g} s of recording", f"output {self.recording}"]
         return [
             f"lidar {self.angles.sensor} at {self.ports.lidar}{emulated}",
             f"servo {self.angles.servo} at {self.ports.servo}{emulated}",

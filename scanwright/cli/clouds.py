@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, show_result, verbosity
+from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, show, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.design.errors import RecordingError
@@ -52,12 +52,13 @@ def import_(
     that costs at 5 m, and the option that corrects it.
     """
     from scanwright import api
-    from scanwright.firmware_io.recording.bags import topics_in
+    from scanwright.firmware_io.recording.bags import topic_lines
 
     if scan is None or angle is None or out is None:
         needed = {"--scan": scan, "--angle": angle, "--out": out}
         missing = ", ".join(option for option, value in needed.items() if value is None)
-        raise RecordingError(f"missing {missing}; {bag[0]} has {topics_in(bag)}")
+        show(topic_lines(bag))
+        raise RecordingError(f"missing {missing}: choose them from the topics of {bag[0]}, listed above")
     if time_increment is not None:
         options = replace(options, time_increment=read_time_increment(time_increment))
     summary = api.import_bag(

@@ -110,7 +110,7 @@ def show(lines: Iterable[str]) -> None:
         if warning:
             warn([line.removeprefix("warning: ")])
         else:
-            print(wrapped(line, sys.stdout))
+            print(wrapped(line, sys.stdout), flush=True)
 
 
 def wrapped(line: str, stream: IO[str]) -> str:

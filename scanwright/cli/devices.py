@@ -86,6 +86,7 @@ def emulate(
             Event().wait()
         return
     assert out is not None
+    ConsoleProgress()("starting the emulated devices (the first run compiles the numerics)")
     from scanwright.cli.results.of_commands import Devices
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
@@ -156,6 +157,7 @@ def scan(
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright import api
     from scanwright.cli.results.of_commands import ScanResult
+    from scanwright.design.angles import CALIBRATED
     from scanwright.firmware_io.scan.plan import plan_scan
 
     plan = plan_scan(
@@ -190,6 +192,10 @@ def scan(
             cloud = api.assemble(plan.recording, plan.angles_path, plan.recording.with_suffix(".ply"))
             watch.ended(finished(recorded, cloud.lines()))
             show_result(cloud.lines, replace(result, recording=recorded, cloud=cloud), as_json)
+            if (calibrated := out / CALIBRATED).exists():
+                hint(f"next: `scanwright view {plan.recording} --angles {calibrated}`")
+            else:
+                hint(f"next: `scanwright calibrate {plan.recording} --angles {out / 'angles.json'} -o {calibrated}`")
         except ScanwrightError as error:
             _end(watch, failed(error), plan.recording)
             raise typer.Exit(exit_code(error)) from None

@@ -176,7 +176,7 @@ def without(key):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", ["not a JSON file"]),
+        ("", ["angles.json: not a JSON file"]),
         ("{", ["not a JSON file"]),
         ("[1, 2]", ["entire file"]),
         (full_table() | {"sensr": "x"}, ["sensr", "unknown key", "did you mean 'sensor'"]),

@@ -130,7 +130,9 @@ def _steps_back(name: str, stamps: Stamps, speed_rad_s: float) -> Iterator[Findi
                        'stamp = "receipt", if messages arrive promptly')  # fmt: skip
     again = int(np.sum(step_s == 0))
     if name == "scans" and again:
-        yield Finding("stamps_repeat", "warning", name, f"{again} scans are not later than the one before them", again)
+        text = f"{again} scans are not later than the one before them: their beams get wrong angles"
+        hint = 'stamp = "receipt", or drop the copies if the driver repeats scans'
+        yield Finding("stamps_repeat", "warning", name, text, again, hint=hint)
 
 
 def _warning(code: str, subject: str, seconds: float, speed_rad_s: float, text: str, hint: str) -> Finding:

@@ -37,7 +37,7 @@ class Corrections:
 
     Attributes:
         angle_scale: turns of the axis per turn of the angle; negative reverses, 0.75 is a gear.
-        angle_zero: angle at joint position 0, in the unit of the angle.
+        angle_zero: angle at joint position 0, in its unit; subtracted before scaling.
         time_increment: seconds between two beams; "auto" is the step's part of a mirror turn.
         stamp: beam of the stamp of a scan; receipt uses no stamps.
         bearings: limits spreads the beams from angle_min to angle_max.

@@ -24,6 +24,7 @@ class BagSurvey:
 
     scan_stamps: Stamps  # times of the scans
     headers: Headers  # of the scans
+    range_limits_m: tuple[float, float]  # of the last scan
     endless: int  # scans without a longest range
     echoes: int  # most echoes of a ray that are kept
     angle_stamps: Stamps  # times of the angles
@@ -54,7 +55,7 @@ def survey_bag(
     rows: list[tuple[Any, ...]] = []
     angles: list[tuple[int, int, tuple[float, ...]]] = []
     joints: set[str] = set()
-    echoes = 1
+    echoes, limits_m = 1, (0.0, 0.0)
     if table is not None:
         angles = [(when, when, (value,)) for when, value in zip(*(part.tolist() for part in table), strict=True)]
     topics = {scan_source.topic, *([] if angle_source is None else [angle_source.topic])}
@@ -68,6 +69,7 @@ def survey_bag(
             else:
                 echoes = max(echoes, laser_scan.echoes[0].shape[1] if hasattr(laser_scan, "echoes") else 1)
                 scans.append((scan_stamp_ns, message.receive_ns, endless(laser_scan)))
+                limits_m = float(laser_scan.range_min), float(laser_scan.range_max)
                 rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns))
         if angle_source is not None and message.topic == angle_source.topic:
             values = angles_in(message.body, angle_source, bag.path)
@@ -97,6 +99,7 @@ def survey_bag(
     return BagSurvey(
         scan_stamps=Stamps(times(stamps), times(receives)),
         headers=Headers.of(rows),
+        range_limits_m=limits_m,
         endless=sum(without_end),
         echoes=echoes,
         angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),

@@ -29,6 +29,7 @@ from scanwright.design.angles import load_angles
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording
 from scanwright.firmware_io.calibration import entropy
+from scanwright.firmware_io.calibration.calibrate import calibrate_recordings
 from scanwright.firmware_io.calibration.estimate import estimate
 from scanwright.firmware_io.calibration.model import PARAMETERS, gather
 from scanwright.firmware_io.recording.importer import import_bag
@@ -230,6 +231,13 @@ def test_the_same_beams_do_not_count_twice(room, tmp_path, command):
     assert "given twice" in complaints[0]
 
 
+def test_scans_of_another_lidar_than_that_of_the_angle_set_are_named(tmp_path):
+    recording = write(tmp_path / "r.mcap", simulate(FURNISHED, HALF, Truth()))
+    angles = designed(HALF).model_copy(update={"sensor": "URG-04LX"})
+    with pytest.raises(RecordingError, match=r"seen twice: .* of URG-04LX from .*: use the angle set of the scanner"):
+        calibrate_recordings([recording], angles, tmp_path / "a.json")
+
+
 def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, command):
     source = {"scan": "/slice:laserScan", "angle": "/slice:stepAngle"}
     import_bag(data / "tilting/first_scan.bag", tmp_path / "r.mcap", **source, angle_unit="deg", hold=True)
@@ -238,6 +246,6 @@ def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, 
     assert (code, len(complaints)) == (2, 1)
     assert "too little is seen twice" in complaints[0]
     assert "turned 60 deg" in complaints[0]
-    (sd_s,) = map(float, re.findall(r"late by 0 within the error of (\d\.\d{3}) s", complaints[0]))
+    (sd_s,) = map(float, re.findall(r"no delay, with an uncertainty of (\d\.\d{3}) s", complaints[0]))
     assert 0.05 < sd_s < 0.08  # of the tenth of a second between two scans, half
     assert not (tmp_path / "a.json").exists()

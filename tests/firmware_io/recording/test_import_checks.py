@@ -3,6 +3,8 @@
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,11 +12,14 @@ import pytest
 from benchmarks.firmware_io.recordings.import_mutations import AT_M, FAULTS, errors_mm, good, sample, write
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.recording.bag_clocks import Stamps
+from scanwright.firmware_io.recording.bags import Message
 from scanwright.firmware_io.recording.import_checks.angles import outliers
 from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
+from scanwright.firmware_io.recording.import_checks.imu import imu_findings
 from scanwright.firmware_io.recording.importer import import_bag
 from scanwright.firmware_io.recording.recording import open_recording
+from scanwright.firmware_io.recording.ros_messages import IMU
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -58,6 +63,13 @@ def test_a_correction_corrects(fault, tmp_path):
     one, summary = made(fault, tmp_path, **CORRECTED[fault])
     assert np.quantile(errors_mm(one, tmp_path / "out.mcap"), 0.99) < 5
     assert summary.warnings == ()
+
+
+def test_every_warning_has_a_hint(tmp_path):
+    for fault in FAULTS:
+        _, summary = made(fault, tmp_path)
+        (tmp_path / "in.bag").unlink()
+        assert all(finding.hint for finding in summary.findings if finding.severity == "warning"), fault
 
 
 def test_a_finding_states_what_it_costs_and_what_corrects_it(tmp_path):
@@ -180,3 +192,45 @@ def test_an_outlier_of_half_a_turn_is_one():
     angle = 0.01 * np.arange(3000)
     angle[1500] += np.pi
     assert np.flatnonzero(outliers(10_000_000 * np.arange(3000), angle)[0]).tolist() == [1500]
+
+
+def test_every_code_of_a_check_is_in_the_table_of_the_page():
+    root = Path(__file__).parents[3]
+    recording = root / "firmware_io" / "recording"
+    checks = [recording / "importer.py", *(recording / "import_checks").glob("*.py")]
+    called = re.compile(r'(?:Finding|_warning|_remark)\(\s*"(\w+)"')
+    codes = {code for path in checks for code in called.findall(path.read_text())}
+    page = (root / "docs" / "how-to" / "a-bag.md").read_text().partition("| code | fault | what to do |")[2]
+    first_cells = [row.split("|")[1] for row in page.splitlines() if row.startswith("|")]
+    assert codes == set(re.findall(r"`(\w+)`", " ".join(first_cells)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("motion", "expected"), [("at rest", False), ("on the axis", False), ("platform", True)])
+def test_an_imu_that_turns_otherwise_than_the_axis_is_evidence_of_a_moved_platform(motion, expected, seed):
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, 40, 0.01)
+    axis = 0.5 * np.sin(0.4 * t)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    rate = np.radians(rng.uniform(-1, 1, 3)) + np.radians(0.2) * rng.normal(size=(t.size, 3))
+    turned = {"at rest": 0 * t, "on the axis": -axis, "platform": np.radians(15) * (t > 20) * np.sin(t / 3)}[motion]
+    rate += np.gradient(turned, t)[:, None] * direction
+    axes = [SimpleNamespace(angular_velocity=SimpleNamespace(x=x, y=y, z=z)) for x, y, z in rate]
+    messages = [Message("/imu", 10**18 + round(1e9 * when), body) for when, body in zip(t, axes, strict=True)]
+    bag = SimpleNamespace(topics={"/imu": IMU, "/scan": "x"}, messages=lambda _: iter(messages))
+    found = list(imu_findings(bag, 10**18 + np.rint(1e9 * t[::3]).astype(np.int64), axis[::3], ()))
+    assert [one.code for one in found] == ["platform_moved"] * expected
+    assert not list(imu_findings(bag, 10**18 + np.arange(3), np.zeros(3), {"/imu"}))
+
+
+def test_one_angle_a_scan_and_a_sweep_away_from_zero_are_reported(tmp_path):
+    one = good(np.random.default_rng(5))
+    sweep = 1.6 + 0.4 * np.sin(np.linspace(0, 6, one.scan_ns.size))
+    angles = {"angle_ns": one.scan_ns, "angle_receive_ns": one.scan_receive_ns, "angle_rad": sweep}
+    write(replace(one, **angles), tmp_path / "in.bag")
+    found = {finding.code: finding for finding in brought(tmp_path).findings}
+    assert found["angles_sparse"].hint.startswith("hold = true")
+    assert found["zero_outside"].hint.startswith("angle_zero = 1.5708 ")
+    moved = {finding.code for finding in brought(tmp_path, angle_zero=1.57).findings}
+    assert "angles_sparse" in moved and "zero_outside" not in moved

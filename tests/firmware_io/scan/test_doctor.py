@@ -7,6 +7,7 @@ import re
 import termios
 import threading
 import tty
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -206,6 +207,15 @@ def test_only_ports_whose_usb_ids_are_in_the_catalogue_are_looked_at(monkeypatch
     monkeypatch.setattr(device_ports.list_ports, "comports", lambda: plugged)
     assert device_ports.servo_ports() == ["u2d2", "usb2ax"]
     assert device_ports.lidar_ports() == ["hokuyo"]
+
+
+def test_without_a_folder_an_emulated_scanner_is_named(command):
+    folder = Path("out/desk")
+    folder.mkdir(parents=True)
+    with device_ports.announced(folder, device_ports.Ports("a", "b", os.getpid())):
+        _, said, _ = command("doctor")
+    assert said.count("an emulated scanner runs: name its build folder out/desk") == 2
+    assert "emulated" not in command("doctor")[1]
 
 
 def test_opening_a_port_leaves_its_control_lines_alone(monkeypatch):

@@ -244,6 +244,7 @@ def test_a_full_disk(shop, tmp_path):
         ("calibrate none.mcap --angles ANGLES -o a.json", "`scanwright import` converts ROS bags"),
         ("assemble none.mcap --angles ANGLES -o a.ply", "`scanwright scan` makes recordings"),
         ("assemble none.mcap --angles none.json -o a.ply", "`scanwright build TASK` writes angles.json"),
+        ("assemble none.mcap --angles none.toml -o a.ply", "use the angles.json of its build folder"),
         ("scan none", "`scanwright build TASK` writes angles.json"),
         ("report none", "`scanwright build TASK` writes out/TASK"),
         ("emulate --replay none", "`scanwright doctor --capture FILE` writes captures"),
