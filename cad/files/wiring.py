@@ -104,8 +104,8 @@ def _on_robot(network: Network, peak_a: float) -> str:
         return words
     least, most = max(drop.least + drop.idle_v - drop.volts for drop in direct), min(drop.most for drop in direct)
     return (
-        f"{words} A battery within {least:.1f} to {most:g} V needs none if each converter behind it accepts that; below "
-        f"{SUPPLY_V:g} V the servo has less torque than the checks assume."
+        f"{words} A battery within {least:.1f} to {most:g} V needs none if each converter behind it accepts that; "
+        f"below {SUPPLY_V:g} V the servo has less torque than the checks assume."
     )
 
 
