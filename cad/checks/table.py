@@ -126,7 +126,7 @@ CHANGES = {
     "belt_tension": f"take a longer period_s in [motion], or {LIGHTER}",
     "waist_torque": "choose a servo with a smaller stall torque (servo)",
     "shaft_slope": f"{LIGHTER} or a shorter ring (slip_ring)",
-    "retention": f'choose a printer profile with thread = "nut" or "insert" (printer), or {LIGHTER[7:]}',
+    "retention": 'choose a printer profile with thread = "nut" or "insert" (printer), or a lighter lidar (sensor)',
     "angle_held": f"{LIGHTER}, or {OTHER_MOUNT}",
     "screw": "choose a printer profile with another thread (printer)",
     "wiring": "correct the value in the catalogue file, or choose another device",
