@@ -59,8 +59,10 @@ class Sweep(Record):
     @model_validator(mode="after")
     def _can_be_done(self) -> Sweep:
         lower, upper = self.limits_deg
+        if not lower < upper:
+            raise ValueError(f"limits_deg = {[lower, upper]}: the first must be below the second")
         if not -180 <= lower < upper <= 180:
-            raise ValueError(f"limits_deg = {[lower, upper]} does not rise within -180 .. 180")
+            raise ValueError(f"limits_deg = {[lower, upper]}: must be within -180 .. 180")
         if upper - lower < NARROWEST_SWEEP_DEG:
             raise ValueError(f"limits_deg = {[lower, upper]}: a sweep is {NARROWEST_SWEEP_DEG:g} deg wide at least")
         least = 2 * np.sqrt((upper - lower) / self.accel_deg_s2)

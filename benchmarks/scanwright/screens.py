@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import shutil
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,6 +65,9 @@ def studio(chromium: Browser, build: Path) -> None:
     angles = load_angles(build / "angles.json").angles_deg
     with guarded_server("Scanwright studio") as (server, gate):
         shown = Studio(server, load_task(build / "task.toml"), Path.cwd(), build.parent)
+        shown.searching.begin()  # for the landscapes of the pads
+        while shown.controls.optimise.disabled:
+            time.sleep(0.5)
         shown.move(Setting((angles.alpha_rot, angles.beta_rot, angles.alpha_laser, angles.beta_laser)))
         shown.judging.settled(PATIENCE_S)
         shown.workers.settled(PATIENCE_S)

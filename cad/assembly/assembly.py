@@ -18,8 +18,8 @@ class Assembly:
     """Solids by name, rotation frame, mm."""
 
     layout: Layout  # the numbers that they were made from
-    parts: dict[str, PartSpec]  # what is known of the made ones
-    bodies: dict[str, BodySpec]  # what is known of the bought ones
+    parts: dict[str, PartSpec]  # descriptions of the made ones
+    bodies: dict[str, BodySpec]  # descriptions of the bought ones
     made: dict[str, cq.Solid]  # parts of this project
     bought: dict[str, cq.Solid]  # bodies of bought products
     _meshes: dict[str, TriMesh] = field(default_factory=dict, init=False, repr=False, compare=False)

@@ -61,7 +61,7 @@ def require_bed(assembly: Assembly) -> None:
     """Require a bed for every made part that is printed.
 
     Raises:
-        BuildError: one lies on no bed of this printer, however it is turned; the message names its size and what helps.
+        BuildError: one fits the bed of this printer in no pose; the message contains its size and remedies.
     """
     printer = assembly.layout.scanner.printer
     for name in assembly.made:

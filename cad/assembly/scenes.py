@@ -1,6 +1,6 @@
 """The scene of each assembly step: present bodies, new bodies, their direction, and their screws.
 
-A step works on the scanner, or on the bench, where it assembles what is later put in as one piece.
+A step is on the scanner, or on the bench, for an assembly that is later inserted as one piece.
 """
 
 import math

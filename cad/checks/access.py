@@ -20,7 +20,7 @@ from scanwright.design.findings import Finding
 from scanwright.design.frames import Rz
 from scanwright.design.scene import ray_caster
 
-# of a hexagon key: radius over its corners with some play, and length of its long arm (ISO 2936)
+# of a hexagon key: radius over its corners with clearance, and length of its long arm (ISO 2936)
 KEYS_MM = {
     "M1.6": (1.2, 46.5),
     "M2": (1.2, 46.5),
@@ -78,7 +78,7 @@ def access_checks(assembly: Assembly) -> list[Finding]:
     """Return an error for each joint with a screw that no driver reaches, or one finding that there is none."""
     bodies = _bodies(assembly)
     scenes = scenes_of(assembly, assembly.layout.joints)
-    found = [
+    findings = [
         _error(number, scene, joint, blocked)
         for number, scene in enumerate(scenes, start=1)
         for joint, _ in scene.joints
@@ -92,7 +92,7 @@ def access_checks(assembly: Assembly) -> list[Finding]:
     ]
     count = sum(joint.count for scene in scenes for joint, _ in scene.joints)
     message = f"screws: a driver reaches all {count} of them in a straight line, in the step that needs it"
-    return found or [Finding("driver_access", "ok", "screws", message, 0.0, 0.0)]
+    return findings or [Finding("driver_access", "ok", "screws", message, 0.0, 0.0)]
 
 
 def blocked_screws(joint: Joint, present: Mapping[str, Body], turning: frozenset[str]) -> list[Blocked]:

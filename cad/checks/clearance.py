@@ -84,7 +84,7 @@ def _distance(one: Array, other: Array) -> float:
 
 
 def _near(rings: Array, box: Array) -> Array:
-    """Return the shapes within FAR_MM of a box (4,), repaired; to repair the others too takes long."""
+    """Return the shapes within FAR_MM of a box (4,), repaired; repairing all of them is slow."""
     bounds = shapely.bounds(rings)
     near = ((bounds[:, :2] < box[2:] + FAR_MM) & (bounds[:, 2:] > box[:2] - FAR_MM)).all(axis=1)
     return np.asarray(shapely.make_valid(shapely.polygons(rings[near])))

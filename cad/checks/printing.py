@@ -25,7 +25,7 @@ from scanwright.design.scene import ray_caster
 POINTS = 6000  # per part: one for 2 to 8 mm2 of the parts of the shipped tasks
 PARALLEL_COS = math.cos(math.radians(15.0))  # a wedge below 15 deg prints as a wall
 SAME_MM = 0.02  # between two thicknesses: a twentieth of a nozzle
-LAYER_MM = 0.4  # two layers of the printer: what is lower than that is a burr
+LAYER_MM = 0.4  # two layers of the printer: lower islands are burrs
 SMALL_MM2 = 0.2  # smaller outlines are less than a line of a 0.4 mm nozzle
 NEAR_HOLE_MM = 2.0  # from a thin spot to a hole that is named with it
 

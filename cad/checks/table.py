@@ -16,7 +16,7 @@ HELD_G = 2.0  # bumps that must not turn the mount: assumed
 LEAST_MARGIN = 2.0  # over strengths that are makers' or assumed
 FREQUENCY_RATIO = 1.2  # of the first natural frequency to the lidar's mirror: clear of its resonance
 LEAN_DEG = 1.0  # more than a pose on a robot is usually known to
-THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is not what was meant
+THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is unusable
 SMALLEST_HOLE_MM = 1.5  # diameter: smaller ones close when printed
 
 

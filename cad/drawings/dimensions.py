@@ -91,7 +91,7 @@ def thinned(values: dict[float, float]) -> list[tuple[float, float]]:
 
 
 def leaders_right(callouts: list[Callout], edge: float, scale: float) -> list[tuple[Callout, Point, Point]]:
-    """Return the callouts at the right of a view from below, the tip of each leader, and where it bends to its text."""
+    """Return the callouts at the right of a view from below, the tip of each leader, and its bend to the text."""
     order = sorted(callouts, key=lambda callout: (callout.at[1], -callout.at[0], callout.words))
     places = spread([callout.at[1] * scale for callout in order], TEXT_MM * 1.7)
     tips = [(callout.at[0] * scale, callout.at[1] * scale) for callout in order]

@@ -62,7 +62,7 @@ def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:
 
 
 def _making(process: Process, printer: Printer, part: Part) -> list[str]:
-    """Return the notes on finish and on what the model contains."""
+    """Return the notes on finish and on the clearances of the model."""
     if process != "printed":
         threads = ", threads countersunk to their diameter" if part.patterns else ""
         finish = "Ra 3.2, faces with a fit Ra 0.8" if part.fits else "Ra 3.2"

@@ -68,7 +68,7 @@ def patterns_of(rounds: list[Round]) -> list[Pattern]:
 
 
 def slots_of(joints: Sequence[Joint], moved: tuple[float, float, float]) -> list[Pattern]:
-    """Return the slots of a part's joints; `moved` is what the part was moved by."""
+    """Return the slots of a part's joints; `moved` is the displacement of the part."""
     slots = []
     for joint in joints:
         if joint.slot_mm is None:

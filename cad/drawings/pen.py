@@ -54,10 +54,10 @@ class Pen:
     space: BaseLayout | None  # to draw on; None to measure only
     scale: float  # paper over model
     origin: Point = (0.0, 0.0)  # on the paper
-    reached: list[Point] = field(default_factory=list)  # corners of what was drawn, about the origin
+    reached: list[Point] = field(default_factory=list)  # corners of the drawn entities, about the origin
 
     def box(self) -> tuple[float, float, float, float]:
-        """Return left, bottom, right and top of what was drawn, about the origin."""
+        """Return left, bottom, right and top of the drawn entities, about the origin."""
         xs, ys = zip(*self.reached, strict=True)
         return min(xs), min(ys), max(xs), max(ys)
 

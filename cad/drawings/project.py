@@ -64,7 +64,7 @@ def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bo
     """Return the lines of a solid in the plane of a view, in a fixed order.
 
     Args:
-        solid: what is drawn.
+        solid: to draw.
         right: unit vector that points to the right of the view.
         up: unit vector that points up in it; the viewer is at right x up.
         zero: point that the plane has its zero at.

@@ -139,7 +139,7 @@ def _points(curve: Curve) -> list[Point]:
 
 
 def _cut_marks(pen: Pen, left: float, right: float, lines: list[list[Point]]) -> None:
-    """Mark the section: thick ends, arrows along the line of sight, and its letter where no line is."""
+    """Mark the section: thick ends, arrows along the line of sight, and its letter clear of all lines."""
     for x, out in ((left, -1.0), (right, 1.0)):
         end = x + out * MARK_MM
         pen.stroke("FRAME", ((x, 0.0), (end, 0.0)))

@@ -62,7 +62,7 @@ def drawn_on(sheet: Sheet) -> Iterator[Outline | Words]:
 
 
 def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
-    """Return a page of what is `drawn_on` it; a group per layer."""
+    """Return a page of the `drawn_on` entities; a group per layer."""
     width, height = sheet.size
     groups: dict[Layer, list[str]] = {layer: [] for layer in WIDTHS}
     for item in shown:
@@ -93,7 +93,7 @@ def svg_bytes(sheet: Sheet, shown: Drawn) -> bytes:
 
 
 def pdf_bytes(pages: Sequence[tuple[Sheet, Drawn]]) -> bytes:
-    """Return a file of sheets, each with what is `drawn_on` it, in Helvetica; its title is the name of the first."""
+    """Return a file of sheets, each with its `drawn_on` entities, in Helvetica; its title is the name of the first."""
     file = io.BytesIO()
     # not compressed: the output of a compressor depends on its version
     canvas = Canvas(file, invariant=1, pageCompression=0)

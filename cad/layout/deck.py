@@ -209,7 +209,7 @@ def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, floa
     """Return the half extents of an octagon around all holes and the strut's pad, and the cut of its corners.
 
     Raises:
-        BuildError: a hole lies under the strut, where no driver reaches its screw.
+        BuildError: a hole is under the strut: no driver reaches its screw.
     """
     least = PAD_HALF + screw.driver_radius + 1.0
     near = [hole for hole in pattern.holes() if max(abs(hole[0]), abs(hole[1])) < least]

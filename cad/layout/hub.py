@@ -16,14 +16,14 @@ from scanwright.design.catalogue.products import Bearing
 HUB_HEIGHT = 14.0
 HUB_WALL = 12.0  # around the spigot: between the heads of the cross screws and the shaft
 CUP_HUB_WALL = 6.0  # likewise around a cup, which is wide enough to hold it stiffly
-NECK_ON_RIM = 1.5  # how far the neck stays inside a cup's rim
+NECK_ON_RIM = 1.5  # between the neck and the edge of a cup's rim
 HUB_GAP = 10.0  # least height between a ring and the hub
 BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
 SPIGOT = 11.0  # length of the shaft inside the hub
 CROSS_ABOVE_BOTTOM = 6.25  # of the cross screws, from the hub's lower face: a wall below their washers
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
 JOURNAL_WALL = 2.2  # of the sleeve between bore and leads
-LEANING = 1.15  # width of a lead across the axis, over its diameter, where it bends outwards
+LEANING = 1.15  # width of a lead across the axis, over its diameter, at its bend outwards
 JOURNAL_END = 1.0  # of the sleeve below the bearing
 
 Axis = Literal["x", "y"]

@@ -16,7 +16,7 @@ HORN_TILTS_RAD = 1e-3  # of a servo's horn at its rated moment: assumed, no make
 RUBS_NM = (5e-3, 5e-3)  # of bearings, and of a ring whose friction is not in the catalogue: assumed
 NEAR_MM = 500.0
 UNRATED_NM = 0.15  # assumed rating of a horn without one: half of that of MX-28, the weakest rated one
-FAR_MM = 10_000.0  # where an error of the angle is compared with the noise of the ranges
+FAR_MM = 10_000.0  # distance at which an angle error is compared with the range noise
 ALUMINIUM_G_CM3 = 2.7
 ALUMINIUM_PA = 70e9
 STEEL_G_CM3 = 7.85
@@ -25,7 +25,7 @@ METAL_POISSON = 0.33
 
 @dataclass(frozen=True, slots=True)
 class Weight:
-    """Weight of what turns, split along and across the axis."""
+    """Weight of the rotor, split along and across the axis."""
 
     across_n: float  # component of the weight across the axis
     along_n: float  # component along the axis

@@ -24,7 +24,7 @@ SUB_PLATE = "sub_plate"
 TEST_PLATE = "test_plate"
 TRIPOD_FOOT = "tripod_foot"
 
-# bought products, and what they are screwed to
+# bought products, and the bodies that they are screwed to
 BEARING = "bearing"
 BELT = "belt"
 DECK = "deck"

@@ -21,7 +21,7 @@ class ScrewPattern:
     part: str  # that is screwed to it
     screw: Screw  # the size
     places: tuple[tuple[float, float], ...]  # middle of each hole for a viewer who looks at the face, about the origin
-    origin: str  # what (0, 0) is, in words
+    origin: str  # description of (0, 0)
 
 
 def screw_patterns(joints: Sequence[Joint], R_rot_lidar: Array) -> list[ScrewPattern]:

@@ -15,7 +15,7 @@ SHEARED = 0.577  # of a tension, von Mises
 PRELOAD = 0.5  # of the proof load, between metals
 NUT_FACTOR = 0.2  # torque over preload and diameter, dry: the usual estimate
 FLANKS = 0.5  # of the cylinder at the nominal diameter that a thread shears off: makers' tables state 0.5 to 0.8
-INSERT_N = 300.0  # pull-out of a heat-set insert: half of what its sellers measure for M3 in PLA, assumed
+INSERT_N = 300.0  # pull-out of a heat-set insert: half of sellers' measurements for M3 in PLA, assumed
 
 
 @dataclass(frozen=True, slots=True)

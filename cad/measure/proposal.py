@@ -70,7 +70,7 @@ def propose(triangles: Array, kind: Literal["lidar", "servo"], origin: Sequence[
 
 
 def _hole(bore: Bore, at: Array) -> tuple[dict[str, Any] | None, str]:
-    """Return the record of a hole, and other screws that it may be for; or None, and what it is."""
+    """Return the record of a hole, and alternative screws; or None, and a description of the hole."""
     mouth = [round(c, 2) + 0.0 for c in (np.asarray(bore.mouth) - at).tolist()]
     screws = likely_screws(bore)
     size = f"{bore.diameter:g} mm at {mouth}, {bore.depth:g} deep"

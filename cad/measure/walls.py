@@ -107,11 +107,9 @@ def _walls_along(triangles: Array, normals: Array, corners: NDArray[np.int64], a
     plane = np.stack([across, np.cross(axis, across)], axis=1)
     seen = triangles[chosen]
     flat = _Flat(seen @ plane, seen @ axis, normals[chosen] @ plane, _neighbours(corners[chosen], normals[chosen]))
-    found: list[_Piece] = []
-    for rows in _pieces(np.arange(chosen.sum()), flat):
-        found += _fitted(rows, flat)
+    pieces = [piece for rows in _pieces(np.arange(chosen.sum()), flat) for piece in _fitted(rows, flat)]
     walls = []
-    for piece in _joined(found):
+    for piece in _joined(pieces):
         along, middle, stretch = map(triple, (axis, plane @ piece.middle, plane @ piece.stretch))
         around = float(piece.sectors.mean())
         walls.append(Wall(along, middle, piece.radius, piece.low, piece.high, piece.hole, around, stretch))
@@ -201,10 +199,10 @@ def _wall(rows: NDArray[np.int64], flat: _Flat, middle: Array, radius: float, st
     return _Piece(middle, radius, low, high, bool(inwards.sum() < 0), sectors, stretch)
 
 
-def _joined(found: list[_Piece]) -> list[_Piece]:
+def _joined(pieces: list[_Piece]) -> list[_Piece]:
     """Join pieces of one cylinder that touch along its axis."""
     joined: list[_Piece] = []
-    for piece in sorted(found, key=lambda each: (each.low, each.radius, *each.middle)):
+    for piece in sorted(pieces, key=lambda each: (each.low, each.radius, *each.middle)):
         for i, below in enumerate(joined):
             if piece.goes_on(below):
                 joined[i] = replace(below, high=max(piece.high, below.high), sectors=piece.sectors | below.sectors)

@@ -1,4 +1,4 @@
-"""The description of a made part: its shape, joints, space, steps, rows of lists, and what shapes it."""
+"""The description of a made part: its shape, joints, space, steps, rows of lists, and the values that shape it."""
 
 import math
 from collections.abc import Callable, Mapping

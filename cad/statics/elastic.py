@@ -18,7 +18,7 @@ from scanwright.cad.statics.voxels import Grid
 from scanwright.design.arrays import Array, Mask
 
 OUTSIDE = 1e-4  # stiffness of a cut cell's cubes outside the body, of that inside: keeps its nodes in place
-HOLD = 20.0  # stiffness per area of what holds a surface, of modulus by edge: softens by some 1e-3
+HOLD = 20.0  # stiffness per area of a clamp, of modulus by edge: softens by about 1e-3
 LATTICE = np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)])
 NODES = LATTICE[(LATTICE == 1).sum(axis=1) < 2]  # corners and middles of edges, in half edges from the corner, (20, 3)
 

@@ -27,7 +27,7 @@ INSIDE = 0.05  # mm below a face: points on it are in cells of the part
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What a mount carries, and where."""
+    """The load of a mount."""
 
     mass_kg: float  # of all of it
     centre_m: Array  # of all of it, rotation frame
@@ -63,7 +63,7 @@ def _on_grid(
     seats = _discs(np.array(mounted.holes), mounted.ears - INSIDE, carried.seat_mm, mounted.screw.nominal / 2)
     seats = (seats - centre) @ R
     at = elastic.places(model, seats)
-    seats = seats[at.known]  # a foot narrower than the ring bears on what it has
+    seats = seats[at.known]  # only points on the foot
     down = (R.T @ carried.down)[:, None] * STANDARD_GRAVITY_M_S2
     lever = R.T @ (carried.centre_m * 1000 - centre)
     loads = elastic.weight(model, density * 1e-6 * down)

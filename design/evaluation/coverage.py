@@ -22,7 +22,7 @@ from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.sphere.regions import field_of
 from scanwright.design.sphere.total_weight import total_weight
-from scanwright.design.task.shapes import OnPlane, Region
+from scanwright.design.task.shapes import BandRegion, OnPlane, Region
 from scanwright.design.task.task import LoadedTask
 
 CIRCLES = 10_000
@@ -41,7 +41,7 @@ def hidden_regions(loaded: LoadedTask) -> tuple[Finding, ...]:
         share = hidden_share(loaded, region) if region.value > 0 else 0.0
         if share <= HIDDEN:
             continue
-        words = region.words() if isinstance(region, OnPlane) else f"weight.{i} ({region.shape})"
+        words = region.words() if isinstance(region, OnPlane | BandRegion) else f"weight.{i} ({region.shape})"
         message = f"the robot hides {percent(share)} of the directions to {words}"
         most = share > MOST_HIDDEN
         hint = "move the scanner to the robot's edge or higher up, or choose a region farther away" if most else ""

@@ -162,7 +162,7 @@ class Evaluation:
             f"never seen     {percent(seen.blind_fraction)} of the unmasked sphere, {percent(J.blind_weight)} of the "
             "weight",
             f"masked         {seen.masked_fraction:.2%} of the sphere",
-            f"min_density    {J.least} beams within {ball_deg:g} deg of the worst direction of the region, at the worst start phase",
+            f"min_density    {J.least} beams within {ball_deg:g} deg: the lowest of all directions and start phases",
         ]
         lines += [f"blind cone     {_cap(cone)}" for cone in gap.blind_cones]
         if self.cap is not None:

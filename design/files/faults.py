@@ -68,7 +68,7 @@ def faults_in(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
             near = suggest(path[-1], [field.alias or name for name, field in record.model_fields.items()])
             meant |= {(*path[:-1], key) for key in _keys(record) if near == f"; did you mean '{key}'?"}
             faults.setdefault(path, []).append(f": unknown key{near}")
-        elif fault["type"] == "union_tag_invalid":
+        elif fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
             faults.setdefault((*path, fault["ctx"]["discriminator"].strip("'")), []).append(_message(fault))
         else:
             faults.setdefault(path, []).append(_message(fault))
@@ -77,7 +77,7 @@ def faults_in(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
 
 
 def _message(fault: Any) -> str:
-    if fault["type"] == "missing":
+    if fault["type"] in ("missing", "union_tag_not_found"):
         return ": this key is required"
     if fault["type"] == "json_invalid":
         return f": not a JSON file: {fault['msg'].removeprefix('Invalid JSON: ')}"

@@ -52,6 +52,8 @@ class BlindSpot:
         """Return its place, width and weight as text."""
         x, y, z = self.centre
         angle, wide = f"{self.half_angle_deg:.2f} deg about", ""
+        if self.scattered and self.half_angle_deg > 60:
+            return f"blind in places in many directions, {percent(self.weight)} of the weight"
         if self.scattered:
             angle = f"directions within {self.half_angle_deg:.2f} deg of"
         elif self.inner_deg:

@@ -46,6 +46,7 @@ class SimplexRun:
         size_deg: largest size in each coordinate at the end.
         spread: largest difference of values at the end.
         values: largest number of values for each coordinate.
+        blind_cost: of `SearchSpace.J`.
     """
 
     reach: float
@@ -53,11 +54,12 @@ class SimplexRun:
     size_deg: float
     spread: float
     values: int
+    blind_cost: float
 
 
-WIDE = SimplexRun(0.5, 243, 0.1, 1e-4, 60)
+WIDE = SimplexRun(0.5, 243, 0.1, 1e-4, 60, 10.0)
 SHRUNK = 1.0, 0.3, 0.1  # factor of the reach of successive runs
-NARROW = SimplexRun(0.1, 1215, 0.005, 1e-7, 30)
+NARROW = SimplexRun(0.1, 1215, 0.005, 1e-7, 30, 1000.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,7 @@ def descend(space: SearchSpace, descent: Descent, run: SimplexRun, number: int =
     chart = _Chart(descent.angles_deg, free, limits, on_spheres=space.problem.sweep is None)
 
     def J(moved: Array) -> float:
-        return _J_of(easier, chart.setting(moved), run.nodes)
+        return _J_of(easier, chart.setting(moved), run.nodes, run.blind_cost)
 
     if not free.any():
         return replace(descent, J=J(chart.origin), gain=0.0)
@@ -154,9 +156,9 @@ def _free(ranges: AngleRanges, any_axis: bool) -> tuple[Bool[ndarray, " 4"], Flo
     return free, limits
 
 
-def _J_of(space: SearchSpace, angles_deg: Setting, nodes: int) -> float:
-    """Return J of a mount, or the highest within the tolerance of the mounting; inf if the mount is rejected."""
-    designed, off_deg = space.J(angles_deg, nodes), space.ranges.tolerance_deg
+def _J_of(space: SearchSpace, angles_deg: Setting, nodes: int, blind_cost: float = np.inf) -> float:
+    """Return `SearchSpace.J` of a mount, or the highest within the tolerance of the mounting."""
+    designed, off_deg = space.J(angles_deg, nodes, blind_cost), space.ranges.tolerance_deg
     if not off_deg or not np.isfinite(designed):
         return designed
     return max(designed, worst_off(space.problem, np.radians(angles_deg), np.radians(off_deg), nodes))

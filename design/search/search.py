@@ -85,6 +85,9 @@ def search(
     progress(_size_words(space))
     least_blind = None
     result = _best(space, progress, effort)
+    if space.avoid_holes and problem.sweep is not None and result.candidate is None:
+        space = replace(space, to_the_outline=False)
+        result = replace(result, candidate=best_candidate(result.land, space))
     if space.avoid_holes and result.candidate is None:  # every mount has a blind spot: use the lowest J
         _reject_blinding_limits(space, progress, effort)
         least_blind = _least_blind(result.land)

@@ -18,6 +18,7 @@ from scanwright.design.sphere.regions import Field, frames_about
 AROUND = 3600  # points of each edge circle: the error of a polar angle is below 4e-7 rad
 PIECE = 1024  # points of one matrix product
 BETWEEN = 9  # points of each edge of a map cell
+MOST_INSIDE = 1200  # directions of `just_inside` on arcs, and as many on map cells
 
 
 def reach_about(field: Field, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:
@@ -37,6 +38,22 @@ def reach_about(field: Field, axes: Float[ndarray, "axes 3"]) -> Float[ndarray, 
     reach[field.weight_at(axes) > 0, 0] = 0.0
     reach[field.weight_at(-axes) > 0, 1] = np.pi
     return reach
+
+
+@lru_cache(maxsize=64)
+def just_inside(field: Field) -> Float[ndarray, "n 3"]:
+    """Return weighted directions next to the outline of the region: a blind spot enters the region there."""
+    arcs, points = _outline(field)
+    sides = np.concatenate([np.empty((0, 3)), *(arc.sides() for arc in arcs)])
+    sides = _thinned(sides[field.weight_at(sides) > 0])
+    probes = probes_around(_thinned(points))
+    weighted = field.weight_at(probes.reshape(-1, 3)).reshape(probes.shape[:2]) > 0
+    which = weighted.any(axis=1)
+    return np.concatenate([sides, probes[which, weighted[which].argmax(axis=1)]])
+
+
+def _thinned(points: Float[ndarray, "n 3"]) -> Float[ndarray, "m 3"]:
+    return points[:: len(points) // MOST_INSIDE + 1]
 
 
 def _cosines(points: Float[ndarray, "n 3"], axes: Float[ndarray, "axes 3"]) -> Float[ndarray, "axes 2"]:

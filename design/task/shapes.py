@@ -64,6 +64,16 @@ class BandRegion(Record):
     value: Value = 1.0
     required: Required = None
 
+    def words(self) -> str:
+        """Return its description."""
+        up, down = (90 - theta_deg for theta_deg in self.theta_deg)
+        around = (
+            "all around"
+            if self.phi_deg == (-180.0, 180.0)
+            else f"heading {self.phi_deg[0]:g} to {self.phi_deg[1]:g} deg"
+        )
+        return f"the band {around}, elevation {down:g} to {up:g} deg"
+
     @model_validator(mode="after")
     def _edges_rise(self) -> BandRegion:
         if not 0 <= self.theta_deg[0] <= self.theta_deg[1] <= 180:
@@ -72,7 +82,10 @@ class BandRegion(Record):
             raise ValueError(f"phi_deg = {list(self.phi_deg)} does not rise by at most 360")
         for name, (low, high) in (("theta_deg", self.theta_deg), ("phi_deg", self.phi_deg)):
             if high - low < THINNEST_DEG:
-                raise ValueError(f"{name} = {[low, high]} is too narrow: widen it to {THINNEST_DEG:g} deg at least")
+                raise ValueError(
+                    f"{name} = {[low, high]} is too narrow: {THINNEST_DEG:g} deg or more "
+                    "are needed; its lengths are in metres"
+                )
         return self
 
 
@@ -223,7 +236,10 @@ class OnPlane(Record):
         a, b, c, d = self.corners_m()
         seen_deg = min(_between_deg(_sum(a, b), _sum(c, d)), _between_deg(_sum(b, c), _sum(d, a)))
         if seen_deg < THINNEST_DEG:
-            raise ValueError(f"from there it looks {seen_deg:.1g} deg thin: widen it to {THINNEST_DEG:g} deg at least")
+            raise ValueError(
+                f"from there it looks {seen_deg:.1g} deg thin: {THINNEST_DEG:g} deg or more "
+                "are needed; its lengths are in metres"
+            )
         return self
 
 

@@ -127,7 +127,7 @@ def _prompted(
     if servo is None:
         servo = product("servo", "2. Which servo turns it?", "XM430-W350", lambda name: checked(servo=name))
     if height_m is None:
-        question = "3. How many metres over the ground is the scanner?"
+        question = "3. How many metres over the ground is the lidar, usually 0.1 to 0.2 m above the robot's deck?"
         height_m = _until(question, None, _number, lambda height: checked(height_m=height))
     if robot is None:
         print("4. Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
@@ -140,6 +140,7 @@ def _prompted(
         print("5. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
         print("   wall:3:4:90:2.5  3 m to the left, 4 wide, 2.5 high  around:30:30  all around, 30 deg up and down")
+        print("   wall:1:2:0:0.5   obstacles 0.5 m high, 1 m ahead, 2 m wide")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")
         see = _until("  ", "ground ceiling", str.split, lambda regions: checked(see=regions))
     if scan_s is None:
@@ -175,7 +176,7 @@ def _number(answer: str) -> float:
     try:
         return float(answer)
     except ValueError as error:
-        raise TaskError(f"'{answer}' is no number") from error
+        raise TaskError(f"'{answer}' is not a number") from error
 
 
 def _command(answers: Any, path: Path) -> str:

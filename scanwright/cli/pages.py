@@ -43,7 +43,7 @@ def studio(
 
     require_kernel("studio")
     from scanwright.design.task.task import load_task
-    from scanwright.studio.session import run_studio
+    from scanwright.studio.page import run_studio
 
     run_studio(load_task(task), port=port, out=out, progress=ConsoleProgress(), announce=_announce(as_json))
 

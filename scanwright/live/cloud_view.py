@@ -30,7 +30,7 @@ COLOUR_BY: tuple[ColourBy, ...] = get_args(ColourBy)
 UNITS: dict[ColourBy, str] = {"height": " m", "range": " m", "intensity": "", "time": " s"}
 NO_CUT_M = 10.0  # of the slider: nothing is cut away
 CHUNK_POINTS = 20_000  # of one node of the scene: a batch joins the last one until that is full
-MOST_POINTS = 5_000_000  # the page drops the oldest beyond, and says so
+MOST_POINTS = 5_000_000  # the page drops the oldest beyond
 POINT_M = 0.012  # 12 mm; the slider offers 2 to 50
 
 
@@ -72,7 +72,7 @@ class CloudView:
         self._key = server.gui.add_html("")
         self._size = server.gui.add_slider("point size [mm]", 2.0, 50.0, 1.0, 1000 * POINT_M)
         self.cut = server.gui.add_slider(
-            "cut above [m]", 0.0, NO_CUT_M, 0.1, NO_CUT_M, hint="Over the lowest point: takes the ceiling off"
+            "cut above [m]", 0.0, NO_CUT_M, 0.1, NO_CUT_M, hint="Above the lowest point: removes the ceiling"
         )
         self._walls: DensityRoom | None = None
         self._expected = server.gui.add_checkbox("expected density", initial_value=True, visible=False)

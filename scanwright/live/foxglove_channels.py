@@ -1,11 +1,9 @@
 """A scan for Foxglove: the channels of the recording, points, frames and the scanner's description.
 
-    /scan /joint_states    as recorded
-    /points                sensor_msgs/PointCloud2, one message a scan, in `world`
-    /tf                    world servo rot laser, at every angle of the servo
-    /robot_description     std_msgs/String, the URDF, if the build has one; once a second, for those who come late
-
-All are ROS 2 messages in CDR with their definitions, so that Foxglove needs nothing else.
+/scan /joint_states    as recorded
+/points                sensor_msgs/PointCloud2, one message a scan, in `world`
+/tf                    world servo rot laser, at every angle of the servo
+/robot_description     std_msgs/String, the URDF, if the build has one; once a second
 """
 
 from __future__ import annotations
@@ -27,9 +25,8 @@ from scanwright.firmware_io.ros.robot_frames import fixed_frames
 from scanwright.firmware_io.samples import JointSample, Scan
 
 _DESCRIBED_NS = 1_000_000_000  # a viewer that connects later waits at most a second for the description
-_ANEW_NS = 1_000_000_000  # without an angle: the devices stood still, and began anew
-Log = Callable[[str, bytes, int], None]
-"""Takes a topic, a message, and its time in ns."""
+_ANEW_NS = 1_000_000_000  # without an angle: the devices were restarted
+Log = Callable[[str, bytes, int], None]  # called with a topic, a message and its time [ns]
 
 _TYPES = {
     SCAN_TOPIC: ros_messages.LASER_SCAN,
@@ -58,16 +55,7 @@ class FoxgloveChannels:
         smooth: bool = True,
         wall_minus_ns: int = 0,
     ) -> None:
-        """Begin without a scan.
-
-        Args:
-            angles: angle set in use.
-            own_body: beams that end on the scanner; None where that is not known.
-            urdf: description with the frames of `angles`; None for none.
-            log: gets each message.
-            smooth: smooth the steps of the encoder in the points.
-            wall_minus_ns: added to every time; what it takes from the clock of the devices to time since 1970.
-        """
+        """`smooth`: smooth the encoder steps; `wall_minus_ns`: from the clock of the devices to time since 1970."""
         self._place = partial(Assembler, angles, own_body=own_body, smooth=smooth)
         self._fixed = [(one.parent, one.child, one.T_parent_child) for one in fixed_frames(angles)]
         self._urdf, self._wall_minus_ns = urdf, wall_minus_ns
@@ -75,7 +63,7 @@ class FoxgloveChannels:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew: earlier data are not assembled with later ones."""
+        """Start again: earlier data are not assembled with later ones."""
         self._assembler, self._described_ns, self._joint_ns = self._place(), -(2**62), -(2**62)
 
     def joint(self, time_ns: int, position_rad: float) -> None:
@@ -100,10 +88,10 @@ class FoxgloveChannels:
         self._push(scan)
 
     def message(self, line: str) -> None:
-        """Nothing: no channel is of words."""
+        """Ignore: no channel has text."""
 
     def close(self) -> None:
-        """Log the points of the scans that still wait for their angles."""
+        """Log the points of the scans that wait for their angles."""
         self._points(self._assembler.finish())
 
     def _push(self, thing: Scan | JointSample) -> None:

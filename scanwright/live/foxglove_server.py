@@ -1,10 +1,7 @@
 """A server of Foxglove's websocket protocol, `foxglove.sdk.v1`, for programs and allowed pages of this computer.
 
-The server of Foxglove's SDK checks no Origin, so any page of the browser could read a scan. A relay in front of it
-would leave that server's own port open, which a page can find. Here one server has one port, and checks each handshake.
-
-Protocol: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md. The server sends `serverInfo` and `advertise`;
-a client sends `subscribe` and `unsubscribe`, and everything else that it sends is dropped.
+The server of Foxglove's SDK checks no Origin, so that any page of the browser could read a scan.
+Protocol: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md.
 """
 
 from __future__ import annotations
@@ -35,9 +32,7 @@ _LOG = logging.getLogger(__name__)
 
 SUBPROTOCOL = Subprotocol("foxglove.sdk.v1")
 APP = "https://app.foxglove.dev"
-FOXGLOVE = (APP, "https://studio.foxglove.dev", "file://")
-"""Origins of Foxglove's applications. The desktop application is an Electron page loaded from a file, which sends
-`file://`. Browsers send `null` for a file, and for a sandboxed frame of any page, so `null` is refused."""
+FOXGLOVE = (APP, "https://studio.foxglove.dev", "file://")  # the desktop application sends file://, a browser null
 
 BACKLOG = 4096  # messages that a slow viewer may be behind; the oldest are dropped beyond
 _MOST_BYTES = 1 << 16  # of a message from a client: subscriptions are short
@@ -87,15 +82,9 @@ class FoxgloveServer:
         self._ended = asyncio.Event()
         self._refused = set[str]()
         about = {"name": name, "capabilities": [], "metadata": {}, "sessionId": str(time.time_ns() // 10**6)}
+        encoded = {"encoding": "cdr", "schemaEncoding": "ros2msg"}
         described = [
-            {
-                "id": number,
-                "topic": topic,
-                "encoding": "cdr",
-                "schemaName": kind,
-                "schemaEncoding": "ros2msg",
-                "schema": definition,
-            }
+            {"id": number, "topic": topic, "schemaName": kind, "schema": definition} | encoded
             for number, (topic, (kind, definition)) in enumerate(channels.items(), 1)
         ]
         self._greeting = [
@@ -138,7 +127,7 @@ class FoxgloveServer:
             return None
         origin = request.headers.get_all("Origin")[:1]
         line = f"refused a viewer: {why}" + (f" {origin[0][:100]!r}" if why == "foreign origin" else "")
-        if line not in self._refused and len(self._refused) < _MOST_REFUSALS:  # a page may try for ever
+        if line not in self._refused and len(self._refused) < _MOST_REFUSALS:  # a page may repeat it
             self._refused.add(line)
             _LOG.warning(line)
         return refusal(why, "to allow a page, start scanwright with --allow-origin ORIGIN")

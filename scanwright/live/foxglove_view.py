@@ -1,8 +1,4 @@
-"""`scanwright view` and `scan --foxglove`: a recording or a scan, served to Foxglove or written for it.
-
-The server listens on this computer only, for Foxglove's own pages, for programs, and for pages that the user allows. It
-takes nothing from who connects but what to send: no parameters, no services, no messages.
-"""
+"""`scanwright view` and `scan --foxglove`: serve a recording or a scan to Foxglove, or write it for Foxglove."""
 
 from __future__ import annotations
 
@@ -33,8 +29,8 @@ from scanwright.live.foxglove_channels import FoxgloveChannels, Log, channels
 from scanwright.live.foxglove_server import foxglove_server
 
 _LOG = logging.getLogger(__name__)
-PORT = 8765  # where Foxglove looks first
-_SETTLED_S = 0.5  # who subscribes does so topic by topic, and is served from a moment later on
+PORT = 8765  # the default of Foxglove
+_SETTLED_S = 0.5  # a viewer subscribes topic by topic
 
 
 def view_recording(
@@ -53,7 +49,7 @@ def view_recording(
         RecordingError: the recording is unreadable.
         TaskError: the port is taken.
     """
-    open_recording(recording)  # what cannot be read is refused before an address is told
+    open_recording(recording)  # an error comes before the address
     with foxglove_server(recording.name, channels(), port, progress, allow_origins) as server:
         announce(server.address)
         shown = _shown(recording, angles, server.log)
@@ -74,10 +70,7 @@ def _until(condition: Callable[[], bool]) -> None:
 
 
 def write_for_foxglove(recording: Path, angles: Path, out: Path) -> int:
-    """Write a recording with points, frames and description, so that Foxglove shows all of it from the file alone.
-
-    Returns:
-        How many scans it holds.
+    """Write a recording with points, frames and description; return the number of scans.
 
     Raises:
         RecordingError: the recording is unreadable, or the file cannot be written.

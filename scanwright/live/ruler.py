@@ -18,13 +18,7 @@ COLOUR = (224, 49, 49)  # red: no colour scale of the points contains it
 def nearest_to_ray(
     clouds: Sequence[Float[ndarray, "n 3"]], origin_m: Vector, direction: Vector
 ) -> Float[ndarray, " 3"] | None:
-    """Return the point that a click selects: the nearest one to the eye of those near its ray; None if there is none.
-
-    Args:
-        clouds: points [m].
-        origin_m: the eye.
-        direction: of the ray, of any length but 0.
-    """
+    """Return the point that a click selects: of those near its ray the nearest to the eye; None if there is none."""
     along = np.asarray(direction, float) / np.linalg.norm(direction)
     best, best_m = None, np.inf
     for points in clouds:

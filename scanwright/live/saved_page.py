@@ -35,12 +35,7 @@ def saved_page(
 ) -> str:
     """Return the page of a cloud, thinned to `MOST_POINTS`.
 
-    Args:
-        title: of the page.
-        points_m: in the world [m]; at least one.
-        level: place of each point on the colour scale, 0 to 1.
-        ends: lowest and highest value of the scale, with its unit.
-        centre_m: optical centre [m].
+    `level` is the place of each point on the colour scale, 0 to 1; `ends` are the texts at the ends of the scale.
     """
     shown = np.random.default_rng(0).permutation(len(points_m))[:MOST_POINTS]
     points = points_m[shown]

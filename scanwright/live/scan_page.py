@@ -1,7 +1,6 @@
 """The page of a scan, in a separate process so that the scan never waits for a browser.
 
-The page is served, and said where, before any device is opened; on a terminal the browser is opened too, and given some
-seconds, so that the first scan is already seen.
+The page is served before any device is opened, so that it shows the first scan.
 """
 
 from __future__ import annotations
@@ -46,12 +45,8 @@ OPENED_S = 15.0  # at most until the browser has it
 def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | None = None) -> Iterator[Viewer]:
     """Serve the page of a build folder's scanner while the body runs; nothing if it is not wanted.
 
-    When the end of the scan was given to the viewer, this waits until no page is open, or for Ctrl-C.
-
-    Args:
-        folder: of the build.
-        wanted: whether there is a page.
-        browse: opens an address; None for the person's browser where this runs on a terminal.
+    After the end of the scan this waits until no page is open, or for Ctrl-C. `browse` opens an address; None is the
+    default browser, on a terminal only.
 
     Raises:
         ScanwrightError: the page cannot be served.

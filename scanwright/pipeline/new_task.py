@@ -93,9 +93,11 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
     if answers.height_m > lidar.practical_range_m:
         raise TaskError(
             f"height_m = {answers.height_m:g}: {lidar.name} sees {lidar.practical_range_m:g} m and would not reach the "
-            f"ground; use metres ({answers.height_m:g} cm is {answers.height_m / 100:g})"
+            f"ground; use metres ({answers.height_m:g} cm is "
+            f"{answers.height_m / 100:g}, {answers.height_m:g} mm is {answers.height_m / 1000:g})"
         )
-    seen = [parse_region(each) for each in answers.see]
+    # where regions overlap the last one decides: those all around come first
+    seen = sorted((parse_region(each) for each in answers.see), key=lambda each: each[0] not in ("all", "around"))
     if not seen:
         raise TaskError(f"see: no region; {known_regions()}")
     things = [numbers for word, numbers in seen if word == "thing"]
@@ -216,6 +218,7 @@ def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None)
         'mode = "sweep"',
         "limits_deg = [-90, 90]",
         f"period_s = {answers.scan_s:g}    # out and back is one full scan: {lines}",
+        "# a wider range, such as [-160, 160], lets a tilted lidar see all around, with lines farther apart",
     ]
 
 
@@ -247,7 +250,8 @@ def _mask(answers: Answers, folder: Path) -> list[str]:
     if not (over > 0 and abs(ahead) <= length / 2):
         raise TaskError(
             f"robot = '{answers.robot}': the scanner ({answers.height_m:g} m high, {ahead:g} m ahead of the "
-            f"middle) is not above it: needs height_m above {height:g}, ahead_m from {-length / 2:g} to {length / 2:g}"
+            f"middle) is not above it: needs height_m above {height:g}, ahead_m from {-length / 2:g} to {length / 2:g} "
+            "(metres)"
         )
     return [
         f"[[mask]]  # the robot's own top, {over:g} m below the scanner: directions that it hides do not count",
@@ -270,8 +274,9 @@ def _too_low(loaded: LoadedTask) -> list[str]:
     if height.severity != "warning" or height.limit is None or height.value is None or height.limit > height.value:
         return []
     return [
-        f"the scanner is {height.limit:.0f} mm above the robot, and {height.value:.0f} mm or more are needed: use a "
-        f"height_m that is {(height.value - height.limit) / 1000:.2g} m larger"
+        f"the scanner is {height.limit:.0f} mm above the robot, but its parts need {height.value:.0f} mm with "
+        f"an upright axis, and more if tilted: use a height_m that is {(height.value - height.limit) / 1000:.2g} m "
+        "larger, or more"
     ]
 
 

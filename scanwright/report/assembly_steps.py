@@ -1,8 +1,4 @@
-"""The assembly steps as HTML: only the Markdown that `assembly.md` uses.
-
-Headings, paragraphs, lists with `-`, pictures alone in a block, and in a line `**bold**` and backticks; anything else
-stays the text it is.
-"""
+"""The assembly steps as HTML: the Markdown that `assembly.md` uses, other text unchanged."""
 
 from __future__ import annotations
 
@@ -12,12 +8,7 @@ from collections.abc import Callable
 
 
 def steps_html(text: str, address: Callable[[str], str | None] = lambda _: None) -> str:
-    """Return HTML of the steps without the title; headings begin at the third level.
-
-    Args:
-        text: Markdown.
-        address: returns the address of a picture, None if there is none.
-    """
+    """Return HTML of the steps without the title, headings from the third level; `address` is that of a picture."""
     blocks = []
     for block in re.split(r"\n\s*\n", text.strip()):
         heading = re.fullmatch(r"(#+) (.*)", block)

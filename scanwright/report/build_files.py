@@ -1,7 +1,4 @@
-"""Readers of a build folder's files: None if a file is missing, an error if no build wrote it.
-
-Pictures become data addresses, so that the page needs no other file.
-"""
+"""Readers of the files of a build folder: None if a file is missing, an error if no build wrote it."""
 
 from __future__ import annotations
 

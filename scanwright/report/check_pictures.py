@@ -19,7 +19,7 @@ from scanwright.report.build_files import png_uri
 SIZE_PX = 200, 150  # pixels, wide and high
 STILL_PX = 720, 480
 FINER = 2  # rays per pixel and side
-YAW_RAD, PITCH_RAD = np.radians(40.0), np.radians(22.0)  # as in scanner.js
+YAW_RAD, PITCH_RAD = np.radians(40.0), np.radians(22.0)  # as in stage.js
 MARGIN = 1.04
 COLOURS = 32
 NAMED, OTHER = np.array([190.0, 60.0, 0.0]), np.array([235.0, 235.0, 232.0])

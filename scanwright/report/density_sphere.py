@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import binary_dilation, gaussian_filter
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array
@@ -61,13 +61,7 @@ def density_sphere(
     mounts: Iterable[TunedMount],
     shadow: SelfOcclusion | None = None,
 ) -> DensitySphere:
-    """Draw density of the scanner and of the reference mounts on one scale.
-
-    Args:
-        problem: the task, `problem_as_built`.
-        angles: what was built.
-        mounts: the reference mounts.
-        shadow: beams that the parts of the scanner block; None if they are not known.
+    """Draw the density of the scanner, without the beams that `shadow` blocks, and of the mounts, on one scale.
 
     Raises:
         BuildError: the shadow is of another number of beams.
@@ -82,7 +76,10 @@ def density_sphere(
         densities[f"{mount.name}, without parts"] = mean_density_at(problem, mount.angles_rad, directions)
     area, order = np.sqrt(1 - directions[:, 2] ** 2), densities[own].argsort()
     bands = bands_to(densities[own][order][np.searchsorted(area[order].cumsum(), DENSEST * area.sum())])
-    maps = _drawn(densities, bands, weight, masked)
+    maps = [
+        SphereMap(f"density of {name}", _picture(_shades(density.reshape(shape), bands), weight, masked))
+        for name, density in densities.items()
+    ]
     counts = weight.ravel() * area
     middle = counts @ directions / max(float(counts.sum()), 1e-12)
     length = float(np.linalg.norm(middle))
@@ -99,13 +96,6 @@ def _directions() -> tuple[Array, tuple[int, int]]:
     return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1).reshape(-1, 3), t.shape
 
 
-def _drawn(densities: dict[str, Array], bands: Bands, weight: Array, masked: NDArray[np.bool_]) -> list[SphereMap]:
-    return [
-        SphereMap(f"density of {name}", _png(_framed(_shades(density.reshape(weight.shape), bands), weight, masked)))
-        for name, density in densities.items()
-    ]
-
-
 def _shades(density: Array, bands: Bands) -> Indices:
     """Return palette entries of densities, smoothed among the directions that are seen."""
     seen = density > UNSEEN
@@ -114,32 +104,19 @@ def _shades(density: Array, bands: Bands) -> Indices:
     return np.where(seen, shade, NOTHING).astype(np.uint8)
 
 
-def _framed(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> Indices:
-    """Hatch masked directions, and draw a dark line on a bright one where the weight changes."""
+def _picture(shades: Indices, weight: Array, masked: NDArray[np.bool_]) -> str:
+    """Return a map with hatched masks, and a dark line on a bright one where the weight changes."""
     row, column = np.indices(shades.shape)
     hatch = (row + column) % HATCH_CELLS < HATCH_CELLS // 4
     out = np.where(masked, np.where(hatch, HATCH, MASKED), shades).astype(np.uint8)
-    if len(np.unique(weight)) > MOST_LEVELS:  # a map of many: its outline
+    if len(np.unique(weight)) > MOST_LEVELS:  # a map: its outline
         weight = weight > 0
     edge = (weight != np.roll(weight, 1, axis=1)) | (weight != np.vstack([weight[:1], weight[:-1]]))
-    out[_wider(edge) & ~masked] = HALO
+    wider = binary_dilation(np.pad(edge, ((0, 0), (1, 1)), mode="wrap"), np.ones((3, 3)))[:, 1:-1]
+    out[wider & ~masked] = HALO
     out[edge & ~masked] = OUTLINE
-    return out
-
-
-def _wider(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Widen a mask by one cell to every side; phi wraps."""
-    mask = mask | np.roll(mask, 1, axis=1) | np.roll(mask, -1, axis=1)
-    above, below = np.zeros_like(mask), np.zeros_like(mask)
-    above[1:], below[:-1] = mask[:-1], mask[1:]
-    return np.asarray(mask | above | below)
-
-
-def _png(indices: Indices) -> str:
-    image = Image.fromarray(indices)
-    image.putpalette(_palette())
+    image = Image.fromarray(out)
+    image.putpalette(
+        [*ramp(np.linspace(0, 1, SHADES)).ravel().tolist(), *(part for colour in PLAIN for part in colour)]
+    )
     return png_uri(image)
-
-
-def _palette() -> list[int]:
-    return [*ramp(np.linspace(0, 1, SHADES)).ravel().tolist(), *(value for colour in PLAIN for value in colour)]

@@ -57,13 +57,7 @@ def cards(angles: AngleSet, answer: BuildAnswer, parts: PartsList | None) -> tup
 
 
 def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList | None) -> list[ToDo]:
-    """Return what to do, the first first.
-
-    Args:
-        files: names in the build folder.
-        findings: all results of its checks.
-        parts: parts list; None if unknown.
-    """
+    """Return what to do in order, from the names of the files of the build, its checks and its parts."""
     todo = _before_making(findings)
     if parts is not None:
         text = f"{_capital(' and '.join(parts.bought.values()) or 'devices')} first: they decide the delivery date."

@@ -43,11 +43,7 @@ CEILING_M = 1.2  # above the scanner, from which the cloud is cut away: it would
 
 
 def report_html(folder: Path, begin: Begin = in_turn) -> str:
-    """Return the page.
-
-    Args:
-        folder: of the build.
-        begin: runs the shares that need the task, and the bodies of the scanner.
+    """Return the page; `begin` runs what needs the task, and what needs the bodies of the scanner.
 
     Raises:
         TaskError: `angles.json` is missing or is no angle set, or `task.toml` is no task.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +24,7 @@ OTHERS = "Others"
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Rows of one kind, and the range of what they cost."""
+    """Rows of one kind."""
 
     title: str
     rows: tuple[Row, ...]
@@ -31,7 +32,7 @@ class Group:
     @property
     def usd(self) -> str:
         """Return the range of the price."""
-        return usd_range(sum(_number(row, "low_usd") for row in self.rows), sum(map(_high, self.rows)))
+        return usd_range(self.rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,7 @@ class PartsList:
     @property
     def usd(self) -> str:
         """Return the range of the total, as the file states it."""
-        return "unknown" if self.total is None else usd_range(_number(self.total, "low_usd"), _high(self.total))
+        return "unknown" if self.total is None else usd_range([self.total])
 
     @property
     def screws(self) -> int:
@@ -91,7 +92,7 @@ def read_parts(path: Path) -> PartsList:
     title_of = {kind: title for title, kinds in GROUPS.items() for kind in kinds}
     grouped: dict[str, list[Row]] = {title: [] for title in (*GROUPS, OTHERS)}
     for row in rows:
-        row["note"] = row["note"].replace(ESTIMATED, "estimate")  # the page says once what that is
+        row["note"] = row["note"].replace(ESTIMATED, "estimate")  # the page explains it once
         if row["kind"] != "total":
             grouped[title_of.get(row["kind"], OTHERS)].append(row)
     groups = tuple(Group(title, tuple(members)) for title, members in grouped.items() if members)
@@ -104,15 +105,8 @@ def price(row: Row) -> str:
     return " to ".join(dict.fromkeys(f"{end:,.0f}" if end >= 10 else f"{end:.2g}" for end in ends))
 
 
-def usd_range(low: float, high: float) -> str:
-    """Return a range of prices in words; one number if both ends round to it."""
+def usd_range(rows: Sequence[Row]) -> str:
+    """Return the range of the price of rows in words; one number if both ends round to it."""
+    low, high = (sum(float(row[end] or 0.0) for row in rows) for end in ("low_usd", "high_usd"))
     ends = dict.fromkeys(f"{end:,.0f}" for end in (low, high))
     return f"{' to '.join(ends)} USD"
-
-
-def _number(row: Row, column: str) -> float:
-    return float(row[column] or 0.0)
-
-
-def _high(row: Row) -> float:
-    return _number(row, "high_usd")

@@ -72,11 +72,7 @@ def room_about(task: Task) -> Room:
 def room_scene(room: Room, centre_m: Vector, middle: Vector, below: float) -> dict[str, Any]:
     """Return the room and its camera for the stage, ready for JSON.
 
-    Args:
-        room: about the scanner.
-        centre_m: optical centre in the world [m].
-        middle: mean direction of the weight.
-        below: share of the weight below the horizon.
+    `middle` is the mean direction of the weight, `below` its share below the horizon.
     """
     heading = float(np.arctan2(middle[1], middle[0])) if np.hypot(*middle[:2]) > UPRIGHT else 0.0
     from_below = below < LITTLE
@@ -98,18 +94,15 @@ def one_scan(
     shadow: SelfOcclusion | None = None,
     most_rays: int = MOST_RAYS,
 ) -> Float32s:
-    """Return points of one full scan with the noise of the data sheet, thinned evenly.
+    """Return points of one full scan with the noise of the data sheet in the world [m], thinned evenly, shape (n, 3).
 
     Args:
-        scanner: its optical centre is the origin of the world.
+        scanner: with the optical centre at the origin of the world.
         joint_rad: axis angle of each line, shape (lines,).
-        placed: the scene; None for a furnished room.
-        folder: of the scene's file.
+        placed: the scene, in a file of `folder`; None for a furnished room.
+        folder: of the scene.
         shadow: beams that the parts of the scanner block; None if unknown.
-        most_rays: at most so many are cast.
-
-    Returns:
-        In the world [m], shape (n, 3).
+        most_rays: largest number of rays.
 
     Raises:
         SceneError: the scene cannot be read.
@@ -129,12 +122,7 @@ def one_scan(
 
 
 def cloud_scene(points_m: Float[ndarray, "n 3"], level: Float[ndarray, " n"]) -> dict[str, Any]:
-    """Return a cloud for the stage, ready for JSON: coordinates and colour in `STEPS` of their range.
-
-    Args:
-        points_m: in the world [m].
-        level: place of each point on the colour scale, 0 to 1.
-    """
+    """Return a cloud for the stage, ready for JSON; `level` is the place of each point on the colour scale, 0 to 1."""
     low, high = points_m.min(axis=0), points_m.max(axis=0)
     span = np.maximum(high - low, 1e-6)
     values = np.column_stack([(points_m - low) / span, np.clip(level, 0, 1)])

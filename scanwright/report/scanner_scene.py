@@ -1,7 +1,7 @@
-"""The scanner in 3D for the report: bodies of `assembly.glb`, their places in `exploded.glb`, axis, field of view.
+"""The scanner in 3D for the report: bodies, their exploded places, axis, field of view.
 
-The page draws this and reads no files: matrices are column by column, arrays little-endian in base64, all in the world
-frame in metres. Corners are in 65,535 steps of the body's box, and its matrices start from there.
+Matrices are column by column, arrays little-endian in base64, in the world frame in metres. Corners are in 65,535 steps
+of the box of the body, and its matrices start from there.
 """
 
 from __future__ import annotations
@@ -52,13 +52,9 @@ def load_glb(path: Path) -> Any:
 def scanner_scene(
     assembly: Any, exploded: Any | None, angles: AngleSet, own_body: tuple[SelfOcclusion, Array] | None
 ) -> dict[str, Any]:
-    """Return what the page draws, ready for JSON.
+    """Return the scanner for the stage, ready for JSON.
 
-    Args:
-        assembly: of `assembly.glb`.
-        exploded: of `exploded.glb`; without it nothing explodes.
-        angles: for the motion.
-        own_body: hidden beams, and the bearings of all beams [rad]; without it there is no field of view.
+    Without `exploded` nothing explodes; without `own_body` (hidden beams, bearings [rad]) there is no field of view.
     """
     turning = assembly.graph.transforms.successors("rot")
     bodies, together, spread = [], [], []
@@ -95,13 +91,7 @@ def scanner_scene(
 
 
 def robot_bodies(task: Task, folder: Path, centre_m: Vector) -> list[dict[str, Any]]:
-    """Return the meshes that hide directions, for the stage.
-
-    Args:
-        task: its masks may name meshes.
-        folder: of their files.
-        centre_m: optical centre in the world [m].
-    """
+    """Return the meshes that hide directions, from files of a folder, for the stage."""
     robots = []
     for region in task.mask:
         if isinstance(region, MeshRegion):

@@ -102,7 +102,7 @@ const inflated = async (text) => {
     const f = Math.min(1, aspect) / Math.tan(FIELD_OF_VIEW / 2);
     return [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, BELOW_TABS, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
   };
-  // shares of the width and the height of the picture where a point is, by view and projection in one
+  // the place of a point as shares of the width and the height of the picture
   const onPicture = (both, [x, y, z]) => {
     const [cx, cy, , w] = [0, 1, 2, 3].map((i) => both[i] * x + both[4 + i] * y + both[8 + i] * z + both[12 + i]);
     return [(cx / w + 1) / 2, (1 - cy / w) / 2];
@@ -273,7 +273,7 @@ const inflated = async (text) => {
       use(FLAT, STILL, [0, 0, 0, 1]);
       drawn(wall.array, gl.LINE_LOOP, 4);
     }
-    // where the scanner stands above the floor, and which way is ahead
+    // a line from the scanner to the floor, and an arrow ahead
     const [x, y, z] = scene.centre;
     use(FLAT, scaled([x, y, (z + scene.level) / 2], [1, 1, (z - scene.level) / 2]), [0, 0, 0, 1]);
     drawn(lines, gl.LINES, 2);
@@ -339,16 +339,21 @@ const inflated = async (text) => {
     leads.append(lead);
     return { body, mark, lead };
   });
-  // the names stand in a column beside the scanner, in the order of the heights of what they name
+  // on a phone the column of names and the buttons have no room for another word
+  const mark = (word, point, both) => {
+    const [x, y] = point ? onPicture(both, point) : [0, 0];
+    const [left, top] = [x * canvas.clientWidth, y * canvas.clientHeight];
+    const taken = view === "scanner" && (left < 110 || (left > canvas.clientWidth - 170 && top > canvas.clientHeight - 70));
+    word.hidden = !point || (canvas.clientWidth < 520 && taken);
+    [word.style.left, word.style.top] = [`${left.toFixed(1)}px`, `${top.toFixed(1)}px`];
+  };
+  // names are in a column next to the scanner, in the order of the heights of their parts
   const name = (both, turn) => {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     const tip = view === "scanner" ? grid?.tip : [scene.centre[0] + 1.4, scene.centre[1], scene.level];
-    ahead.hidden = !tip || (view === "scanner" && value("apart", 0) > 0);
-    if (!ahead.hidden) [ahead.style.left, ahead.style.top] = onPicture(both, tip).map((share) => `${(100 * share).toFixed(2)}%`);
     const shown = view === "scanner" && !picked && !spinning;
-    const axisMark = element("axis-mark");
-    axisMark.hidden = !shown;
-    if (shown) [axisMark.style.left, axisMark.style.top] = onPicture(both, product(scene.axis, scaled([0, 0, scene.reach], [1, 1, 1])).slice(12, 15)).map((share) => `${(100 * share).toFixed(2)}%`);
+    mark(ahead, view === "scanner" && value("apart", 0) > 0 ? null : tip, both);
+    mark(element("axis-mark"), shown && product(scene.axis, scaled([0, 0, scene.reach], [1, 1, 1])).slice(12, 15), both);
     const placed = labels.map(({ body, mark, lead }) => {
       const place = placeOf(body, turn);
       const at = [0, 1, 2].map((k) => (place[k] + place[4 + k] + place[8 + k]) / 2 + place[12 + k]); // of its box

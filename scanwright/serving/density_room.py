@@ -17,14 +17,14 @@ from scanwright.report.colours import Bands, Colours
 from scanwright.report.room import Room
 
 NODES = 5_000  # approximately, at which the density is known; more would delay the picture
-FINER = 6  # pixels per node and side
+FINER = 4  # pixels per node and side
 SMOOTH = 0.7  # standard deviation in nodes: otherwise the edge of a band follows single scan lines
 BLIND = (236, 236, 240)  # colour of blind directions: a grey that is not in the scale
 AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # three.js: a body has its own colour at intensity pi
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class WallPicture:
     """One picture; `rows` and `columns` interpolate between its nodes."""
 
     handle: viser.ImageHandle
@@ -49,7 +49,7 @@ class DensityRoom:
         self.frame = scene.add_frame("/room", show_axes=False, position=np.zeros(3) if centre_m is None else centre_m)
         size, middle = room.high - room.low, (room.low + room.high) / 2
         side = np.sqrt(2 * (size * np.roll(size, 1)).sum() / NODES)
-        self.walls, nodes = list[Wall](), []
+        self.walls, nodes = list[WallPicture](), []
         for axis, sign in ((axis, sign) for axis in range(3) for sign in (-1, 1)):
             right = np.eye(3)[(axis + 1) % 3]
             z = sign * np.eye(3)[axis]  # a picture is seen from its -z side
@@ -70,20 +70,24 @@ class DensityRoom:
                 cast_shadow=False,
                 receive_shadow=False,
             )
-            self.walls.append(Wall(handle, _finer(len(rows)), _finer(len(columns))))
+            self.walls.append(WallPicture(handle, _finer(len(rows)), _finer(len(columns))))
         points = np.concatenate(nodes)
         self.directions = points / np.linalg.norm(points, axis=1, keepdims=True)
-        self._ends = np.cumsum([len(each) for each in nodes])[:-1]
+        self._ends = np.cumsum([0, *map(len, nodes)])
 
     def colour(self, density: Float[ndarray, " n"], bands: Bands, opacity: Array | None = None) -> None:
         """Show the densities at the nodes, and how opaque the walls are there."""
-        opacity = np.ones(len(density)) if opacity is None else opacity
-        parts = (np.split(values, self._ends) for values in (density, (density > UNSEEN) * 1.0, opacity))
-        for wall, total, seen, opaque in zip(self.walls, *parts, strict=True):
-            share = wall.finer(seen)
-            shown = np.where(share < 0.5, 0.0, wall.finer(total) / np.maximum(share, UNSEEN))
-            alpha = np.round(255 * wall.finer(opaque)).astype(np.uint8)
-            wall.handle.image = np.dstack([density_colours(shown, bands), alpha])
+        seen = (density > UNSEEN) * 1.0
+        for k, wall in enumerate(self.walls):
+            part = slice(self._ends[k], self._ends[k + 1])
+            shown = wall.finer(density[part])
+            if not seen[part].all():
+                share = wall.finer(seen[part])
+                shown = np.where(share < 0.5, 0.0, shown / np.maximum(share, UNSEEN))
+            image = density_colours(shown, bands)
+            if opacity is not None:
+                image = np.dstack([image, np.round(255 * wall.finer(opacity[part])).astype(np.uint8)])
+            wall.handle.image = image
 
 
 def density_colours(density: Float[ndarray, "*n"], bands: Bands) -> Colours:

@@ -1,12 +1,10 @@
-// A cloud of millions of points turns smoothly on any computer: while the view moves, as many of them are drawn as the
-// computer manages at some forty frames a second; once it rests, more and more, up to what it draws in half a second.
-// The points of a node below /cloud come in no order, so that the first of them are all of them, thinned. A line says
-// what share is seen. Scene, camera and the count of frames are those that viser keeps for its own tests in a browser.
+// Draws as many points of a cloud as the computer can: at forty frames a second while the view moves, and more at rest.
+// Points of a node below /cloud are in random order, so that the first of them are a thinned cloud.
 (() => {
   const MOVING_MS = 25;
   const RESTING_MS = 500;
   const RESTS_AFTER_MS = 200;
-  const LEAST_MOVING = 20_000; // points; fewer would hardly be drawn sooner
+  const LEAST_MOVING = 20_000; // points; fewer are hardly faster
   const LEAST_RESTING = 200_000;
   let share = 1; // of the points that are there
   let most = 1; // of them, at rest: what was drawn in time
@@ -55,7 +53,7 @@
     [last, frames] = [now, drawn.frame];
     for (const geometry of geometries)
       geometry.setDrawRange(0, share < 1 ? Math.ceil(share * geometry.attributes.position.count) : Infinity);
-    const seen = share < 1 && !moves ? `1 point of ${Math.round(1 / share)} is drawn: this computer draws no more at once` : "";
+    const seen = share < 1 && !moves ? `1 of ${Math.round(1 / share)} points shown: this computer cannot draw more at once` : "";
     if (line.textContent !== seen) line.textContent = seen;
   };
   requestAnimationFrame(look);

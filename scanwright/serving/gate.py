@@ -1,6 +1,6 @@
-"""Access checks of a live page.
+"""Access checks of a live page: of every request, and of every message before viser reads it.
 
-Every request is checked before it is answered, and every message before viser reads it. Rejected are
+Rejected are
 
 - requests without the token, which is in the address and then in a cookie (HttpOnly, SameSite=Strict);
 - another Host than this computer's, such as a name that resolves to 127.0.0.1 (DNS rebinding);
@@ -8,8 +8,6 @@ Every request is checked before it is answered, and every message before viser r
 - every path but `/` and every query but the token;
 - more than `MOST_VISITORS` connections; messages over `MOST_BYTES` (the library closes the connection);
 - messages that the page does not need: uploads, viser's sharing over the internet, and malformed ones.
-
-The Content-Security-Policy of the page prevents it from loading anything from elsewhere.
 """
 
 from __future__ import annotations
@@ -52,14 +50,12 @@ PAGE_MESSAGES = (
 KNOWN: dict[str, Any] = {
     kind.__name__: kind for kind in viser.infra.Message.get_subclasses() if kind.__name__ in PAGE_MESSAGES
 }
-"""Messages that a page can send; all others are dropped and counted."""
 
 ICON = (
     "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 32 32'%3E%3Crect width='32' height='32' "
     "rx='6' fill='%2300224e'/%3E%3Cpath d='M16 25 6 9a16 16 0 0 1 20 0z' fill='%23fee838'/%3E%3Ccircle cx='16' cy='25' "
     "r='3' fill='%23fff'/%3E%3C/svg%3E"
 )
-"""Icon of the browser tab: a sector of beams."""
 
 ADDED_TO_PAGE = (
     "mended_page.css",
@@ -69,7 +65,6 @@ ADDED_TO_PAGE = (
     "state_banner.js",
     "setting_link.js",
 )
-"""A style and scripts that are inserted into the page before its own."""
 
 Answer = Callable[[ServerConnection, Request], Response | None]
 

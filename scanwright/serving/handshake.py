@@ -1,7 +1,6 @@
-"""Checks of a browser's request before a server answers, and the socket that it listens on.
+"""Checks of a request by Host and Origin, headers that a page cannot choose, and the socket of a server.
 
-A browser lets any page open a websocket to this computer. Two headers, which a page cannot choose, identify the origin:
-Host, which differs if a name was made to resolve to 127.0.0.1 (DNS rebinding), and Origin, the page of the script.
+A browser lets any page open a websocket to this computer; Host differs after DNS rebinding.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ def bound(port: int) -> socket.socket:
     Raises:
         TaskError: the port is taken.
     """
-    # with the protocol named, asyncio sends small messages at once: else each waits 40 ms for the last one's receipt
+    # with the protocol named, asyncio sends small messages at once; otherwise each waits 40 ms for a receipt
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

@@ -1,7 +1,5 @@
-// viser's page for those who hear it or have no mouse: names for what has none, one landmark, and focus for what scrolls.
-// The page is React's and changes at any time; it never takes back an attribute that it did not set.
+// Accessibility of viser's page: names for controls, one landmark, and focus for what scrolls.
 (() => {
-  // as dark as the person has it everywhere else; viser asks for this once, before it draws
   const dark = matchMedia("(prefers-color-scheme: dark)");
   window.__VISER_EMBED_CONFIG__ = { darkMode: dark.matches };
   dark.addEventListener("change", () => location.reload());
@@ -10,7 +8,7 @@
     if (value && element.getAttribute(name) !== value) element.setAttribute(name, value);
   };
 
-  // a slider and the number beside it stand in one row with one label, which belongs to neither
+  // a slider and its number share a label, which belongs to neither
   const nameRows = () => {
     for (const label of document.querySelectorAll("label[for]")) {
       const row = label.closest(".mantine-Flex-root");
@@ -30,25 +28,25 @@
     }
   };
 
-  // on a phone the view ends where the sheet begins, so that its middle is seen
+  // on a phone the view ends at the sheet
   const sheetHeight = new ResizeObserver(([sheet]) => {
     const covered = sheet.target.isConnected ? sheet.target.offsetHeight : 0;
     document.documentElement.style.setProperty("--sw-sheet", `${covered}px`);
   });
 
-  // Ctrl-Z in a field where nothing was typed since Enter has nothing to take back there: it is meant for the page
-  const undoes = (told) => (told.ctrlKey || told.metaKey) && told.key.toLowerCase() === "z";
+  // Ctrl-Z in a field without typed text is for the page
+  const undoes = (event) => (event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z";
   let typed = false;
   addEventListener("input", ({ target }) => (typed = target.type !== "checkbox"), true);
   addEventListener("focusin", () => (typed = false), true);
   addEventListener(
     "keydown",
-    (told) => {
-      if (told.key === "Enter") typed = false;
-      if (!undoes(told) || typed || !(told.target instanceof HTMLInputElement)) return;
-      told.preventDefault();
-      told.stopImmediatePropagation();
-      document.documentElement.dispatchEvent(new KeyboardEvent("keydown", told));
+    (event) => {
+      if (event.key === "Enter") typed = false;
+      if (!undoes(event) || typed || !(event.target instanceof HTMLInputElement)) return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      document.documentElement.dispatchEvent(new KeyboardEvent("keydown", event));
     },
     true,
   );
@@ -74,6 +72,5 @@
       }
   };
 
-  // before the next frame, so that nobody meets a control without its name
   new MutationObserver(mend).observe(document, { childList: true, subtree: true });
 })();

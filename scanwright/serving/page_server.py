@@ -1,9 +1,4 @@
-"""The server of a live page, with access checks, until its last visitor has left.
-
-viser serves its page and its websocket from one asyncio server of the `websockets` library without access checks. That
-server is opened here, on a socket that is bound to 127.0.0.1, with a `Gate` for each connection. There is no second
-port without checks, which a relay would have.
-"""
+"""The server of a live page: that of viser, opened here on 127.0.0.1 with a `Gate` for each connection."""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
-// The setting of the page: `#angles=...` in the address follows it, a link that has one sets it once, and dots on pads
-// (`.sw-pad`: two of the four angles, from `data-first` on) are dragged or moved by arrow keys. An element of class
-// sw-setting holds the angles, and the id of the field that takes them.
+// The angles of the page: `#angles=...` in the address follows them, and a link with angles sets them once. Dots on pads
+// (`.sw-pad`: two of the four angles, from `data-first` on) are dragged or moved by arrow keys.
 (() => {
   let wanted = new URLSearchParams(location.hash.slice(1)).get("angles");
   let shown = null; // angles of the page before the link
   let tries = 0;
   let held = null; // the pad on which a pointer is down,
-  let box = null; // and where it was then: lines above it may come and go
+  let box = null; // and its place then: lines above it may change
   let angles = [];
   let waits = false;
 
@@ -16,11 +15,11 @@
     window.__viserMutable.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value: angles.join(",") } });
   };
   // viser ignores what a page sends before the server knows its camera
-  const ask = () => {
+  const request = () => {
     if (!wanted) return;
     angles = wanted.split(",");
     send();
-    if (++tries < 20) setTimeout(ask, 250);
+    if (++tries < 20) setTimeout(request, 250);
     else wanted = null;
   };
   const place = (pad) => {
@@ -47,7 +46,7 @@
     if (wanted) {
       shown ??= setting.dataset.angles;
       if (setting.dataset.angles === shown) {
-        if (!tries) ask();
+        if (!tries) request();
         return;
       }
       wanted = null;
@@ -60,26 +59,26 @@
   };
   new MutationObserver(look).observe(document, { childList: true, subtree: true, attributeFilter: ["data-angles"] });
 
-  const on = (event, act) => addEventListener(event, (told) => told.target instanceof Element && act(told, told.target), true);
-  on("pointerdown", (told, target) => {
+  const on = (name, act) => addEventListener(name, (event) => event.target instanceof Element && act(event, event.target), true);
+  on("pointerdown", (event, target) => {
     held = target.closest(".sw-pad");
     if (!held) return;
     box = held.getBoundingClientRect();
-    told.preventDefault(); // of the picture, which would be dragged itself
+    event.preventDefault(); // no drag of the picture
     held.querySelector(".sw-dot").focus();
-    held.setPointerCapture(told.pointerId);
-    follow(told);
+    held.setPointerCapture(event.pointerId);
+    follow(event);
   });
-  on("pointermove", (told) => held && follow(told));
+  on("pointermove", (event) => held && follow(event));
   for (const event of ["pointerup", "pointercancel"]) on(event, () => (held = null));
-  on("keydown", (told, target) => {
-    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[told.key];
+  on("keydown", (event, target) => {
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
     if (!step || !target.matches(".sw-dot")) return;
-    told.preventDefault();
-    told.stopImmediatePropagation(); // the view takes arrow keys too
+    event.preventDefault();
+    event.stopImmediatePropagation(); // the view uses arrow keys too
     const pad = target.closest(".sw-pad");
     const first = Number(pad.dataset.first);
-    move(pad, step.map((part, k) => angles[first + k] + part * (told.shiftKey ? 0.1 : 1)));
+    move(pad, step.map((part, k) => angles[first + k] + part * (event.shiftKey ? 0.1 : 1)));
   });
   on("click", (_, target) => {
     if (target.closest("button")?.textContent.trim() === "Copy link") navigator.clipboard?.writeText(location.href);

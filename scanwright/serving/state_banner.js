@@ -1,5 +1,4 @@
-// The state that a page must not miss, such as a scan that failed: words of the hidden element `.sw-state`, over the view.
-// They stay if the panel that holds the element is folded, and give way to `data-lost` if the connection breaks.
+// A banner over the view with the text of the hidden element `.sw-state`, or of `data-lost` if the connection breaks.
 (() => {
   const banner = document.createElement("div");
   banner.className = "sw-banner";

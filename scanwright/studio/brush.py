@@ -16,8 +16,7 @@ from scanwright.studio.view.view_3d import View3D
 STROKE = 0.5  # of the radius: a stroke leaves a dab each time it has moved that far
 LEAST_DEG, MOST_DEG = 1.0, 60.0  # radius of a dab; as the slider
 
-Paint = Callable[[tuple[Dab, ...], int], None]
-"""Called with all dabs and the number of the last stroke."""
+Paint = Callable[[tuple[Dab, ...], int], None]  # called with all dabs and the number of the last stroke
 
 
 class PaintBrush:
@@ -54,7 +53,7 @@ class PaintBrush:
             guarded(lambda: self.dab(eye, np.asarray(event.end_position) - eye))(event)
 
     def dab(self, ray_origin: Any, ray_direction: Any) -> None:
-        """Paint where a ray from the camera leaves the room."""
+        """Paint where a ray from the camera leaves the room; raise TaskError if there is too much paint."""
         c = self._controls
         hit = self._view.room.beyond(np.asarray(ray_origin, float), np.asarray(ray_direction, float))
         if hit is None or not c.painting.value or c.brush.value not in BRUSHES:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from threading import Lock
 
 from scanwright.design.task.angle_ranges import NAMES
-from scanwright.studio.state import Canvas, Setting
+from scanwright.studio.state import Dab, Setting
 
 JOINED_S = 1.0  # changes of one control within this time are one step: a slider that is dragged
 MOST_STEPS = 500
@@ -16,9 +16,9 @@ MOST_STEPS = 500
 
 @dataclass(frozen=True, slots=True)
 class PageState:
-    """All that a person changes on the page: canvas, angles, kept settings by name, other controls."""
+    """All that a person changes on the page: paint, angles, kept settings by name, other controls."""
 
-    canvas: Canvas
+    dabs: tuple[Dab, ...]
     setting: Setting
     kept: tuple[tuple[str, Setting], ...]
     fields: tuple[tuple[str, object], ...]
@@ -26,8 +26,6 @@ class PageState:
 
 def difference(before: PageState, after: PageState) -> str:
     """Return the change between two states, in words."""
-    if after.canvas.base is not before.canvas.base:
-        return f"task {before.canvas.base.task.name} to {after.canvas.base.task.name}"
     angles = [
         f"{name} {old:g} to {new:g}"
         for name, old, new in zip(NAMES, before.setting.angles_deg, after.setting.angles_deg, strict=True)
@@ -40,7 +38,7 @@ def difference(before: PageState, after: PageState) -> str:
     return "; ".join(
         [
             *angles,
-            *_painted(len(after.canvas.dabs) - len(before.canvas.dabs), len(after.canvas.dabs)),
+            *_painted(len(after.dabs) - len(before.dabs), len(after.dabs)),
             *(f"keep {name}" for name in kept if name not in were),
             *(f"remove {name}" for name in were if name not in kept),
             *(

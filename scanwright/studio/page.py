@@ -6,6 +6,7 @@ in other processes. All visitors see and move the same setting.
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Hashable
 from dataclasses import replace
@@ -18,25 +19,29 @@ import viser
 
 from scanwright.design.angles import STANDARD_DEG, standard_settings
 from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.progress import Progress
 from scanwright.design.search.optimum import Optimum
-from scanwright.design.task.task import LoadedTask, load_task, shipped_tasks
+from scanwright.design.task.task import LoadedTask
 from scanwright.report.colours import bands_to
+from scanwright.serving.page_server import guarded_server, wait_until_alone
 from scanwright.serving.style import key_html, note_html
 from scanwright.studio.brush import PaintBrush
 from scanwright.studio.history import JOINED_S, History, PageState
 from scanwright.studio.panel import panel_html
-from scanwright.studio.panel.controls import NO_SCENE, TASK_SCENE, Controls, name_of_copy, put, scan_scenes
+from scanwright.studio.panel.controls import NO_SCENE, TASK_SCENE, Controls, put
 from scanwright.studio.panel.facts import Facts, Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
 from scanwright.studio.panel.pads import pads_html
 from scanwright.studio.panel.saving import Saving
 from scanwright.studio.searching import Searching
-from scanwright.studio.state import Canvas, Dab, Setting
+from scanwright.studio.state import Dab, Setting, painted
 from scanwright.studio.view.latest_only import LatestOnly
 from scanwright.studio.view.outlines import highest_density
 from scanwright.studio.view.view_3d import View3D
 from scanwright.studio.view.workers import Order, Workers
 
+_LOG = logging.getLogger(__name__)
+ALONE_S = 300.0  # without a visitor; a browser that restarts returns sooner
 FIRST_S = 30.0  # at most, for the first colours
 
 
@@ -45,29 +50,25 @@ class Studio:
 
     def __init__(self, server: viser.ViserServer, loaded: LoadedTask, saved_to: Path, out: Path) -> None:
         self._server = server
-        self._canvas = Canvas(loaded)
+        self._loaded, self._dabs = loaded, tuple[Dab, ...]()
         self.judge = Judge.for_task(loaded)
         self.facts: Facts | None = None
-        self._message_of: tuple[Canvas, Setting] | None = None
-        self._searched: dict[Canvas, Optimum] = {}
+        self._message_of: tuple[tuple[Dab, ...], Setting] | None = None
+        self._searched: dict[tuple[Dab, ...], Optimum] = {}
         self.view = View3D(server, loaded.task)
-        names = shipped_tasks()
-        own = loaded.task.name if loaded.task.name in names and loaded.source.parent != saved_to else str(loaded.source)
-        self._tasks = [own, *(name for name in names if name != own)]
-        self._opened = {own: loaded}
-        self.controls = Controls(server.gui, loaded, self._tasks, Setting(STANDARD_DEG["rolling"]))
-        self.brush = PaintBrush(self.view, self.controls, lambda: self._canvas.dabs, self._paint)
+        self.controls = Controls(server.gui, loaded, Setting(STANDARD_DEG["rolling"]))
+        self.brush = PaintBrush(self.view, self.controls, lambda: self._dabs, self._paint)
         self.kept = KeptSettings(self.controls, self.move, self.judge)
         self.saving = Saving(self.controls, saved_to, out)
         self.judging: LatestOnly[Setting] = LatestOnly("judge", self._follow, self._rest)
-        self.painting: LatestOnly[Canvas] = LatestOnly("paint", self._take, lambda _: self.kept.rejudge(self.judge))
+        self.painting: LatestOnly[tuple[Dab, ...]] = LatestOnly(
+            "paint", self._take, lambda _: self.kept.rejudge(self.judge)
+        )
         self.workers = Workers(
             self.view, lambda text, bad: setattr(self.controls.making, "content", note_html(text, bad=bad))
         )
         self.history = History(self._state())
-        self.searching = Searching(
-            self.controls, self.show, lambda: (self._canvas, self.setting), self._use_optimum, self.move
-        )
+        self.searching = Searching(self.controls, self.show, self._now, self._use_optimum, self.move)
         self._connect()
         self._task_changed()
         self.judging.settled(FIRST_S)  # the first picture has its colours
@@ -85,14 +86,14 @@ class Studio:
 
     def show(self, text: str, bad: bool = False) -> None:
         """Show a message, until the state of the page changes."""
-        self._message_of = (self._canvas, self.setting)
+        self._message_of = (self._dabs, self.setting)
         self.controls.note.content = note_html(text, bad=bad)
 
     def _update_text(self) -> None:
         """Show the angles as text, and remove a message of another state."""
         put(self.controls.typed, self.setting.text)
         self.controls.typed_error.content = ""
-        if self.controls.note.content and self._message_of != (self._canvas, self.setting):
+        if self.controls.note.content and self._message_of != (self._dabs, self.setting):
             self.controls.note.content = ""
 
     def move(self, setting: Setting, of: Hashable = None, joined_s: float = math.inf) -> None:
@@ -103,9 +104,12 @@ class Studio:
         self.judging.request(setting)
         self._note(of, joined_s)
 
+    def _now(self) -> tuple[LoadedTask, tuple[Dab, ...], Setting]:
+        return painted(self._loaded, self._dabs), self._dabs, self.setting
+
     def _state(self) -> PageState:
         fields = tuple((name, control.value) for name, control in self.controls.fields.items())
-        return PageState(self._canvas, self.setting, self.kept.settings, fields)
+        return PageState(self._dabs, self.setting, self.kept.settings, fields)
 
     def _note(self, of: Hashable = None, joined_s: float = JOINED_S) -> None:
         self.history.note(self._state(), of, joined_s)
@@ -115,21 +119,18 @@ class Studio:
         """Undo or redo."""
         if (moment := step()) is None:
             return
-        before, self._canvas = self._canvas, moment.canvas
+        before, self._dabs = self._dabs, moment.dabs
         for name, value in moment.fields:
             put(self.controls.fields[name], value)
         for slider, angle in zip(self.controls.angles, moment.setting.angles_deg, strict=True):
             put(slider, angle)
         self._update_text()
-        if moment.canvas.base is not before.base:
-            self._offer_scenes()
-            put(self.controls.task, next(name for name, task in self._opened.items() if task is self._canvas.base))
         if moment.kept != self.kept.settings:
             self.kept.take(moment.kept)
-        if moment.canvas == before:
+        if moment.dabs == before:
             self.judging.request(moment.setting)
         else:
-            self.painting.request(moment.canvas)
+            self.painting.request(moment.dabs)
         self.controls.show_steps(self.history.undoes, self.history.redoes)
 
     def _keep(self) -> None:
@@ -170,8 +171,7 @@ class Studio:
             field.on_update(noted)
         for field in (c.brush, c.radius):
             field.on_update(lambda _: self.brush.show())
-        c.task.on_update(self._guarded(self._change_task))
-        c.painting.on_update(lambda _: self.brush.arm(self._guarded))
+        c.painting.on_update(self._guarded(self._arm))
         c.undo_key.on_trigger(self._guarded(undo))
         c.redo_key.on_trigger(self._guarded(redo))
         c.brush_key.on_trigger(lambda _: put(c.painting, not c.painting.value))
@@ -193,7 +193,7 @@ class Studio:
 
     def _write(self, write: Callable[[LoadedTask, Setting], object]) -> None:
         self.saving.refuse("")
-        write(self._canvas.painted(), self.setting)
+        write(painted(self._loaded, self._dabs), self.setting)
 
     def _guarded(self, act: Callable[[], Any], refuse: Callable[[str], None] | None = None) -> Callable[[Any], None]:
         """Return an event handler that shows errors, at their field if `refuse` does."""
@@ -224,47 +224,27 @@ class Studio:
         self.controls.facts.content = panel_html.facts_html(facts, self.controls.typed._impl.uuid)
         self._server.flush()
 
-    def _change_task(self) -> None:
-        name = self.controls.task.value
-        if name not in self._tasks:  # a page could name any file of this computer
-            raise TaskError(f"task '{name}': not in the list")
-        if name not in self._opened:
-            self._opened[name] = load_task(Path(name))
-        if self._opened[name] is self._canvas.base:
-            return
-        self._canvas = Canvas(self._opened[name])
-        self.kept.take(())  # of the previous task
-        self._update_text()
-        self._offer_scenes()
-        put(self.controls.name, name_of_copy(self._canvas.base))
-        self.painting.request(self._canvas)
-        self._note()
-
     def _use_optimum(self, optimum: Optimum) -> None:
         """Judge by the task with the period of the optimum."""
         self.judge = replace(self.judge, loaded=optimum.loaded, problem=optimum.problem)
-        self._searched[self._canvas] = optimum
+        self._searched[self._dabs] = optimum
         self._show_pads()
         self.kept.rejudge(self.judge)
 
     def _show_pads(self) -> None:
         """Show the landscapes of the task as it is painted now."""
-        self.controls.pads.content = pads_html(self._searched.get(self._canvas))
-
-    def _offer_scenes(self) -> None:
-        self.controls.scene.options = scan_scenes(self._canvas.base)
+        self.controls.pads.content = pads_html(self._searched.get(self._dabs))
 
     def _paint(self, dabs: tuple[Dab, ...], stroke: int | None = None) -> None:
-        canvas = Canvas(self._canvas.base, dabs)
-        canvas.painted()  # rejects an invalid task
-        self._canvas = canvas
+        painted(self._loaded, dabs)  # rejects an invalid task
+        self._dabs = dabs
         self._update_text()
-        self.painting.request(canvas)
+        self.painting.request(dabs)
         self._note(("stroke", stroke) if stroke is not None else None, math.inf)
 
-    def _take(self, canvas: Canvas) -> None:
+    def _take(self, dabs: tuple[Dab, ...]) -> None:
         try:
-            judge = Judge.for_task(canvas.painted())
+            judge = Judge.for_task(painted(self._loaded, dabs))
         except ScanwrightError as error:
             self.show(str(error), bad=True)
             return
@@ -279,13 +259,16 @@ class Studio:
             "beams per direction, without parts; grey: none; white: region of interest; red: hidden by the robot",
         )
         self._show_pads()
-        self.view.enter(self.judge.loaded.task)
         self.view.outline(self.judge.problem)
-        self.brush.arm(self._guarded)
-        masks = sum(dab.brush == "hidden" for dab in self._canvas.dabs)
-        count = len(self._canvas.dabs)
-        self.controls.painted.content = note_html(f"{count} dabs, {masks} of them hide directions")
+        masks = sum(dab.brush == "hidden" for dab in self._dabs)
+        self.controls.painted.content = note_html(f"{len(self._dabs)} dabs, {masks} of them hide directions")
         self.judging.request(self.setting)
+
+    def _arm(self) -> None:
+        self.brush.arm(self._guarded)
+        if self.controls.painting.value and not self.controls.density.value:
+            put(self.controls.density, True)  # the brush paints on what is shown
+            self._show_density()
 
     def _show_density(self) -> None:
         self.view.show_density(self.controls.density.value)
@@ -297,10 +280,28 @@ class Studio:
         self.workers.order(Order(loaded, problem, self.setting, self.controls.scanner.value, scene))
 
     def _show_scanner(self) -> None:
-        self.view.show_scanner(self.controls.scanner.value)
+        self.view.scanner.visible = self.controls.scanner.value
         self._order()
 
     def _change_scene(self) -> None:
         if self.controls.scene.value == NO_SCENE:
             self.view.show_points(np.empty((0, 3)))
         self._order()
+
+
+def run_studio(
+    loaded: LoadedTask, *, port: int, out: Path, progress: Progress, announce: Callable[[str], None]
+) -> None:
+    """Serve the studio until some minutes after the last visitor; raise TaskError if the port is taken."""
+    with guarded_server(f"Scanwright: {loaded.task.name}", port, recall=True) as (server, gate):
+        progress("reading the task (first run: compiling, about 5 s)")
+        studio = Studio(server, loaded, Path.cwd(), out)
+        try:
+            announce(gate.address)
+            studio.searching.begin()
+            progress(f"press Ctrl-C to end; without a visitor the studio ends after {ALONE_S / 60:g} minutes")
+            wait_until_alone(gate, ALONE_S)
+        finally:
+            studio.close()
+        for why, count in gate.refused.items():
+            _LOG.warning("refused %d requests: %s", count, why)

@@ -10,9 +10,10 @@ from scanwright.design.errors import ScanwrightError
 from scanwright.design.evaluation.as_built import as_built
 from scanwright.design.objective.holes import percent
 from scanwright.design.search.optimum import Optimum, find_optimum
+from scanwright.design.task.task import LoadedTask
 from scanwright.pipeline.build import setting_built
 from scanwright.studio.panel.controls import Controls, put
-from scanwright.studio.state import Canvas, Setting
+from scanwright.studio.state import Dab, Setting
 
 SEARCH_STEPS = 9  # progress lines of a search
 
@@ -24,7 +25,7 @@ class Searching:
         self,
         controls: Controls,
         show: Callable[..., None],
-        now: Callable[[], tuple[Canvas, Setting]],
+        now: Callable[[], tuple[LoadedTask, tuple[Dab, ...], Setting]],
         use: Callable[[Optimum], None],
         move: Callable[[Setting, Hashable], None],
     ) -> None:
@@ -40,7 +41,7 @@ class Searching:
         c.progress.visible, c.progress.animated = True, True
         Thread(target=self._run, args=self._now(), name="optimise", daemon=True).start()
 
-    def _run(self, canvas: Canvas, setting: Setting) -> None:
+    def _run(self, task: LoadedTask, dabs: tuple[Dab, ...], setting: Setting) -> None:
         steps = 0
 
         def progress(step: str, _fraction: float | None = None, /) -> None:
@@ -50,11 +51,11 @@ class Searching:
             self._show(step)
 
         try:
-            optimum = find_optimum(canvas.painted(), progress)
-            if canvas != self._now()[0]:
+            optimum = find_optimum(task, progress)
+            if dabs != self._now()[1]:
                 return
             self._use(optimum)
-            if setting != self._now()[1]:
+            if setting != self._now()[2]:
                 self._show("optimum found; Optimise moves the sliders there")
                 return
             step = object()  # both moves are one
@@ -65,7 +66,7 @@ class Searching:
             self._show(f"{title}; {holes}; searching the equivalent mount whose parts block the fewest beams")
             with worker_processes() as begin:
                 chosen = begin(setting_built, optimum)()
-            if (canvas, bare) == self._now():
+            if (dabs, bare) == self._now()[1:]:
                 self._move(Setting.within_bounds(chosen.family.angles_deg), step)
             seen = as_built(
                 optimum.problem,

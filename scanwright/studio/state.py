@@ -33,7 +33,7 @@ class Setting:
 
     @classmethod
     def within_bounds(cls, angles_deg: Iterable[float]) -> Setting:
-        """Return a setting, each angle within its bounds and rounded to 0.01 deg."""
+        """Return a setting, clipped and rounded to 0.01 deg; raise ValueError if it is not four finite numbers."""
         angles = np.array([float(angle) for angle in angles_deg])
         if angles.shape != (4,) or not np.isfinite(angles).all():
             raise ValueError(f"{angles.tolist()}: not four finite angles")
@@ -45,7 +45,7 @@ class Setting:
 
     @classmethod
     def read(cls, text: str) -> Setting:
-        """Return the setting that a text states."""
+        """Return the setting of a text; raise TaskError if it is not four numbers within the bounds."""
         try:
             angles = [float(part) for part in text.replace(",", " ").split()]
             setting = cls.within_bounds(angles)
@@ -88,26 +88,8 @@ class Dab:
         return ConeRegion(shape="cone", axis=axis, half_angle_deg=self.radius_deg, value=value)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Canvas:
-    """The task that is judged: equal for the same paint on the same loaded task."""
-
-    base: LoadedTask
-    dabs: tuple[Dab, ...] = ()
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Canvas) and self.base is other.base and self.dabs == other.dabs  # its maps are arrays
-
-    def __hash__(self) -> int:
-        return hash((id(self.base), self.dabs))
-
-    def painted(self) -> LoadedTask:
-        """Return the task with the paint."""
-        return painted(self.base, self.dabs)
-
-
 def painted(loaded: LoadedTask, dabs: tuple[Dab, ...]) -> LoadedTask:
-    """Return the task with paint: dabs that hide join the masks, the others the weights."""
+    """Return the task with paint: dabs that hide join the masks, the others the weights; raise TaskError if invalid."""
     if len(dabs) > MOST_DABS:
         raise TaskError(f"paint: {len(dabs)} dabs: {MOST_DABS} at most; use a wider brush, or a map")
     task = loaded.task

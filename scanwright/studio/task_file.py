@@ -1,4 +1,4 @@
-"""Write the task file of the studio."""
+"""Write the task file of the studio; a wrong name, or a file that cannot be written, raises TaskError."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
-FRICTION = 0.15  # of plastic on metal or plastic, dry: the low end of what is measured
+FRICTION = 0.15  # of plastic on metal or plastic, dry: the low end of measured values
 
 
 def angle_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:

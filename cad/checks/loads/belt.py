@@ -44,7 +44,7 @@ def _angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Finding:
     off = math.radians(error) * FAR_MM
     message = (
         f"{BELT}: the axis is off the servo's angle by up to {error:.2g} deg, once per turn ({off:.0f} mm at 10 m): "
-        f"{math.degrees(run_out):.2g} if both printed pulleys are off their axes by half of their play, and "
+        f"{math.degrees(run_out):.2g} if both printed pulleys are off their axes by half of their clearance, and "
         f"{math.degrees(stretch):.2g} of stretch"
     )
     severity: Severity = "ok" if error <= limit else "warning"

@@ -27,12 +27,12 @@ from scanwright.design.scanner import Scanner
 
 POSITIONS = 72  # of the servo, around a turn
 LEAST_ERROR = 0.25  # share of the bend: a finer grid changed it by 3 % mostly, 22 % at worst, on seven mounts
-FAILS_DEG = 1.0  # a constant bend up to this is a warning, since `calibrate` corrects it; beyond, nothing supports it
+FAILS_DEG = 1.0  # a constant bend up to this is a warning, since `calibrate` corrects it
 
 
 @dataclass(frozen=True, slots=True)
 class BeamError:
-    """Largest over a turn: angle of the lidar [rad], and how far that puts a beam off at FAR_MM [mm]."""
+    """Largest over a turn: angle of the lidar [rad], and offset of a beam at FAR_MM [mm]."""
 
     angle_rad: float
     off_mm: float

@@ -65,7 +65,7 @@ def _horn(scanner: Scanner, cage: BearingCage | None, weight: Weight, shared: Su
     both = ", ".join(f"{total:.3g} in {name}" for name, total in sums.items())
     what = f"worst tilt moment on the horn of {servo.name}, {both}; in aluminium {parts}"
     by, limit = ("", None) if rating is None else (f"; half of its rating of {rating:g} N m allowed", SHARE * rating)
-    hint = "lighten what turns, or raise the axis"
+    hint = "use a lighter lidar or linkage, or raise the axis"
     return rated("tilt_moment", max(sums.values()), limit, "N m", SERVO, what, by, hint)
 
 

@@ -130,7 +130,7 @@ def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
         turned = np.linalg.pinv(stiffness, rcond=1e-9) @ cross_matrix(centre_m - start.mean(axis=0))
         shares += np.array([-cross_matrix(arm) @ turned for arm in arms])
     pulls = np.linalg.norm(np.einsum("ni,nij->nj", along, shares), axis=1)
-    if joint.heel_mm is not None:  # a pair: what turns about its line is held by the edge and both screws
+    if joint.heel_mm is not None:  # a pair: the edge and both screws carry the moment about its line
         line, arm = start[1] - start[0], centre_m - start.mean(axis=0)
         turning = np.cross(line / np.linalg.norm(line), arm)
         pulls = pulls + float(np.linalg.norm(turning)) / (2 * joint.heel_mm / 1000)

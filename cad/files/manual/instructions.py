@@ -48,7 +48,7 @@ def instructions_text(
         f"beta_rot {angles.beta_rot:g}, alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
         "In the pictures present bodies are grey, new made parts orange, new bought ones blue; the rotation axis is "
         "upright, or the lidar's axis if the step is on the bench. `exploded.glb` shows the scanner in 3D; `bom.csv` "
-        "lists what you need.",
+        "lists all items.",
         "",
         *_to_measure(assembly),
         f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
@@ -65,7 +65,7 @@ def instructions_text(
     ]
     lines += [LOCKED, ""]
     if any(joint.inserts for joint in joints):
-        lines += ["Melt the inserts in before anything else, flush with the face that the screw comes from.", ""]
+        lines += ["Melt the inserts in first, flush with the face on the side of the screw.", ""]
     if any(joint.traps for joint in joints):
         lines += [NUTS, ""]
     for number, scene in enumerate(scenes, start=1):
@@ -117,7 +117,7 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     """Return one joint as a sentence, with the torque of its screws."""
     what = f"{joint.count} x {joint.number}{'' if joint.washer_mm is None else ' with washers'}"
     nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
-    where = {
+    place = {
         "thread": f"from {joint.part} into {joint.onto}",
         "trap": f"from {joint.part} onto {nuts} in {joint.onto}",
         "nut": f"through {joint.part} into {joint.onto}, with {nuts}",
@@ -127,7 +127,7 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         inserts = f", through {nuts} in its bore"
-    return f"{what} {where}{inserts}, {torque_in_words(assembly, joint)}."
+    return f"{what} {place}{inserts}, {torque_in_words(assembly, joint)}."
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:

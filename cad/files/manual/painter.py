@@ -25,7 +25,7 @@ class Piece:
     """Something to draw."""
 
     scene: Scene  # its triangles
-    moved_m: Vector  # where it is moved to
+    moved_m: Vector  # displacement
     colour: Array  # sRGB, 0 to 255
 
 

@@ -13,7 +13,7 @@ from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, 
 
 PRELOAD_N = 10.0  # least, of each strand: assumed for the seat of a small belt in its grooves
 SEAT_N_PER_M = 10e6  # sideways stiffness of a bearing in a printed seat: assumed
-PRELOAD_SHARE = 1.0  # of the largest working pull: twice what keeps the slack strand tight
+PRELOAD_SHARE = 1.0  # of the largest working pull: twice the least that keeps the slack strand tight
 
 
 @dataclass(frozen=True, slots=True)

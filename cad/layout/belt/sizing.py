@@ -41,7 +41,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
             its screws leave no wall, or the lidar would hang upside down.
     """
     ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
-    assert ring is not None and ring.flange is not None and ring.rotor is not None  # what a capsule has
+    assert ring is not None and ring.flange is not None and ring.rotor is not None  # of every capsule
     bore = ring.rotor.diameter_mm + 2 * TUBE_WALL
     carrier = _carrier(scanner, ring, bore + 2 * SHAFT_WALL)
     belt = _belt(scanner, ring)

@@ -50,7 +50,7 @@ PLATE = 5.0  # of the servo
 HORN_BOSS_GAP = 0.5  # over the boss of the horn, in the foot of the drive pulley
 UNDER_HORN_HEAD = 4.0  # of the drive pulley: at least
 SEAT_GAP = 0.2  # the feet carry, not the plate
-INNER_RING = 1.45  # how far a shoulder may touch a bearing's inner ring, on the radius
+INNER_RING = 1.45  # width of a bearing's inner ring that a shoulder may touch
 SEAT_WALL = 5.0  # of the tower
 LIP = 1.5  # of the tower inside the bearings' outer rings
 CHAMBER_GAP = 1.5  # around flange and ring in the tower
@@ -129,7 +129,7 @@ class BeltStack(Hub):
 
     @property
     def rim_radius(self) -> float:
-        """Radius of the pulleys' rims: the largest of what turns with them."""
+        """Radius of the pulleys' rims, the largest of the pulleys."""
         return self.belt_radius + RIM_ABOVE_BELT
 
     @property

@@ -27,7 +27,7 @@ TRAP_WALL = 3.0  # of the boss outside a nut
 WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
 TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator next to it
 PLUG_PLAY = 1.0  # clearance around a plug in a hole
-PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest of what the printers make
+PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest material of the printers
 POISSON = 0.35
 
 

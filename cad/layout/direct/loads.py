@@ -107,7 +107,7 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
         weight: of all that turns.
         stack: with a bearing.
         cage_n_per_m: sideways stiffness of the cage at the bearing.
-        metal: what the shaft is of.
+        metal: of the shaft.
     """
     b = (stack.bearing_middle - stack.horn) / 1000
     waist = metal.waist * stack.waist_diameter

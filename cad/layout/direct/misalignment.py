@@ -15,10 +15,10 @@ from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.loads import UNRATED_NM, Weight, rated_moment_nm
 from scanwright.design.scanner import Scanner
 
-TRUED_MM = 0.03  # on the indicator over a turn: the flange is tapped within the play of its screws
-SLEEVE_BOND_MM = 0.04  # most runout of the sleeve against the shaft: play of its bore, and its own
+TRUED_MM = 0.03  # on the indicator over a turn: the flange is tapped within the clearance of its screws
+SLEEVE_BOND_MM = 0.04  # largest runout of the sleeve against the shaft: clearance of its bore, and its own
 INNER_RING_MM = 0.013  # Kia of a bearing of the normal class, 18 to 30 mm, ISO 492
-SLEEVE_FIT_MM = 0.02  # most play of g6 in the inner ring, on the diameter: ISO 286, ISO 492
+SLEEVE_FIT_MM = 0.02  # largest clearance of g6 in the inner ring, on the diameter: ISO 286, ISO 492
 BEARING_CLEARANCE_MM = 0.02  # most radial clearance of the normal group, 24 to 30 mm, ISO 5753-1
 CAGE_SET_MM = 0.02  # that the cage springs off the sleeve's middle when its screws are tightened: assumed
 WARMER_K = 20.0  # than when it was set

@@ -8,7 +8,7 @@ ring's top, all fixed parts around the shaft stay below it: clearance over a tur
     -h                top of the linkage's hub
     shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
     hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
-    leads_low         HUB_GAP, or what the bend of its leads needs, below: the end of the ring's rotor collar
+    leads_low         HUB_GAP, or the height of the bend of its leads, below: the end of the ring's rotor collar
     ring_top          the collar's length below
     ring_bottom       the length of the ring's stator below
                       RING_GAP, or the shaft's waist, below: top of the shaft's collar
@@ -73,7 +73,7 @@ class DirectStack(Hub):
     flange_thickness: float
     collar_radius: float
     collar_height: float
-    waist_length: float  # of the thin piece that bends where horn and bearing are not quite in line
+    waist_length: float  # of the thin piece that bends if horn and bearing are not quite in line
     waist_diameter: float  # in aluminium
     foot_radius: float = 0.0  # of a cup over the screws of a servo frame; else 0
     foot_height: float = 0.0
@@ -86,7 +86,7 @@ class DirectStack(Hub):
 
     @property
     def horn_grip(self) -> float:
-        """Thickness of what the horn's screws hold."""
+        """Thickness of the part below the heads of the horn's screws."""
         return self.grip or self.flange_thickness
 
     @property
@@ -111,7 +111,7 @@ class DirectStack(Hub):
 
     @property
     def cage_seat(self) -> float:
-        """Height of the lip that the bearing lies on, if it falls down its play."""
+        """Height of the lip below the bearing, with its clearance."""
         return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm) - BEARING_SLACK
 
     @property

@@ -74,7 +74,7 @@ class AlignmentLinkage:
     screw: Screw
     screw_hole: float  # diameter
     holes: tuple[tuple[float, float], ...]
-    screw_travel: float  # of the screws to either side, where slots take them
+    screw_travel: float  # of the screws to either side, in slots
     fit: float  # diametral clearance of the spigot
     cross_hole: float  # diameter, in the hub
     cross_azimuths: tuple[float, ...]  # two neighbours of CROSS_AT

@@ -141,7 +141,7 @@ class Shapes:
     plate: cq.Shape
     neck: cq.Shape
     free_space: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
-    fins: list[cq.Shape]  # the fan, and what would be a fin of the neck
+    fins: list[cq.Shape]  # the fan, and fins of the neck
     hub: cq.Shape
     holes: list[cq.Shape]  # and marks
 

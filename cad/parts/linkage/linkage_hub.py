@@ -15,7 +15,7 @@ from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size
 OVER_LEADS = 1.5  # height of the channel over its leads
-IN_HUB = 0.5  # where that height ends, before the slots of a tongue
+IN_HUB = 0.5  # end of that height, before the slots of a tab
 EAR_CORNER = 0.3  # of its half width
 
 
@@ -85,7 +85,7 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     roof = max(stack.shoulder + LEAST_ABOVE, stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS)
     low, out = (inner, -half, stack.shoulder - 1.0), stack.hub_radius + 20.0
     ends = [(out, roof)]
-    if p.hub_tie is not None:  # lower where the leads are tied
+    if p.hub_tie is not None:  # lower at the tie of the leads
         ends = [(stack.hub_radius - IN_HUB, roof), (out, p.hub_tie.low)]
     channels = [solids.box(low, (end, half, high)) for end, high in ends]
     return [each.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p))) for each in channels]

@@ -106,7 +106,7 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         name=names.DRIVE_PULLEY,
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer),
-        step=Step("Drive pulley, and the servo next to the shaft", words, "the belt runs a turn in its rims"),
+        step=Step("Drive pulley and servo", words, "the belt runs a turn in its rims"),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack),

@@ -80,6 +80,9 @@ def gains(problem: Problem, angles_deg: Sequence[float], J: float, mounts: Itera
     return tuple(sorted(result, key=lambda gain: gain.J_less))
 
 
+EASIER = ', and easier to build: angles.prefer = "simple" with prefer_loss = 0.02 picks it'
+
+
 def gain_lines(result: tuple[Gain, ...]) -> list[str]:
     """Return the gains as lines, and the verdict."""
     what = "J" if result[0].factor is None else "beam density in the region"
@@ -101,7 +104,7 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     mount = f"{best.mount.name} {angles_words(best.mount.angles_deg)}"
     against = _against(best)
     if not better:
-        rest = f", but {against}" if against else ", and easier to build" if best.simpler else ""
+        rest = f", but {against}" if against else EASIER if best.simpler else ""
         return [f"{mount} is as good within {AS_GOOD - 1:.0%}{rest}"]
     rest = f", but {against}" if against else ": fix its angles in the task to build it"
     return [f"{mount} has {1 / best.factor:.2f} times the beams if its parts block none{rest}"]

@@ -22,7 +22,7 @@ BRUSHES: tuple[Brush, ...] = get_args(Brush)
 class Controls:
     """Handles of all controls, put up for a task with the angles of a setting."""
 
-    def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, tasks: list[str], setting: Setting) -> None:
+    def __init__(self, gui: viser.GuiApi, loaded: LoadedTask, setting: Setting) -> None:
         self.banner = gui.add_html(banner_html("running", (), lost=LOST))
         self.facts, self.mode, self.note, self.making = (gui.add_html("") for _ in range(4))
         self.undo = gui.add_button(UNDO, icon=viser.Icon.ARROW_BACK_UP, color=QUIET, disabled=True)
@@ -32,7 +32,6 @@ class Controls:
         self.brush_key = gui.add_command("Brush", description="Turn the brush on or off", hotkey="B")
         tabs = gui.add_tab_group()
         with tabs.add_tab("Angles"):
-            self.task = gui.add_dropdown("task", tasks, initial_value=tasks[0])
             self.pads = gui.add_html(pads_html(None))
             self.angles = tuple(
                 gui.add_slider(name, -bound, bound, 0.01, angle)
@@ -60,12 +59,13 @@ class Controls:
             self.table = gui.add_html("")
             self.kept = gui.add_dropdown("setting", ("rolling",), initial_value="rolling")
             self.restore, self.remove = gui.add_button("Restore", color=QUIET), gui.add_button("Remove", color=QUIET)
+        scenes = (NO_SCENE, ROOM) if loaded.task.scene is None else (NO_SCENE, ROOM, TASK_SCENE)
         with tabs.add_tab("View"):
             self.density = gui.add_checkbox("density", initial_value=True)
             self.scanner = gui.add_checkbox("scanner", initial_value=True)
-            self.scene = gui.add_dropdown("scan of", scan_scenes(loaded), initial_value=NO_SCENE)
+            self.scene = gui.add_dropdown("scan of", scenes, initial_value=NO_SCENE)
         with tabs.add_tab("Save"):
-            self.name = gui.add_text("name", name_of_copy(loaded))
+            self.name = gui.add_text("name", f"{loaded.task.name}_mine"[:64])
             self.name_error = gui.add_html("")
             self.fixed = gui.add_checkbox(
                 "fix these angles", initial_value=False, hint="Write these angles instead of ranges to search"
@@ -97,13 +97,3 @@ class Controls:
 def put(control: Any, value: object) -> None:
     """Set the value of a control, which viser declares as read-only."""
     control.value = value
-
-
-def scan_scenes(loaded: LoadedTask) -> tuple[str, ...]:
-    """Return the scenes that can be scanned."""
-    return (NO_SCENE, ROOM, TASK_SCENE) if loaded.task.scene is not None else (NO_SCENE, ROOM)
-
-
-def name_of_copy(loaded: LoadedTask) -> str:
-    """Return the suggested name of a changed task."""
-    return f"{loaded.task.name}_mine"[:64]

@@ -24,7 +24,7 @@ class KeptSettings:
         self.rejudge(judge)
 
     def keep(self, setting: Setting) -> str:
-        """Add a setting to the table, and return its name there."""
+        """Add a setting to the table, and return its name there; raise TaskError if the table is full."""
         with self._table:
             name = next((letter for letter in LETTERS if letter not in self._facts), None)
             if name is None:
@@ -40,7 +40,7 @@ class KeptSettings:
             self._move(facts.setting)
 
     def remove(self) -> None:
-        """Remove the selected setting."""
+        """Remove the selected setting; raise TaskError if it is a reference mount."""
         name = self._controls.kept.value
         if name in self._judge.references():
             raise TaskError(f"compare: {name} cannot be removed: others are compared with it")

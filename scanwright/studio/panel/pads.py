@@ -18,11 +18,7 @@ PADS = ((0, "Where the axis points", "axes", "lidar"), (2, "How the lidar sits",
 
 
 def pads_html(optimum: Optimum | None) -> str:
-    """Return the pads; `setting_link.js` moves their dots.
-
-    Args:
-        optimum: search of the task on the page, for the landscapes; None if it has not been searched.
-    """
+    """Return the pads, with landscapes if the task has been searched; `setting_link.js` moves their dots."""
     pads, drawn = "", False
     for first, title, table, other in PADS:
         (x, y), names = BOUNDS_DEG[first : first + 2], NAMES[first : first + 2]
@@ -41,13 +37,9 @@ def pads_html(optimum: Optimum | None) -> str:
 
 
 def _landscape(optimum: Optimum, table: str, x: float, y: float) -> str:
-    """Draw the lowest J over a pair of angles in bands, as an element that covers its range; empty if it has none.
+    """Return the lowest J over a pair of angles in bands, as an element that covers its range; empty if it has none.
 
-    Args:
-        optimum: the search.
-        table: `axes` or `planes`.
-        x: bound of the first angle [deg].
-        y: bound of the second one [deg].
+    `table` is `axes` or `planes`; x and y are the bounds of the angles [deg].
     """
     rows = getattr(optimum.search, table)[:, :3]
     xs, ys = np.unique(rows[:, 0]), np.unique(rows[:, 1])

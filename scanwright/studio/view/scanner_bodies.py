@@ -22,10 +22,7 @@ class BodyMesh:
 
 
 def make_bodies(scanner: Scanner, turning: bool) -> tuple[BodyMesh, ...]:
-    """The parts that turn with the horn, or those that stand still: two halves for two cores.
-
-    The linkage, which takes the kernel longer than all others together, is a draft of the same shapes.
-    """
+    """Return the parts that turn with the horn, or the fixed ones; raise BuildError if one fails."""
     from scanwright.cad.assembly.linkage_preview import coarse_mesh, draft_linkage
     from scanwright.cad.assembly.make import make_parts
 

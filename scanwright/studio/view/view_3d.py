@@ -12,7 +12,7 @@ from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.task.task import Task
 from scanwright.report.colours import Bands, ramp
-from scanwright.report.room import Room, room_about
+from scanwright.report.room import room_about
 from scanwright.serving.density_room import DensityRoom, lit
 from scanwright.studio.state import Setting
 from scanwright.studio.view.outlines import edges
@@ -29,11 +29,8 @@ GHOST = 0.25  # opacity of parts that belong to an earlier setting
 class View3D:
     """The scene of one page: the room with its densities, the scanner in it, its field of view, a scan."""
 
-    room: Room
-    walls: DensityRoom
-
     def __init__(self, server: viser.ViserServer, task: Task) -> None:
-        self._server, self._scene = server, server.scene
+        self._scene = server.scene
         self._bodies: dict[bool, list[viser.MeshHandle]] = {True: [], False: []}
         self._cloud: viser.PointCloudHandle | None = None
         self._edges: tuple[Array, ...] = ()
@@ -41,25 +38,14 @@ class View3D:
         self.points = 0
         lit(self._scene)
         server.initial_camera.look_at = (0.0, 0.0, 0.0)
-        self._scanner = self._scene.add_frame("/scanner", show_axes=False)
-        self._marks = {
-            (1.0, 0.0, 0.0): self._scene.add_label("/ahead", "ahead"),
-            (0.0, 1.0, 0.0): self._scene.add_label("/left", "left"),
-        }
-        self.enter(task)
-
-    def enter(self, task: Task) -> None:
-        """Show the room of a task; its walls have no colours yet."""
-        room = room_about(task)
-        before = getattr(self, "room", None)
-        if before is not None and np.array_equal([before.low, before.high], [room.low, room.high]):
-            return  # paint changes no wall
-        self.room, self.walls = room, DensityRoom(self._scene, room)
-        self.walls.frame.visible = self._colours
-        x, y, z = room.high - room.low
-        self._server.initial_camera.position = (float(-0.8 * x), float(0.8 * y), float(0.5 * (x + z)))
-        for direction, mark in self._marks.items():
-            mark.position = tuple((MARK * room.walls_along(np.array(direction))).tolist())
+        self.scanner = self._scene.add_frame("/scanner", show_axes=False)
+        self.room = room_about(task)
+        self.walls = DensityRoom(self._scene, self.room)
+        x, y, z = self.room.high - self.room.low
+        server.initial_camera.position = (float(-0.8 * x), float(0.8 * y), float(0.5 * (x + z)))
+        for name, direction in (("ahead", (1.0, 0.0, 0.0)), ("left", (0.0, 1.0, 0.0))):
+            at = MARK * self.room.walls_along(np.array(direction))
+            self._scene.add_label(f"/{name}", name, position=tuple(at.tolist()))
 
     def show_density(self, visible: bool) -> None:
         """Show or hide the walls and the edges on them."""
@@ -98,7 +84,7 @@ class View3D:
     def show_bodies(self, setting: Setting, turning: bool, bodies: tuple[BodyMesh, ...]) -> None:
         """Show the half of the scanner that turns, or the one that is fixed, in place of the previous one."""
         half = "turning" if turning else "standing"
-        self._scanner.wxyz = viser.transforms.SO3.from_matrix(R_world_rot(*setting.angles_rad[:2])).wxyz
+        self.scanner.wxyz = viser.transforms.SO3.from_matrix(R_world_rot(*setting.angles_rad[:2])).wxyz
         new = {f"/scanner/{half}/{body.name}": body for body in bodies}
         for handle in self._bodies[turning]:
             if handle.name not in new:
@@ -114,10 +100,6 @@ class View3D:
         """Show one half of the scanner as of an earlier setting, until `show_bodies` replaces it."""
         for handle in self._bodies[turning]:
             handle.opacity = GHOST
-
-    def show_scanner(self, visible: bool) -> None:
-        """Show or hide the scanner."""
-        self._scanner.visible = visible
 
     def show_points(self, points_m: Array) -> None:
         """Show a scan, coloured by height."""

@@ -10,11 +10,11 @@ import pytest
 from scanwright.cad.drawings.devices.sketch import sketch_svg
 from scanwright.cad.drawings.pen import CAPITAL, GLYPH_WIDTH
 from scanwright.design.catalogue.catalogue import load_catalogue
-from scanwright.design.catalogue.products import Belt, Multibeam
+from scanwright.design.catalogue.products import Belt, Multibeam, Printer
 from scanwright.design.errors import TaskError
 
 pytestmark = pytest.mark.quick
-DRAWN = [product.name for product in load_catalogue() if not isinstance(product, Belt | Multibeam)]
+DRAWN = [product.name for product in load_catalogue() if not isinstance(product, Belt | Multibeam | Printer)]
 NARROWER = 0.75  # than the pen reckons: Helvetica's figures are that wide
 
 
@@ -59,6 +59,7 @@ def test_a_sketch_of_a_servo_has_its_horn():
     assert {"4x M2 TAPPED, 3.5 DEEP ON Ø16", "Ø20.5", "2x M2.5 SELF TAPPING, 3.8 DEEP"} <= set(words)
 
 
-def test_what_has_no_dimensions_is_refused():
+@pytest.mark.parametrize("name", ["GT2-6", "sla"])
+def test_what_has_no_dimensions_is_refused(name):
     with pytest.raises(TaskError, match="has no dimensions"):
-        sketch_svg(load_catalogue().named("GT2-6"))
+        sketch_svg(load_catalogue().named(name))

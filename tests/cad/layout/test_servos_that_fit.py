@@ -150,7 +150,7 @@ def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
         (
             "SRC022A-6",
             {"case_max_mm": (20.1, 10.0, -30.0)},
-            r"drive_pulley: foot: case_max_mm = .* MX-64R stands 30 mm above its case, and the belt",
+            r"drive_pulley: foot: case_max_mm = .* MX-64R is 30 mm above its case, and the belt",
         ),
     ],
 )

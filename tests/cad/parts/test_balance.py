@@ -162,7 +162,7 @@ SMALL = {"sensor": "URG-04LX", "servo": "AX-12A"}
         (scanner_for(0, 0, 30, -60), "upright"),
         (scanner_for(-175, 10, 0, 20, **UST), "no more than the friction of bearing and ring"),
         (scanner_for(-115, 50, 65, 10, **SMALL), "in the fan"),
-        (scanner_for(135, -85, 35, -90, **UST), "the horn of MX-64R bears"),
+        (scanner_for(135, -85, 35, -90, **UST), "too heavy for the horn of MX-64R"),
         (scanner_for(75, 65, -20, 10), "the lidar or its cables"),
         (scanner_for(105, -20, -10, -70, **UST), "near to the deck"),
         (scanner_for(-45, 35, -10, 0, **UST), "shorter than its screws"),

@@ -342,7 +342,10 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     )
     assert "Close a cable tie around shaft and bundles" in text and "behind the plate" not in text
     assert len(set(re.findall(r"by the shaft's window at (\d+) deg", text))) == 2
-    assert "one of its windows" not in text and 'through the one that the step "Leads between lidar and ring" names' in text
+    assert (
+        "one of its windows" not in text
+        and 'through the one that the step "Leads between lidar and ring" names' in text
+    )
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):

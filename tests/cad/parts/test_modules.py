@@ -123,8 +123,8 @@ def test_a_part_that_no_bed_holds_is_refused_with_its_size_and_what_would_serve(
     with pytest.raises(BuildError) as refused:
         make_parts(small, foot)
     assert str(refused.value) == (
-        "tripod_foot: 100 x 100 x 8 mm in its print pose: the bed of fdm-0.4 is 99 x 200 x 99 mm (bed_mm); use a printer "
-        "with bed_mm = [100.0, 100.0, 8.0], or a smaller pattern of holes in [deck], or other angles"
+        "tripod_foot: 100 x 100 x 8 mm in its print pose: the bed of fdm-0.4 is 99 x 200 x 99 mm (bed_mm); use a "
+        "printer with bed_mm = [100.0, 100.0, 8.0], or a smaller pattern of holes in [deck], or other angles"
     )
     assert "tripod_foot" in make_parts(on_bed_of(scanner, (100.0, 100.0, 8.0)), foot).made
 
@@ -133,7 +133,7 @@ def test_the_search_goes_on_to_the_next_setting_where_a_bed_is_too_small():
     setting_deg = (0, 40, -20, -70)
     scanner = on_bed_of(scanner_at(setting_deg, **SMALL), (60.0, 60.0, 60.0))
     answer = PartsWorkshop(scanner).shadow(np.radians(setting_deg))
-    assert isinstance(answer, Refused) and "as it is printed: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason
+    assert isinstance(answer, Refused) and "in its print pose: the bed of fdm-0.4 is 60 x 60 x 60 mm" in answer.reason
 
 
 def test_a_module_that_the_task_requires_and_that_has_no_place_is_an_error():

@@ -4,15 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.density.beams import scan_at
 from scanwright.design.evaluation.expected_cloud import expected_cloud, expected_error
 from scanwright.design.evaluation.gaps import WIDE, gaps
+from scanwright.design.evaluation.missed_object import missed_object
 from scanwright.design.findings import Finding
 from scanwright.design.frames import rotvec_to_matrix
 from scanwright.design.objective.problem import problem_of
-from scanwright.design.sphere.directions import spiral
+from scanwright.design.objective.score import score
+from scanwright.design.sphere.directions import spiral, weighted_samples
 from scanwright.design.task.task import load_task
 
 SPIN = {"period_s": 18.0}
@@ -129,7 +132,8 @@ def widest_deg(loaded, angles_rad):
 )
 def test_a_gap_much_wider_than_the_lines_is_a_finding(angles_deg, weight, warns):
     loaded, angles_rad = task(weight=weight), np.radians(angles_deg)
-    gap = expected_cloud(loaded, problem_of(loaded), angles_rad).gap
+    problem = problem_of(loaded)
+    gap = expected_cloud(loaded, problem, angles_rad, score(problem, angles_rad)).gap
     wide = widest_deg(loaded, angles_rad)
     assert (gap is not None) == warns == (wide > WIDE * 0.5)
     if gap is not None:
@@ -144,4 +148,45 @@ def test_a_ball_as_wide_as_the_smallest_object_turns_the_gap_into_a_blind_spot()
     weight = {"shape": "cone", "axis": [1, 0, -0.69], "half_angle_deg": 6}
     loaded = task(weight=weight, density={"ball_radius_deg": 1.0})
     problem, angles_rad = problem_of(loaded), np.radians((0, -55.68, -78.49, 80))
-    assert expected_cloud(loaded, problem, angles_rad).gap is None
+    cloud = expected_cloud(loaded, problem, angles_rad, score(problem, angles_rad))
+    assert cloud.gap is None and cloud.missed is None, "its blind spot is stated elsewhere"
+
+
+def fewest(loaded, angles_rad, rng):
+    """Return the lowest count of beams in a ball over random directions of the region and random start phases."""
+    problem, lowest = problem_of(loaded), np.inf
+    directions = weighted_samples(problem.field, 4000, turn_rad=rng.uniform(0, 6)).directions
+    for start in rng.uniform(0, 1, 6):
+        joint_rad = problem.lines.angles_rad + start * problem.lines.step_rad
+        if problem.sweep is not None:
+            joint_rad = problem.sweep.angles_rad(start)
+        tree = cKDTree(scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever))
+        counts = tree.query_ball_point(directions, 2 * np.sin(problem.ball_rad / 2), return_length=True)
+        lowest = min(lowest, counts.min())
+    return lowest
+
+
+@pytest.mark.parametrize("motion", [{"period_s": 2.5}, SWEEP | {"period_s": 5.0}])
+def test_an_object_that_can_be_missed_is_named_with_the_period_that_hits_it(motion):
+    rng, missed = np.random.default_rng(7), 0
+    ring = {} if "mode" in motion else {"slip_ring": "SNU11-P0210"}
+    for radius_deg in rng.permutation([0.8, 1.2, 6.0, 15.0]):
+        density = {"ball_radius_deg": float(radius_deg)}
+        loaded = task(motion, sensor="LD19", weight=SHAPES[2], density=density, **ring)
+        angles_rad = np.radians((0, 0, *rng.uniform(40, 60, 2)))
+        problem = problem_of(loaded)
+        own = score(problem, angles_rad)
+        warning = missed_object(loaded, angles_rad, own)
+        if warning is None:
+            assert own.blind_weight > 1e-9 or fewest(loaded, angles_rad, rng) > 0
+            continue
+        missed += 1
+        assert (warning.code, warning.severity, warning.value) == ("missed_object", "warning", 0)
+        assert f"({2 * radius_deg:.2g} deg)" in warning.message
+        period_s = float(warning.hint.split("period_s = ")[1].split()[0])
+        assert period_s > motion["period_s"]
+        slower = task(motion | {"period_s": period_s}, sensor="LD19", weight=SHAPES[2], density=density, **ring)
+        assert fewest(slower, angles_rad, rng) > 0
+    assert 0 < missed < 4
+    usual = task(motion, sensor="LD19", weight=SHAPES[2], **ring)
+    assert missed_object(usual, angles_rad, replace(own, least=0, blind_weight=0.0)) is None, "it states no size"

@@ -119,7 +119,7 @@ class Valley:
     problem = SimpleNamespace(sweep=None)
     ranges = AngleRanges()
 
-    def J(self, angles_deg, _):
+    def J(self, angles_deg, *_):
         u = R_world_rot(*np.radians(angles_deg[:2]))[:, 2]
         off = [u @ np.array([0.6, 0.8, 0.0]), *np.radians(angles_deg[2:])]
         return float(20 * (np.hypot(off, 0.02) - 0.02).sum()) - float(u[2])
@@ -140,7 +140,7 @@ def test_what_gains_nothing_is_walked_from_once(most):
     flat = []
 
     class Plateau(Valley):
-        def J(self, angles_deg, _):
+        def J(self, angles_deg, *_):
             flat.append(bool(angles_deg[3] > 45))
             return 5.0 if flat[-1] else super().J(angles_deg, 0)
 

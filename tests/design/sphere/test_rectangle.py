@@ -114,7 +114,7 @@ def test_circles_through_it_and_how_far_it_reaches(name):
         (GROUND | {"height_m": -1}, "height_m = -1"),
         (CEILING | {"ceiling_m": 0.3}, "ceiling_m = 0.3 is not above height_m = 0.4"),
         (WALL | {"top_m": -1}, "top_m = -1 is not above bottom_m = -0.5"),
-        (GROUND | {"from_m": 9000, "to_m": 9001}, "deg thin: widen it to 0.001 deg"),
+        (GROUND | {"from_m": 9000, "to_m": 9001}, "deg thin: 0.001 deg or more are needed; its lengths are in metres"),
         (GROUND | {"ceiling_m": 2}, "ceiling_m: unknown key"),
     ],
 )

@@ -115,7 +115,8 @@ def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
         (["--height-m", "-1"], "error: --height-m = -1: must be between 0.001 and 10000 m"),
         (
             ["--height-m", "45"],
-            "--height-m = 45: UST-20LX sees 20 m and would not reach the ground; use metres (45 cm is 0.45)",
+            "--height-m = 45: UST-20LX sees 20 m and would not reach the ground; use metres (45 cm is 0.45, "
+            "45 mm is 0.045)",
         ),
         (["--height-m", "-1", "--see", "all"], "--height-m = -1: must be"),
         (["--lidar", "UST10"], "did you mean 'UST-10LX'?"),
@@ -157,7 +158,7 @@ QUESTIONS = [
     ("'ust' is more than one: UST-10LX, UST-20LX", "ust10"),
     ("did you mean 'UST-10LX'?", "ust-10"),
     ("How many metres", "sixty"),
-    ("'sixty' is no number", "0.6"),
+    ("'sixty' is not a number", "0.6"),
     ("blocks the view", "box:1:1:0.9"),
     ("is not above it", "box:1:1:0.3"),
     ("ahead of the middle of the box", "0.9"),

@@ -49,7 +49,7 @@ def test_every_place_states_the_same_numbers_of_a_build(built, command):
     blocked = re.search(r"which block (\S+) of the beams", told)[1]
     assert (f"Parts block {blocked}." in report) == (seen["blocked"] > 0)
     weight, sphere = re.search(r"never seen: (\S+) of the weight, (\S+) of the unmasked", told).groups()
-    assert f"{weight} of what counts, and {sphere} of the sphere, with parts" in report
+    assert f"{weight} of the region of interest, and {sphere} of the sphere, with parts" in report
     assert f"{own['J']} +- {own['J_error']}, with parts" in report
     for words in own["blind"]:
         assert words.partition(":")[0].removeprefix("blind ") in report and f"with parts: {words}" in told

@@ -121,7 +121,7 @@ def test_parts_are_grouped_in_order_and_nothing_is_lost(parts, built):
         parts.usd,
         "1 part to print and 1 other to have machined, 6 screws.",
     )
-    assert usd_range(0.2, 0.4) == "0 USD"
+    assert usd_range([{"low_usd": "0.2", "high_usd": "0.4"}]) == "0 USD"
 
 
 def test_what_to_do_begins_with_what_is_wrong(parts):

@@ -31,7 +31,7 @@ from scanwright.studio.panel import panel_html
 from scanwright.studio.panel.facts import Judge
 from scanwright.studio.panel.kept_settings import KeptSettings
 from scanwright.studio.panel.pads import pads_html
-from scanwright.studio.state import MOST_DABS, Canvas, Dab, Setting, painted
+from scanwright.studio.state import MOST_DABS, Dab, Setting, painted
 from scanwright.studio.task_file import save_task, task_text
 from scanwright.studio.view import workers
 from scanwright.studio.view.latest_only import LatestOnly
@@ -210,8 +210,8 @@ def test_of_many_wishes_the_last_is_done_and_then_the_rest():
     newest.close()
 
 
-def test_a_slider_that_is_dragged_is_one_step_and_each_stroke_is_one(loaded):
-    now = PageState(Canvas(loaded), SETTING, (), (("radius", 12.0),))
+def test_a_slider_that_is_dragged_is_one_step_and_each_stroke_is_one():
+    now = PageState((), SETTING, (), (("radius", 12.0),))
     at_s = 0.0
     history = History(now, lambda: at_s)
 
@@ -229,8 +229,8 @@ def test_a_slider_that_is_dragged_is_one_step_and_each_stroke_is_one(loaded):
     dabs = tuple(Dab((1.0, 0.1 * k, 0.0), 5.0, "matters") for k in range(5))
     for count, stroke in ((1, 1), (2, 1), (3, 2), (5, 2)):
         at_s += 100 * JOINED_S
-        history.note(replace(history._done[-1], canvas=Canvas(loaded, dabs[:count])), ("stroke", stroke), math.inf)
-    history.note(replace(history._done[-1], canvas=Canvas(loaded)), None)
+        history.note(replace(history._done[-1], dabs=dabs[:count]), ("stroke", stroke), math.inf)
+    history.note(replace(history._done[-1], dabs=()), None)
     said = []
     while history.undoes:
         said.append(history.undoes)
@@ -250,11 +250,6 @@ def test_a_slider_that_is_dragged_is_one_step_and_each_stroke_is_one(loaded):
     assert not history.redoes and history.redo() is None
     history.note(moved(-50.0), "beta_rot")  # back where it was, in one drag
     assert history.undoes == "beta_rot -55 to -50"
-
-
-def test_the_same_task_loaded_twice_is_another_canvas_and_maps_are_not_compared(loaded):
-    mapped = replace(loaded, maps=(np.ones((2, 2)),))
-    assert Canvas(mapped) == Canvas(mapped) != Canvas(replace(mapped, maps=(np.ones((2, 2)),)))
 
 
 def bodies(scanner, turning):
