@@ -18,7 +18,7 @@ SOLID = {
     "bottom_solid_layers": "1",
     "solid_infill_below_area": "0",
 }
-PRINTED_CM3_H = 20.0  # as `benchmarks.cad.slicer` measures it for these parts
+PRINTED_CM3_H = 20.0  # of the part, with the time for its supports, as `benchmarks.cad.slicer` measures it
 LINES = ("", "external_perimeter_", "perimeter_", "infill_", "solid_infill_")
 
 
@@ -38,7 +38,7 @@ def print_words(printer: Printer) -> str:
 
 
 def print_hours(mass_g: float, printer: Printer) -> float:
-    """Return the estimated time to print parts of a mass."""
+    """Return the estimated time to print parts of a mass, with their supports."""
     return mass_g / printer.density_g_cm3 / PRINTED_CM3_H
 
 

@@ -6,17 +6,18 @@ from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import DECK, FIXED_CABLES, ROTOR_LEADS, SERVO, SERVO_CASE, SERVO_FRAME
 from scanwright.cad.parts.part_spec import Step
 
+OTHER_HOLES = "For a mount with other holes, write them as [deck] in the task and build again."
 ON_DECK = Step(
     "Servo on the deck",
     "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
-    f"{screws(SERVO_CASE, DECK)} Leave space for the plugs.",
+    f"{screws(SERVO_CASE, DECK)} Leave space for the plugs. {OTHER_HOLES}",
     "the horn turns freely, and the case is flat on the deck",
     (SERVO,),
 )
 FRAME_ON_DECK = Step(
     "Frame on the deck",
     "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
-    f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame.",
+    f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame. {OTHER_HOLES}",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
 LEADS_TITLE = "Leads between lidar and ring"

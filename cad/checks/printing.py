@@ -133,8 +133,9 @@ def islands_check(name: str, mesh: TriMesh, pose: PrintPose) -> Finding:
         return Finding("islands", "ok", name, f"{name}: no layer starts in the air", 0.0, 0.0)
     lowest, largest = islands[0], max(island.area_mm2 for island in islands)
     at = np.linalg.inv(pose.T_bed_part) @ [*lowest.middle, lowest.height, 1.0]
+    start = "1 layer starts" if len(islands) == 1 else f"{len(islands)} layers start"
     message = (
-        f"{name}: {len(islands)} layers start in the air, the lowest {lowest.height:.1f} mm above the bed, "
+        f"{name}: {start} in the air, the lowest {lowest.height:.1f} mm above the bed, "
         f"{spot(at[:3])}, the largest {figures(largest)} mm2"
     )
     return Finding("islands", "warning", name, message, tidy(len(islands)), 0.0, hint="let the slicer support them")

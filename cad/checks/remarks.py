@@ -29,7 +29,8 @@ def remarks_of(scanner: Scanner, assembly: Assembly) -> tuple[Finding, ...]:
         message = f"{BASE_MOUNT}: not included, the axis is upright"
         hint = (
             f"hold {what} with 4 x {mounted.screw.name} from below through the deck, {hole:g} mm "
-            f"holes at {places} mm from the axis; leave space for the plugs"
+            f"holes at {places} mm from the axis; leave space for the plugs; to get a mount for other holes, write "
+            "them as [deck] in the task"
         )
         remarks.append(Finding("servo_on_deck", "note", BASE_MOUNT, message, hint=hint))
     elif scanner.deck is None:

@@ -20,6 +20,7 @@ from scanwright.cad.checks.loads.retention import retention_checks
 from scanwright.cad.checks.loads.vibration import vibration_checks
 from scanwright.cad.checks.printing import printing_checks
 from scanwright.cad.checks.products import module_checks, unverified
+from scanwright.cad.checks.table import with_change
 from scanwright.cad.checks.wiring import wiring_checks
 from scanwright.cad.layout.drive import products_of
 from scanwright.design.findings import Finding
@@ -73,4 +74,4 @@ def run_checks(scanner: Scanner, assembly: Assembly, progress: Progress) -> tupl
         *module_checks(scanner, layout.left_out),
         *(warning for product in products for warning in unverified(product, assembly)),
     ]
-    return checks, shadow
+    return [with_change(check) for check in checks], shadow

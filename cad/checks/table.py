@@ -3,7 +3,10 @@
 Constant limits are here, with their reason; limits of products, printer or layout are described.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
+
+from scanwright.design.findings import Finding
 
 CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
@@ -102,6 +105,48 @@ TABLE = (
         "smallest_hole", "diameter of the smallest hole", f"at least {SMALLEST_HOLE_MM:g} mm", "smaller ones close"
     ),
 )
+
+
+OTHER_MOUNT = "change [angles] in the task: other values, or ranges that exclude this mount"
+LIGHTER = "choose a lighter lidar (sensor)"
+STRONGER = "choose a stronger servo (servo) or a lighter lidar (sensor)"
+STIFFER = f"{LIGHTER}, or a printer profile with a stiffer plastic (printer)"
+LEADS = "choose a ring with thinner or more flexible leads (slip_ring)"
+CHANGES = {
+    "module": "remove it from [modules] in the task, or change what it needs",
+    "clearance": OTHER_MOUNT,
+    "interference": OTHER_MOUNT,
+    "driver_access": OTHER_MOUNT,
+    "beams_linkage": OTHER_MOUNT,
+    "static_torque": STRONGER,
+    "spin_up_torque": f"take a longer period_s in [motion], or {STRONGER}",
+    "tilt_moment": STRONGER,
+    "axial_load": STRONGER,
+    "bearing_load": LIGHTER,
+    "belt_tension": f"take a longer period_s in [motion], or {LIGHTER}",
+    "waist_torque": "choose a servo with a smaller stall torque (servo)",
+    "shaft_slope": f"{LIGHTER} or a shorter ring (slip_ring)",
+    "retention": 'choose a printer profile with thread = "nut" or "insert" (printer), or a lighter lidar (sensor)',
+    "angle_held": f"{LIGHTER}, or {OTHER_MOUNT}",
+    "screw": "choose a printer profile with another thread (printer)",
+    "wiring": "correct the value in the catalogue file, or choose another device",
+    "lead_bend": LEADS,
+    "lead_joint": LEADS,
+    "deflection": STIFFER,
+    "deflection_turning": STIFFER,
+    "mount_lean": "correct the holes in [deck] of the task",
+    "bed": "choose a printer with a larger bed (printer), or other [angles]",
+    "wall": "choose a printer profile with thinner walls (printer), or other [angles]",
+    "smallest_hole": "choose a lidar or servo with larger screws",
+}
+"""What to change if a check fails that has no hint of its own, by its code."""
+
+
+def with_change(finding: Finding) -> Finding:
+    """Return a finding, with what to change as its hint if it fails and has none."""
+    if finding.severity != "error" or finding.hint:
+        return finding
+    return replace(finding, hint=CHANGES[finding.code])
 
 
 def table_page() -> str:

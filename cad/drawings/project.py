@@ -1,7 +1,8 @@
 """Lines of a solid seen from one side, hidden ones marked: straight lines, arcs, and chains of points. Millimetres.
 
 The kernel's hidden-line removal takes 8.6 s if edges are exactly behind one another and 0.1 s if not, so the view is
-turned by SKEW_RAD. Lines within TOLERANCE_MM are drawn once, and no hidden line under a visible one.
+turned by a small angle. At one angle in a hundred it returns no lines, or only some: then the next angle is used. Lines
+within TOLERANCE_MM are drawn once, and no hidden line under a visible one.
 """
 
 import math
@@ -19,8 +20,17 @@ from OCP.HLRBRep import HLRBRep_Algo, HLRBRep_HLRToShape
 from OCP.TopoDS import TopoDS_Shape
 
 from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 
-SKEW_RAD = (1.0e-4, 0.6e-4)  # rad, about the two axes of the view
+SKEWS_RAD = (  # about the two axes of the view, the next ones if the kernel fails with the first
+    (1.0e-4, 0.6e-4),
+    (-0.9e-4, 0.7e-4),
+    (1.1e-4, -0.5e-4),
+    (0.7e-4, 1.2e-4),
+    (-0.6e-4, -0.8e-4),
+    (1.3e-4, 0.9e-4),
+)
+MISSING_MM = 0.2  # corners may be outside the lines: by more, lines are missing
 TOLERANCE_MM = 0.03  # between lines that are drawn once: a quarter of the thinnest line
 SAMPLES = 49  # of a curved edge: the chords of a circle seen tilted, 100 mm across on paper, stay within 0.1 mm
 SHORTEST_MM = 0.05  # line that is drawn: shorter than half a line is wide
@@ -59,10 +69,31 @@ def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bo
         up: unit vector that points up in it; the viewer is at right x up.
         zero: point that the plane has its zero at.
         hidden: whether to include hidden lines.
+
+    Raises:
+        BuildError: the kernel finds no lines.
     """
-    towards = np.cross(right, up)
+    corners = np.array([vertex.toTuple() for vertex in solid.Vertices()]) - zero
+    flat = corners @ np.stack([right, up], axis=1)
+    for skew in SKEWS_RAD:
+        pieces = _pieces(solid, right, up, zero, skew, hidden=hidden)
+        if pieces and _covers(np.concatenate([points for points, _ in pieces]), flat):
+            return _drawn_once(pieces)
+    raise BuildError(f"no drawing: the CAD kernel finds no lines of a part seen along {np.cross(up, right).round(4)}")
+
+
+def _covers(points: Array, corners: Array) -> bool:
+    """Return whether the extent of points contains all corners, both shape (n, 2)."""
+    low, high = points.min(axis=0) - MISSING_MM, points.max(axis=0) + MISSING_MM
+    return bool(((corners >= low) & (corners <= high)).all())
+
+
+def _pieces(
+    solid: cq.Shape, right: Array, up: Array, zero: Array, skew: tuple[float, float], *, hidden: bool
+) -> list[tuple[Array, bool]]:
+    """Return points along each line, and whether it is hidden; arguments as for `project`."""
     middle = np.array(solid.BoundingBox().center.toTuple())
-    skewed = towards + SKEW_RAD[0] * right + SKEW_RAD[1] * up
+    skewed = np.cross(right, up) + skew[0] * right + skew[1] * up
     algorithm = HLRBRep_Algo()
     algorithm.Add(solid.wrapped)
     axes = gp_Ax2(gp_Pnt(*middle.tolist()), gp_Dir(*skewed.tolist()), gp_Dir(*right.tolist()))
@@ -77,7 +108,7 @@ def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bo
     if hidden:
         for compound in (shapes.HCompound(), shapes.OutLineHCompound()):
             pieces += [(points + origin, True) for points in _edges(compound)]
-    return _drawn_once(pieces)
+    return pieces
 
 
 def _edges(compound: TopoDS_Shape | None) -> Iterator[Array]:

@@ -32,7 +32,7 @@ JOINTS = "joints of the layout"
 STEPS, WIRING_TEXT, CATALOGUE_CABLES = "assembly.md", "wiring.md", "cables of the catalogue"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 PAPER_V = 12.0  # of its supply
-WASTE = 1.1  # plastic bought over plastic of the parts: a tenth for supports and failed prints
+WASTE = 0.1  # of the plastic of the parts, more for supports and failed prints
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,8 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
 def _wiring(scanner: Scanner) -> Iterator[BomItem]:
     lidar, ring = scanner.lidar, scanner.slip_ring
     supply = f"power supply, {PAPER_V:g} V, {network_of(scanner).supply_a:g} A"
-    yield BomItem("wiring", supply, source=PAPER, estimate="power supply")
+    note = f"for mains; on a robot a DC/DC converter from its battery to {PAPER_V:g} V"
+    yield BomItem("wiring", supply, source=PAPER, note=note, estimate="power supply")
     yield from _servo_wiring(scanner.servo)
     if lidar.cables is None:
         yield _unknown_wiring(lidar)
@@ -189,11 +190,15 @@ def _servo_wiring(servo: Servo) -> Iterator[BomItem]:
     """Yield the adapter and the cable of a servo from the catalogue."""
     if servo.adapter is None:
         yield _unknown_wiring(servo)
-    for field, price, estimate in (("adapter", servo.adapter_usd, "adapter"), ("cable", None, "servo cable")):
+    both = "one whole for data, one to cut for power"
+    for field, price, count, note, estimate in (
+        ("adapter", servo.adapter_usd, 1, "", "adapter"),
+        ("cable", None, 2, both, "servo cable"),
+    ):
         part, origin = getattr(servo, field), servo.provenance().get(field)
         if part is not None:
             source = origin.source if origin is not None else ""
-            yield BomItem("wiring", part, unit_usd=price, total_usd=price, source=source, estimate=estimate)
+            yield BomItem("wiring", part, "", count, "", "", price, price, source=source, note=note, estimate=estimate)
 
 
 def _unknown_wiring(product: Product) -> BomItem:
@@ -205,12 +210,15 @@ def _unknown_wiring(product: Product) -> BomItem:
 
 def _filament(scanner: Scanner, items: list[BomItem], plates: Sequence[Sequence[str]]) -> BomItem:
     hours = {item.part: print_hours(item.mass_g or 0.0, scanner.printer) for item in items if item.kind == "printed"}
-    grams = WASTE * sum(item.mass_g or 0.0 for item in items if item.kind == "printed")
+    parts_g = sum(item.mass_g or 0.0 for item in items if item.kind == "printed")
+    grams = (1 + WASTE) * parts_g
     each = (
         f"plate {n} {hours_in_words(sum(hours[part] for part in plate))}" for n, plate in enumerate(plates, start=1)
     )
     of_plates = f" ({', '.join(each)})" if len(plates) > 1 else ""
-    time = f"{hours_in_words(sum(hours.values()))} to print{of_plates}"
+    time = f"{hours_in_words(sum(hours.values()))} to print with supports{of_plates}"
+    contains = f"{parts_g:.1f} g of parts, {WASTE:.0%} more for supports and failed prints"
+    a_kg = f"a kg for {FILAMENT_USD_PER_KG[0]:g} to {FILAMENT_USD_PER_KG[1]:g} USD"
     low, high = (round(grams / 1000 * usd, 2) for usd in FILAMENT_USD_PER_KG)
     return BomItem(
         kind="material",
@@ -219,7 +227,7 @@ def _filament(scanner: Scanner, items: list[BomItem], plates: Sequence[Sequence[
         high_usd=high,
         mass_g=round(grams, 1),
         source=ESTIMATED,
-        note=f"{time}; {scanner.printer.maker}; a kg for {FILAMENT_USD_PER_KG[0]:g} to {FILAMENT_USD_PER_KG[1]:g} USD",
+        note=f"{time}; {contains}; {scanner.printer.maker}; {a_kg}",
     )
 
 

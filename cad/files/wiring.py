@@ -1,7 +1,8 @@
 """`wiring.svg` and `wiring.md`: the wiring of a scanner as a drawing and as text, with the load of each wire."""
 
 from scanwright.cad.files.schematic import schematic_svg
-from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M
+from scanwright.cad.parts.part_spec import BENCH
+from scanwright.design.electrics.loads import COMPUTER_W, LEADS_M, SUPPLY_V
 from scanwright.design.electrics.network import Network
 from scanwright.design.electrics.rules import check_network
 from scanwright.design.electrics.sizing import OVER_PEAK
@@ -10,9 +11,9 @@ from scanwright.design.findings import sentence
 from scanwright.design.scanner import Scanner
 
 GROUND = (
-    "One ground: connect every - to the - bar of the distribution, the case of the supply to the protective earth of "
-    "its mains side, and the shield of a data cable at the computer's end only. Wire with the supply off and F0 "
-    "removed; measure from each + to - before you insert F0."
+    "One ground: connect every - to the - bar of the distribution, the case of a mains supply to protective earth, and "
+    "the shield of a data cable at the computer's end only. Wire with the supply off and F0 removed; measure from each "
+    "+ to - before you insert F0."
 )
 STALLED = (
     "A blocked servo draws its stall current until its own protection acts: the supply, F0 and its branch carry that "
@@ -36,6 +37,7 @@ def wiring_text(network: Network, title: str) -> str:
     sections: dict[str, Section] = {
         "Do not build this wiring": ([sentence(broken) for broken in check_network(network)], []),
         "Caution": ([*network.cautions], [GROUND]),
+        BENCH: (_bench(network), []),
         "Power": _power(network),
         "Slip ring": _ring(network),
         "Wires": _wires(network),
@@ -48,6 +50,21 @@ def wiring_text(network: Network, title: str) -> str:
             listed = ["\n".join(f"- {item}" for item in items)] if items else []
             blocks += [f"## {heading}", *listed, *paragraphs]
     return "\n\n".join(blocks) + "\n"
+
+
+def _bench(network: Network) -> list[str]:
+    """Return how to power and connect the servo before it is built in."""
+    titles = {box.name: box.title for box in network.boxes}
+    plus, minus = (next(wire for wire in network.wires if wire.end == ("servo", pin)) for pin in ("V", "GND"))
+    feed = f"{titles[plus.start[0]]} {plus.start[1]}"
+    return [
+        f"Wire the supply up to {feed}. Insert F0, switch on, measure {plus.net} from {plus.start[1]} to "
+        f"{minus.start[1]}, and switch off.",
+        f"Power: cut one servo cable, join its V to {plus.start[1]} and its GND to {minus.start[1]}, and insulate its "
+        f"data wires. Switch on, measure {plus.net} from V to GND at its plug, switch off, and plug it in.",
+        "Data: plug the second servo cable, whole, into the servo's other socket and the adapter, and the adapter "
+        "into the computer. Switch on.",
+    ]
 
 
 def _power(network: Network) -> Section:
@@ -73,7 +90,23 @@ def _power(network: Network) -> Section:
         f"is assumed to use {COMPUTER_W:g} W. A fuse carries {OVER_PEAK:g} times the peak of its branch, a wire its "
         f"fuse. {STALLED}"
     )
-    return items, [sources]
+    return items, [_on_robot(network, peak), sources]
+
+
+def _on_robot(network: Network, peak_a: float) -> str:
+    """Return what replaces the mains supply on a robot."""
+    words = (
+        f"On a robot, a DC/DC converter from its battery to {SUPPLY_V:g} V and at least {peak_a:.2g} A replaces the "
+        "mains supply; its input must accept the battery full and empty."
+    )
+    direct = [drop for drop in network.drops if drop.idle_v == SUPPLY_V]  # without a converter
+    if not direct:
+        return words
+    least, most = max(drop.least + drop.idle_v - drop.volts for drop in direct), min(drop.most for drop in direct)
+    return (
+        f"{words} A battery within {least:.1f} to {most:g} V needs none if each converter behind it accepts that; "
+        f"below {SUPPLY_V:g} V the servo has less torque than the checks assume."
+    )
 
 
 def _ring(network: Network) -> Section:

@@ -65,7 +65,7 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
         return None
     screw, hole = joint.screw, joint.screw.nominal + 0.4
     proof = PROOF_MPA * stress_area_mm2(screw)
-    head = nut = _under_head_mm2(joint, hole)
+    head, nut = _under_head_mm2(joint, hole), math.inf
     in_nut = joint.fixing in ("nut", "trap", "deck")
     engaged = screw.nut_height if in_nut else joint.length_mm - joint.grip_mm
     if in_nut and joint.protrudes_mm is not None:
@@ -75,14 +75,13 @@ def hold_of(joint: Joint, under: Material, into: Material) -> Hold | None:
         engaged = min(engaged, INSERT_LENGTH)
         pulls["the insert"] = INSERT_N
     elif in_nut:
-        if joint.fixing == "trap":
-            nut = math.pi / 4 * (screw.nut_across**2 - hole**2)
-            pulls[f"{into.name} under the nut"] = nut * into.strength_mpa
-            floor = math.pi * screw.nut_across * joint.thread_mm
-            pulls[f"{into.name} around the nut"] = SHEARED * floor * into.strength_mpa
+        nut = math.pi / 4 * (screw.nut_across**2 - hole**2)
+        pulls[f"{into.name} under the nut"] = nut * into.strength_mpa
+        floor = math.pi * screw.nut_across * joint.thread_mm
+        pulls[f"{into.name} around the nut"] = SHEARED * floor * into.strength_mpa
     else:
         pulls[f"the thread in {into.name}"] = _strips(screw, engaged, into)
-    lasting = min(head * under.pressure_mpa, nut * into.pressure_mpa if joint.fixing == "trap" else math.inf)
+    lasting = min(head * under.pressure_mpa, nut * into.pressure_mpa)
     preload = min(PRELOAD * proof, lasting, min(pulls.values()) / 1.5)
     needed = 0.0 if in_nut or joint.inserts else 1.5 * preload / _strips(screw, 1.0, into)
     behind = screw.nominal * joint.grip_mm * under.strength_mpa

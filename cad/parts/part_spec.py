@@ -29,6 +29,7 @@ HORN = (
 )
 ON_CASE = ("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm", "servo.horn_thickness_mm")
 SEATED = "the hub is on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
+BENCH = "Servo on the bench"  # section of `wiring.md`
 TURNED_FROM = "aluminium EN AW-6082-T6"
 
 
@@ -36,7 +37,10 @@ def to_centre(servo: Servo) -> str:
     """Return the sentence of a step that turns the servo to the centre of its encoder."""
     counts = 2 ** round(math.log2(servo.position_feedback_deg / servo.position_step_deg))
     centre = f"position {counts // 2} of {counts}"
-    return f"Connect the servo and turn it to its centre ({centre}) with `scanwright servo-setup PORT --centre`."
+    return (
+        f"Power the servo on the bench (`wiring.md`, {BENCH}) and turn it to its centre ({centre}) with "
+        "`scanwright servo-setup PORT --centre`. Then switch it off."
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,7 +60,8 @@ def cautions_of(scanner: Scanner, loads: list[ElectricLoad], wires: list[Wire]) 
         yield f'A swapped + and - can destroy {scanner.lidar.name}. Find each lead marked "{MEASURE}" like this: {HOW}.'
     yield from _levels(scanner.lidar)
     yield from _ties(scanner.lidar)
-    yield f"Find V and GND of {scanner.servo.name} by the pins of its plug, not by colour."
+    pins = scanner.servo.connector or "its data sheet names them"
+    yield f"Find V and GND of {scanner.servo.name} by the pins of its plug, not by colour ({pins})."
 
 
 def _voltage(load: ElectricLoad) -> Iterator[str]:
@@ -74,8 +75,8 @@ def _voltage(load: ElectricLoad) -> Iterator[str]:
             "" if load.bounds_v is None else f" {load.title} accepts {load.bounds_v[0]:g} to {load.bounds_v[1]:g} V."
         )
         yield (
-            f"Set the converter for the {load.name} to {load.set_v:g} V with a multimeter before you connect anything "
-            f"to its output.{limit}"
+            f"Set the converter that feeds the {load.name} to {load.set_v:g} V, measured with a multimeter, before you "
+            f"connect anything to its output.{limit}"
         )
     elif load.bounds_v is not None and load.bounds_v[1] - SUPPLY_V < NARROW_V:
         yield (

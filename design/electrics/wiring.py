@@ -159,7 +159,7 @@ def _boxes(
         Box(
             "servo",
             servo.name,
-            (f"{servo.connector or 'connector unknown'}; it has two", "one for power, one for data"),
+            (*textwrap.wrap(servo.connector or "connector unknown", LINE_CHARS), "two plugs: power, and data"),
             ("V", "GND", *signals, "GND data"),
             (),
             6,

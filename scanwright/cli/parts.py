@@ -69,9 +69,9 @@ def build(
     show_result(lambda: built.lines(in_full=verbosity() is Verbosity.VERBOSE), record, as_json)
     report = built.folder / "report.html"
     if built.failed:
-        hint(f"next: read the failed checks in {report}, and change the task")
+        hint(f"next: change {task} as the failed checks state, and build again; {report} shows them")
         raise typer.Exit(1)
-    hint(f"next: open {report}; then print {built.folder / 'print/fit_coupon.3mf'} and try it")
+    hint(f"next: open {report}: it lists what to do, in order")
 
 
 @app.command(example="report out/ground_ahead")

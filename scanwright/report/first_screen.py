@@ -59,6 +59,12 @@ def cards(angles: AngleSet, answer: BuildAnswer, parts: PartsList | None) -> tup
 def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList | None) -> list[ToDo]:
     """Return what to do in order, from the names of the files of the build, its checks and its parts."""
     todo = _before_making(findings)
+    if parts is not None:
+        text = f"{_capital(' and '.join(parts.bought.values()) or 'devices')} first: they decide the delivery date."
+        todo.append(ToDo("Order devices, screws and wiring", text, ("#parts", "bom.csv")))
+    if "print/fit_coupon.3mf" in files:
+        text = "It shows which clearance your printer needs. Write the result into the printer's catalogue file."
+        todo.append(ToDo("Print the fit coupon", text, ("print/fit_coupon.3mf",)))
     if "template.pdf" in files:
         text = (
             "Print template.pdf at 100 %, measure its 100 mm scale, and lay it on each device: do the screws meet the "
@@ -66,12 +72,6 @@ def to_do(files: Collection[str], findings: Sequence[Finding], parts: PartsList 
         )
         plates = tuple(name for name in ("template.pdf", "print/test_plate.3mf") if name in files)
         todo.append(ToDo("Try the hole patterns on your devices", text, plates))
-    if "print/fit_coupon.3mf" in files:
-        text = "It shows which clearance your printer needs. Write the result into the printer's catalogue file."
-        todo.append(ToDo("Print the fit coupon", text, ("print/fit_coupon.3mf",)))
-    if parts is not None:
-        text = f"{_capital(' and '.join(parts.bought.values()) or 'devices')} first: they decide the delivery date."
-        todo.append(ToDo("Order devices, screws and wiring", text, ("#parts", "bom.csv")))
     machined = parts.group("turned") if parts is not None else None
     if machined is not None:
         sheets = tuple(f"drawings/{row['part']}.pdf" for row in machined.rows)
@@ -157,7 +157,7 @@ def _scan(angles: AngleSet, answer: BuildAnswer) -> Card:
 def _make(parts: PartsList | None) -> Card:
     if parts is None or parts.total is None:
         return Card("To make it", "Price unknown", "Missing: bom.csv with a total.")
-    text = f"{parts.made('printed')} to print, {parts.made('turned', 'sawn')} to have machined, {parts.screws} screws."
+    text = f"{parts.made_words}, {parts.screws} screws."
     return Card("To make it", parts.usd, text)
 
 
@@ -182,6 +182,9 @@ def _before_making(findings: Sequence[Finding]) -> list[ToDo]:
         "which the next build replaces), and build again."
     )
     if unverified := tuple(each for each in findings if each.code == "unverified"):
-        text = f"These values are not from a drawing. A wrong one makes a part that does not fit. {how}"
+        text = (
+            "These values are not from a drawing. A wrong one makes a part that does not fit. Measure devices that you "
+            f"still have to order when they arrive, before you print parts. {how}"
+        )
         todo.append(ToDo(f"Measure {count(len(unverified), 'value')}", text, ("#checks",), unverified))
     return todo

@@ -65,12 +65,18 @@ class PartsList:
     @property
     def to_make(self) -> str:
         """Return how many parts to print and to have machined, and the time to print."""
-        return f"{self.made('printed')}, {self.printing or 'to print'}; {self.made('turned', 'sawn')} to have machined"
+        return f"{self.made_words}; {self.printing}" if self.printing else self.made_words
 
-    def made(self, *kinds: str) -> str:
-        """Return how many parts are made in a way, in words."""
-        count = sum(int(row["quantity"] or 1) for row in self._rows(*kinds))
-        return f"{count} part{'' if count == 1 else 's'}"
+    @property
+    def made_words(self) -> str:
+        """Return how many parts to print and to have machined; none is counted twice."""
+        printed, machined = (
+            sum(int(row["quantity"] or 1) for row in self._rows(*kinds)) for kinds in (("printed",), ("turned", "sawn"))
+        )
+        words = f"{printed} part{'' if printed == 1 else 's'} to print"
+        if not machined:
+            return f"{words}, none to have machined"
+        return f"{words} and {machined} other{'' if machined == 1 else 's'} to have machined"
 
     def group(self, kind: str) -> Group | None:
         """Return the group of a kind of row; None if it has no rows."""

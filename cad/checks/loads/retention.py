@@ -73,7 +73,7 @@ def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Fi
     bare = joint.fixing == "thread" and not joint.inserts and material_of(assembly, joint.onto).plastic
     if bare and carries and joint.onto in assembly.parts:
         message = f"{both}: the lidar hangs on threads in bare plastic, which creeps"
-        yield Finding("retention", "error", subject, message, hint="use nuts or inserts")
+        yield Finding("retention", "error", subject, message)
     yield _margin(scanner, assembly, joint, hold, hanging)
     yield _screws(joint, hold, subject)
 

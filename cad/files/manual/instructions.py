@@ -51,12 +51,12 @@ def instructions_text(
         "lists all items.",
         "",
         *_to_measure(assembly),
-        "Try the hole patterns before you print parts: print `template.pdf` at 100 %, measure its scale of 100 mm, and "
-        f"lay each page on its device. Then print `print/{TEST_PLATE}.3mf` and screw it to lidar and servo.",
-        "",
-        f"Print `print/{FIT_COUPON}.3mf` next: the clearances that fit on your printer belong in its catalogue file "
+        f"Print `print/{FIT_COUPON}.3mf` first: the clearances that fit on your printer belong in its catalogue file "
         f"(now fits {scanner.printer.fit_clearance_mm:g}, screws {scanner.printer.screw_clearance_mm:g} mm). Print "
         f"everything {print_words(scanner.printer)}: the files contain this for PrusaSlicer; set it in other slicers.",
+        "",
+        "Try the hole patterns before you print parts: print `template.pdf` at 100 %, measure its scale of 100 mm, and "
+        f"lay each page on its device. Then print `print/{TEST_PLATE}.3mf` and screw it to lidar and servo.",
         "",
         *(line for number, parts in enumerate(plates, start=1) for line in _plate(number, parts, assembly)),
         f"Lengths of screws with nuts assume {CASE_EAR_MM:g} mm of servo case before the nut and a deck of {DECK_MM:g} "

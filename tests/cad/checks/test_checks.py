@@ -166,7 +166,7 @@ def test_a_layer_that_starts_in_the_air_is_found_where_it_starts():
     pose = print_pose(mesh_of(lying), (220.0, 220.0, 250.0))
     pose = replace(pose, T_bed_part=np.array([[1, 0, 0, -100], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]))
     said = islands_check("part", mesh_of(lying), pose).message
-    assert re.search(r"1 layers .* at \(137, -1[12](\.\d)?, 10\) in the rotation frame, the largest 60 mm2", said)
+    assert re.search(r"1 layer starts .* at \(137, -1[12](\.\d)?, 10\) in the rotation frame, the largest 60 mm2", said)
     two = gallows.fuse(box((20, 5, 20.3), (24, 15, 30))).Solids()[0]
     assert sorted(round(i.area_mm2) for i in islands_of(mesh_of(two))) == [40, 60]
 

@@ -11,7 +11,7 @@ import scanwright.cad.checks.loads.retention as room
 from scanwright.cad import solids
 from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
 from scanwright.cad.layout.joints import ScrewAxis
-from scanwright.cad.layout.tightening import ALUMINIUM, PRINTED, hold_of, stress_area_mm2
+from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, hold_of, stress_area_mm2
 from scanwright.cad.screws import SCREWS, thread_in_part
 from scanwright.design.catalogue.catalogue import load_catalogue
 
@@ -135,6 +135,24 @@ def test_torque_and_strength_against_hand_calculation():
     beside = np.count_nonzero((np.hypot(x, y) < 2.75) & (np.abs(y) > 1.7)) * 0.005**2
     slid = hold_of(replace(joint, slot_mm=(3.4, 7.4)), PRINTED, ALUMINIUM)
     assert slid.preload_n == pytest.approx(20 * beside, rel=2e-3) and beside < head / 2
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_torque_crushes_a_body_under_a_head_or_a_nut(seed):
+    rng = np.random.default_rng(seed)
+    screw = SCREWS[rng.choice(["M2", "M2.5", "M3", "M4", "M5"])]
+    fixing = rng.choice(["nut", "trap", "deck", "thread"])
+    bodies = rng.choice(np.array([PRINTED, MOULDED, BOUGHT, ALUMINIUM], dtype=object), 2)
+    washer = float(2.5 * screw.nominal) if rng.random() < 0.5 else None
+    grip, depth = (float(value) for value in rng.uniform(3.0, 9.0, 2))
+    axis = ScrewAxis((0, 0, 0), (0, 0, 1))
+    hold = hold_of(room.Joint("one", "other", fixing, screw, (axis,), grip, depth, washer_mm=washer), *bodies)
+    hole = math.pi / 4 * (screw.nominal + 0.4) ** 2
+    faces = [math.pi / 4 * (washer or screw.head_diameter) ** 2 - hole]
+    if fixing != "thread":  # the inscribed circle of a nut
+        faces.append(math.pi / 4 * screw.nut_across**2 - hole)
+    for body, face in zip(bodies, faces, strict=False):
+        assert hold.preload_n <= body.pressure_mpa * face * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("profile", ["fdm-0.4", "fdm-0.4-insert", "fdm-0.4-nut", "sla"])

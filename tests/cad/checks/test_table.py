@@ -4,8 +4,9 @@ import ast
 from pathlib import Path
 
 from scanwright.cad import checks
-from scanwright.cad.checks.table import TABLE, table_page
+from scanwright.cad.checks.table import CHANGES, TABLE, table_page, with_change
 from scanwright.design.electrics import rules
+from scanwright.design.findings import Finding
 from scanwright.pipeline import deck_height
 
 FOLDER = Path(checks.__file__).parent
@@ -32,6 +33,17 @@ def test_every_check_has_one_row():
 
 def test_a_limit_has_a_source():
     assert [row.code for row in TABLE if bool(row.limit) != bool(row.source)] == []
+
+
+def test_a_check_that_fails_states_what_to_change():
+    fail = {row.code for row in TABLE if row.limit}
+    only_warn = {"flanks", "belt_angle", "ring_data", "natural_frequency", "deck_height", "islands"}
+    assert set(CHANGES) == fail - only_warn
+    for code in CHANGES:
+        assert with_change(Finding(code, "error", "part", "part: too much")).hint == CHANGES[code]
+    kept = Finding("wall", "error", "part", "part: too much", hint="its own")
+    passed = Finding("wall", "warning", "part", "part: nearly too much")
+    assert [with_change(each) for each in (kept, passed)] == [kept, passed]
 
 
 def test_the_page_has_a_line_for_each_check():

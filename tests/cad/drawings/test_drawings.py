@@ -20,6 +20,7 @@ from shapely import box as shapely_box
 from shapely.affinity import rotate, translate
 from svglib.svglib import svg2rlg
 
+from scanwright.cad.drawings import project as projection
 from scanwright.cad.drawings.dimensions import angle_between, spread
 from scanwright.cad.drawings.part import part_of
 from scanwright.cad.drawings.patterns import number, patterns_of
@@ -31,6 +32,7 @@ from scanwright.cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, p
 from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
 from scanwright.cad.solids import box, cylinder, upright
+from scanwright.design.errors import BuildError
 
 X, Y, Z = np.eye(3)
 SVG = "{http://www.w3.org/2000/svg}"
@@ -302,6 +304,33 @@ def test_what_lies_exactly_behind_is_drawn_once():
     for right, up in ((X, Y), (Y, Z), (X, Z)):
         seen, hidden = drawn(solid, right, up)
         assert len(seen) == 4 and not hidden
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_view_that_the_kernel_returns_incomplete_is_drawn_at_another_angle(seed, monkeypatch):
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(5, 40, 3)
+    solid = box(-size, size).cut(upright(rng.uniform(1, 3), -50, 50))
+    right, up = (np.roll(X, k) for k in rng.choice(3, 2, replace=False))
+    whole, fails = projection._pieces, int(rng.integers(1, len(projection.SKEWS_RAD)))
+    seen = []
+
+    def incomplete(solid, right, up, zero, skew, *, hidden):
+        seen.append(skew)
+        lines = whole(solid, right, up, zero, skew, hidden=hidden)
+        if len(seen) > fails:
+            return lines
+        edge = max(points[:, 0].max() for points, _ in lines)
+        return [piece for piece in lines if piece[0][:, 0].max() < edge - 0.5] if rng.random() < 0.5 else []
+
+    expected = project(solid, right, up, np.zeros(3))
+    monkeypatch.setattr(projection, "_pieces", incomplete)
+    assert len(project(solid, right, up, np.zeros(3))) == len(expected)
+    assert seen == list(projection.SKEWS_RAD[: fails + 1])
+    fails = len(projection.SKEWS_RAD)
+    seen.clear()
+    with pytest.raises(BuildError, match="no lines of a part"):
+        project(solid, right, up, np.zeros(3))
 
 
 def test_an_inclined_cylinder_ends_in_curves():

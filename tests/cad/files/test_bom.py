@@ -258,7 +258,9 @@ def test_the_time_to_print_is_that_of_the_plates(rows, made):
     hours = print_hours(sum(masses.values()), made.scanner.printer)
     assert hours == pytest.approx(sum(masses.values()) / 1.24 / 20)
     (plastic,) = (row for row in rows if row["kind"] == "material")
-    assert plastic["note"].startswith(f"{hours_in_words(hours)} to print")
+    assert plastic["note"].startswith(f"{hours_in_words(hours)} to print with supports")
+    assert f"; {sum(masses.values()):.1f} g of parts, 10% more for supports" in plastic["note"]
+    assert float(plastic["mass_g"]) == pytest.approx(1.1 * sum(masses.values()), abs=0.06)
     assert [hours_in_words(h) for h in (0.01, 0.6, 4.8, 11.4)] == [
         "about 0.5 h",
         "about 0.5 h",

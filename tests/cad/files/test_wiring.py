@@ -4,12 +4,15 @@ import itertools
 import re
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from scanwright.cad.files.schematic import schematic_svg
 from scanwright.cad.files.wiring import wiring_files
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.lidar import Lidar
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.electrics.wiring import network_of
 from scanwright.design.scanner import scanner_of
 
@@ -87,6 +90,26 @@ def test_the_words_tell_power_circuits_and_wires():
     assert text.index("## Caution") < text.index("## Power") < text.index("## Wires")
     unsure = wiring_files(scanner_for(*SCANNERS["no ring"]), "0" * 12)["wiring.md"].decode()
     assert "## Unknown" in unsure and "Slip ring" not in unsure
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_servo_is_powered_on_the_bench_by_pins_and_volts_of_its_branch(seed):
+    rng, products = np.random.default_rng(seed), load_catalogue().products.values()
+    servos, lidars = ([each for each in products if isinstance(each, kind)] for kind in (Servo, Lidar))
+    servo, lidar = servos[rng.integers(len(servos))], lidars[rng.integers(len(lidars))]
+    scanner = scanner_for(lidar.name, servo.name, None)
+    text = wiring_files(scanner, "0" * 12)["wiring.md"].decode()
+    volts = 12 if servo.supply_v[0] <= 12 <= servo.supply_v[1] else 5
+    bench = text[text.index("## Servo on the bench") : text.index("## Power")]
+    assert f"measure {volts} V from V to GND" in bench and "cut one servo cable" in bench
+    assert (" for the servo out +" in bench) == (volts == 5)
+    assert f"by the pins of its plug, not by colour ({servo.connector}" in text and "1 GND, 2 V, 3 D" in text
+    assert f"to 12 V and at least {sum(b.peak_a for b in network_of(scanner).branches):.2g} A" in text
+    direct = [each for each in (servo, lidar) if each.supply_v and each.supply_v[0] <= 12 <= each.supply_v[1]]
+    battery = re.search(r"A battery within ([\d.]+) to ([\d.]+) V", text)
+    assert (battery is None) == (not direct)
+    for device in direct:
+        assert device.supply_v[0] <= float(battery[1]) + 0.05 and float(battery[2]) <= device.supply_v[1]
 
 
 @pytest.mark.parametrize("name", ["a tied pin", "a tied pin and no ring"])

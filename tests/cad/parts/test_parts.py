@@ -240,7 +240,7 @@ def test_findings_name_what_to_do(built):
     left_out = [out.what for out in built.result.left_out if out.unit == "parts"]
     if built.name == "upright":
         assert left_out == ["servo_frame", "bearing_cage", "base_mount", "counterweight", *MODULES]
-        assert "M2.5" in found["servo_on_deck"].hint
+        assert "M2.5" in found["servo_on_deck"].hint and "[deck]" in found["servo_on_deck"].hint
     else:
         bearing = [] if built.name in BEARING else ["bearing_cage"]
         assert left_out == ["servo_frame", *bearing] + ([] if built.name in BALANCED else ["counterweight"]) + MODULES

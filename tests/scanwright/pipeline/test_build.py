@@ -152,7 +152,8 @@ def test_a_build_whose_checks_fail_says_so_first_and_exits_with_1(tilted, tmp_pa
         "error: check failed: all is well",
         f"error: 1 of {len(built.checks)} checks failed: do not make these parts",
     ]
-    assert complaints[-1] == f"next: read the failed checks in {folder / 'report.html'}, and change the task"
+    change = f"next: change {folder / 'task.toml'} as the failed checks state, and build again"
+    assert complaints[-1] == f"{change}; {folder / 'report.html'} shows them"
     assert [check.message for check in sw.build(folder / "task.toml", tmp_path).failed] == ["all is well"]
 
 

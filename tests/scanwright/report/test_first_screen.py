@@ -119,7 +119,7 @@ def test_parts_are_grouped_in_order_and_nothing_is_lost(parts, built):
     make = cards(ANGLES, built, parts)[3]
     assert (make.headline, make.text) == (
         parts.usd,
-        "1 part to print, 1 part to have machined, 6 screws.",
+        "1 part to print and 1 other to have machined, 6 screws.",
     )
     assert usd_range([{"low_usd": "0.2", "high_usd": "0.4"}]) == "0 USD"
 
@@ -142,14 +142,14 @@ def test_what_to_do_begins_with_what_is_wrong(parts):
     assert [each.title for each in todo] == [
         "Fix 1 failed check",
         "Measure 1 value",
-        "Try the hole patterns on your devices",
-        "Print the fit coupon",
         "Order devices, screws and wiring",
+        "Print the fit coupon",
+        "Try the hole patterns on your devices",
         "Have 1 part machined",
         "Print 2 plates",
         "Assemble and wire",
     ]
     assert todo[1].findings == (findings[0],)
-    assert todo[2].files == ("template.pdf", "print/test_plate.3mf")
+    assert todo[4].files == ("template.pdf", "print/test_plate.3mf")
     assert todo[5].files == ("drawings/shaft.pdf",) and todo[6].files == ("print/plate_1.3mf", "print/plate_2.3mf")
     assert to_do([], [], None) == []
