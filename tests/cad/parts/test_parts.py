@@ -234,7 +234,8 @@ def test_findings_name_what_to_do(built):
     found = {finding.code: finding for finding in built.result.findings}
     assert "aluminium or steel" in found["turn_from_metal"].hint
     assembly = built.result.assembly
-    notes = unverified(products_of(assembly.layout.scanner, assembly.layout.drive), assembly)
+    products = products_of(assembly.layout.scanner, assembly.layout.drive)
+    notes = [note for product in products for note in unverified(product, assembly)]
     assert any("SNU11-P0210: length_mm = 38.0" in f.message and "measure" in f.hint for f in notes)
     assert "tilt_moment" not in found
     left_out = [out.what for out in built.result.left_out if out.unit == "parts"]
