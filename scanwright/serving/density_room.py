@@ -20,6 +20,7 @@ NODES = 5_000  # approximately, at which the density is known; more would delay 
 FINER = 4  # pixels per node and side
 SMOOTH = 0.7  # standard deviation in nodes: otherwise the edge of a band follows single scan lines
 BLIND = (236, 236, 240)  # colour of blind directions: a grey that is not in the scale
+EDGE = (96, 104, 116)  # colour of the edges of the room: without them it looks flat
 AMBIENT, LAMP, LAMP_M = np.pi, 0.7, (1.0, 0.6, 2.0)  # three.js: a body has its own colour at intensity pi
 
 
@@ -85,6 +86,7 @@ class DensityRoom:
                 share = wall.finer(seen[part])
                 shown = np.where(share < 0.5, 0.0, shown / np.maximum(share, UNSEEN))
             image = density_colours(shown, bands)
+            image[[0, -1]] = image[:, [0, -1]] = EDGE
             if opacity is not None:
                 image = np.dstack([image, np.round(255 * wall.finer(opacity[part])).astype(np.uint8)])
             wall.handle.image = image
