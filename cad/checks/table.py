@@ -146,7 +146,7 @@ def with_change(finding: Finding) -> Finding:
     """Return a finding, with what to change as its hint if it fails and has none."""
     if finding.severity != "error" or finding.hint:
         return finding
-    return replace(finding, hint=CHANGES[finding.code])
+    return replace(finding, hint=CHANGES.get(finding.code, ""))
 
 
 def table_page() -> str:

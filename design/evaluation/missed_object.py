@@ -14,7 +14,7 @@ from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score, score_on
 from scanwright.design.self_occlusion import SelfOcclusion
-from scanwright.design.task.task import LoadedTask
+from scanwright.design.task.task import DensityRules, LoadedTask
 
 LONGER = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)  # periods that are tried, in units of its own
 NODES = 2187  # of the region, for each of them
@@ -25,11 +25,11 @@ def missed_object(
 ) -> Finding | None:
     """Return a warning if an object as wide as a ball can get no beam; blind spots have their own messages.
 
-    The task states the size of the smallest object with `density.ball_radius_deg`. `own` is the score of the mount
-    without the beams that `shadow` blocks.
+    A task states the size of the smallest object with a `density.ball_radius_deg` other than the default. `own` is the
+    score of the mount without the beams that `shadow` blocks.
     """
     radius_deg = loaded.task.density.ball_radius_deg
-    if "ball_radius_deg" not in loaded.task.density.model_fields_set:
+    if radius_deg == DensityRules().ball_radius_deg:  # a build writes the default to its task.toml
         return None
     if own.least > 0 or own.blind_weight > NO_BLIND_WEIGHT:
         return None
