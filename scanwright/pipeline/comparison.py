@@ -41,7 +41,7 @@ class Comparison:
         if not in_full:
             return [
                 *short_table(self.rows),
-                "time of the measurement; beams: geometric mean within the ball; blind: share of the region never seen",
+                "time: of a scan; beams: geometric mean in the ball; blind: share of the region; USD: devices only",
                 notes(self.optimum.loaded, self.rows)[0],
                 *verdict(self.optimum.gains),
                 *self._vibration_lines(),
