@@ -73,3 +73,10 @@ def test_the_angle_set_of_a_page_is_valid_and_its_comparison_runs(tmp_path, caps
     exec(compile(code, "calibrate.md", "exec"), {})
     median_mm = float(capsys.readouterr().out.split()[1])
     assert 1 < median_mm < 30  # of 0.5 deg at most in a room of some metres
+
+
+def test_the_price_in_the_readme_is_that_of_the_table():
+    row = re.search(r"^\| `low_cost` .*", (ROOT / "docs/choose-hardware.md").read_text(), re.MULTILINE)
+    assert row is not None
+    low, high = re.findall(r"(\d+) to (\d+)", row[0])[0]
+    assert f"${low} to ${high}" in (ROOT / "README.md").read_text()
