@@ -133,7 +133,7 @@ def load_angles(path: str | Path) -> AngleSet:
         within = path / "angles.json"
         advice = f": name {within}" if within.is_file() else " without an angles.json, not an angle set"
         raise TaskError(f"{path}: this is a folder{advice}")
-    if path.suffix == ".toml":
+    if path.suffix == ".toml" and path.is_file():
         raise TaskError(f"{path}: this is a task: use the angles.json of its build folder (`scanwright build {path}`)")
     try:
         angles = AngleSet.model_validate_json(read_text_of(path, "the angle set"), strict=True)

@@ -48,7 +48,7 @@ def _write_sketches(folder: Path) -> None:
     """Write devices.md with a sketch of every product that has dimensions."""
     from scanwright.cad.drawings.devices.sketch import sketch_svg
     from scanwright.design.catalogue.catalogue import load_catalogue
-    from scanwright.design.catalogue.products import Belt, Multibeam
+    from scanwright.design.catalogue.products import Belt, Multibeam, Printer
 
     page = [
         "# Sketches of the products",
@@ -58,7 +58,7 @@ def _write_sketches(folder: Path) -> None:
     ]
     (folder / "sketches").mkdir(exist_ok=True)
     for product in load_catalogue():
-        if not isinstance(product, Belt | Multibeam):
+        if not isinstance(product, Belt | Multibeam | Printer):
             file = f"sketches/{product.name.lower().replace(' ', '-')}.svg"
             (folder / file).write_bytes(sketch_svg(product))
             page += ["", f"## {product.name}", "", f"![{product.name} with its dimensions]({file})"]

@@ -41,7 +41,7 @@ def missed_object(
     period_s = _period_that_hits(loaded, angles_rad, shadow)
     hint = "set limits.min_density = 1 to search mounts that hit it"
     if period_s is not None:
-        hint = f"with motion.period_s = {period_s:.3g} this mount hits it everywhere"
+        hint += f"; this one does with motion.period_s = {period_s:.3g}"
     return Finding("missed_object", "warning", "region", message, float(own.least), 1.0, "beams", hint)
 
 

@@ -182,7 +182,7 @@ def import_bag(
             same_clock=angle_source is not None and angle_source.topic == scan_source.topic,
         )
         findings += _scan_findings(survey)
-        findings += imu_findings(opened, survey.angle_stamps.receive_ns, np.unwrap(survey.angle * unit_rad), also)
+        findings += imu_findings(opened, survey.angle_stamps.receive_ns, np.unwrap(survey.angle * unit_rad))
         findings += _zero_outside(log, unit_rad, corrections)
         if also and clock.note:
             also_note = f"{', '.join(sorted(also))}: their stamps may be of another clock than the scans' times"

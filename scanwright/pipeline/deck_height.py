@@ -33,7 +33,8 @@ def deck_height(loaded: LoadedTask, angles: AngleSet) -> Finding:
     change = "add" if off_mm * z_mm > 0 else "subtract"
     hint = (
         f"{change} {abs(off_mm) / 1000:.3f} m {'to' if change == 'add' else 'from'} the scanner's height in the task "
-        "(--height-m of `scanwright new`, or each height_m and sensor_m) and build again"
+        "(--height-m of `scanwright new`, or each height_m and sensor_m) and build again, with "
+        "[angles] fixed to keep this mount"
     )
     if off_mm < 0:
         hint += f", or put a plate of {-off_mm:.0f} mm under the mount"

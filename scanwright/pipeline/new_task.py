@@ -97,7 +97,9 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
             f"{answers.height_m / 100:g}, {answers.height_m:g} mm is {answers.height_m / 1000:g})"
         )
     # where regions overlap the last one decides: those all around come first
-    seen = sorted((parse_region(each) for each in answers.see), key=lambda each: each[0] not in ("all", "around"))
+    seen = sorted(
+        (parse_region(each) for each in answers.see), key=lambda each: {"all": 0, "around": 1}.get(each[0], 2)
+    )
     if not seen:
         raise TaskError(f"see: no region; {known_regions()}")
     things = [numbers for word, numbers in seen if word == "thing"]

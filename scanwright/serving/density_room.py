@@ -93,7 +93,7 @@ class DensityRoom:
 
 
 def density_colours(density: Float[ndarray, "*n"], bands: Bands) -> Colours:
-    """Return the colours of mean densities, shape (*n, 3); `BLIND` for 0."""
+    """Return the colours of mean densities, shape (..., 3); `BLIND` for 0."""
     colours = bands.colours(density)
     colours[density <= UNSEEN] = BLIND
     return colours

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,9 +20,9 @@ _FEWEST = 20  # rates
 _ON_AXIS = (0.9, 1.1)  # turns of an IMU that rides on the axis, per turn of it
 
 
-def imu_findings(bag: Bag, angle_ns: Times, position_rad: Floats, intended: Collection[str]) -> Iterator[Finding]:
-    """Report IMUs that turned otherwise than the axis; `angle_ns`: receive times; `intended`: topics not examined."""
-    topics = {topic for topic, kind in bag.topics.items() if kind == ros_messages.IMU} - set(intended)
+def imu_findings(bag: Bag, angle_ns: Times, position_rad: Floats) -> Iterator[Finding]:
+    """Report IMUs that turned otherwise than the axis; `angle_ns`: receive times."""
+    topics = {topic for topic, kind in bag.topics.items() if kind == ros_messages.IMU}
     rows: dict[str, list[tuple[int, float, float, float]]] = {topic: [] for topic in topics}
     for message in bag.messages(topics) if topics else ():
         rate = message.body.angular_velocity
@@ -37,7 +37,7 @@ def imu_findings(bag: Bag, angle_ns: Times, position_rad: Floats, intended: Coll
             cost_mm = 2000 * AT_M * math.sin(min(turned_rad, math.pi) / 2)
             text = f"{topic}: by its gyro it turned by {math.degrees(turned_rad):.0f} deg, and not with the axis: "
             cost = f"the platform moved, and points are up to {cost_mm:,.0f} mm off at {AT_M:g} m"
-            hint = f"record again with the base at rest; or --also {topic} and the poses, for `assemble --poses`"
+            hint = "record again with the base at rest, or give `assemble` the poses of the base"
             yield Finding("platform_moved", "warning", topic, text + cost, cost_mm, unit="mm", hint=hint)
 
 

@@ -130,7 +130,7 @@ WRONG = {
     ),
     "sweep of no width": (
         swap('mode = "spin"', 'mode = "sweep"\nlimits_deg = [10, 10]'),
-        ["motion", "limits_deg", "does not rise"],
+        ["motion", "limits_deg", "the first must be below the second"],
     ),
     "angle out of range": (BASE + "[angles]\nbeta_rot_deg = 91\n", ["angles", "beta_rot_deg", "91", "90"]),
     "range out of bounds": (BASE + "[angles]\nalpha_rot_deg = [0, 181]\n", ["angles", "alpha_rot_deg", "180"]),

@@ -219,9 +219,8 @@ def test_an_imu_that_turns_otherwise_than_the_axis_is_evidence_of_a_moved_platfo
     axes = [SimpleNamespace(angular_velocity=SimpleNamespace(x=x, y=y, z=z)) for x, y, z in rate]
     messages = [Message("/imu", 10**18 + round(1e9 * when), body) for when, body in zip(t, axes, strict=True)]
     bag = SimpleNamespace(topics={"/imu": IMU, "/scan": "x"}, messages=lambda _: iter(messages))
-    found = list(imu_findings(bag, 10**18 + np.rint(1e9 * t[::3]).astype(np.int64), axis[::3], ()))
+    found = list(imu_findings(bag, 10**18 + np.rint(1e9 * t[::3]).astype(np.int64), axis[::3]))
     assert [one.code for one in found] == ["platform_moved"] * expected
-    assert not list(imu_findings(bag, 10**18 + np.arange(3), np.zeros(3), {"/imu"}))
 
 
 def test_one_angle_a_scan_and_a_sweep_away_from_zero_are_reported(tmp_path):

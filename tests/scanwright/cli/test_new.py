@@ -18,7 +18,7 @@ from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import TaskError
-from scanwright.design.task.shapes import CeilingRegion, GroundRegion, WallRegion
+from scanwright.design.task.shapes import AllRegion, BandRegion, CeilingRegion, GroundRegion, WallRegion
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.deck_height import deck_height
 from scanwright.pipeline.new_task import ANGLES, UPRIGHT, Answers, task_text, write_task_file
@@ -89,8 +89,9 @@ def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
     box = ["--robot", "box:0.6:0.3:0.3", "--ahead-m", "0.2"]
     assert command("new", "all_of_it", *DOG[:6], *words, *box, "--scan-s", "20")[0] == 0
     task = load_task(here / "all_of_it.toml").task
-    assert [type(r) for r in task.weight[:3]] == [GroundRegion, CeilingRegion, WallRegion]
-    assert task.weight[3].theta_deg == (60, 120) and task.weight[4].shape == "all"
+    # the last region decides where they overlap
+    assert [type(r) for r in task.weight] == [AllRegion, BandRegion, GroundRegion, CeilingRegion, WallRegion]
+    assert task.weight[1].theta_deg == (60, 120)
     assert task.density.ball_radius_deg == pytest.approx(0.95, abs=0.01)  # 0.05 m at 3 m
     top = task.mask[0]
     assert top.corners_m()[0] == pytest.approx((-0.5, -0.15, -0.1)) and top.corners_m()[2] == pytest.approx(
@@ -231,7 +232,7 @@ def test_on_a_terminal_what_no_flag_answers_is_asked(here):
         program.kill()
         os.close(screen)
     task = load_task(here / "asked.toml").task
-    assert (task.sensor, task.weight[0].distance_m, task.weight[1].shape) == ("UST-10LX", 2, "band")
+    assert (task.sensor, task.weight[1].distance_m, task.weight[0].shape) == ("UST-10LX", 2, "band")
     assert (task.mask[0].from_m, task.mask[0].to_m) == (-0.7, 0.3)
 
 
