@@ -168,7 +168,7 @@ ENTRIES = (
         (-2.6, -1.6, 2.0),
         (1.3, 0, 1.1),
         38,
-        "Rolling would have 1.15 times the beams if its parts blocked none, and `compare` shows this before you "
+        "Rolling would have 1.06 times the beams if its parts blocked none, and `compare` shows this before you "
         "print anything. A lidar with a view of 360 deg sees its own mount in every scan. These beams are known "
         "and dropped.",
     ),
