@@ -27,7 +27,7 @@ from pydantic import Field, ValidationError
 
 from scanwright.design import frames
 from scanwright.design.arrays import Pose, Rotation, Setting, Vector
-from scanwright.design.errors import TaskError
+from scanwright.design.errors import MissingFileError, TaskError
 from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
 from scanwright.design.files.text_files import read_text_of
@@ -133,8 +133,11 @@ def load_angles(path: str | Path) -> AngleSet:
         within = path / "angles.json"
         advice = f": name {within}" if within.is_file() else " without an angles.json, not an angle set"
         raise TaskError(f"{path}: this is a folder{advice}")
-    if path.suffix == ".toml" and path.is_file():
-        raise TaskError(f"{path}: this is a task: use the angles.json of its build folder (`scanwright build {path}`)")
+    if path.suffix == ".toml":
+        remedy = f"use the angles.json of its build folder (`scanwright build {path}`)"
+        if not path.exists():
+            raise MissingFileError(f"{path}: no such file; if it is a task, {remedy}")
+        raise TaskError(f"{path}: this is a task: {remedy}")
     try:
         angles = AngleSet.model_validate_json(read_text_of(path, "the angle set"), strict=True)
     except ValidationError as error:
