@@ -17,7 +17,7 @@ from scanwright.report.colours import Bands, Colours
 from scanwright.report.room import Room
 
 NODES = 5_000  # approximately, at which the density is known; more would delay the picture
-FINER = 4  # pixels per node and side
+FINER = 3  # pixels per node and side
 SMOOTH = 0.7  # standard deviation in nodes: otherwise the edge of a band follows single scan lines
 BLIND = (236, 236, 240)  # colour of blind directions: a grey that is not in the scale
 EDGE = (96, 104, 116)  # colour of the edges of the room: without them it looks flat
