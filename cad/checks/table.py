@@ -139,7 +139,7 @@ CHANGES = {
     "wall": "choose a printer profile with thinner walls (printer), or other [angles]",
     "smallest_hole": "choose a lidar or servo with larger screws",
 }
-"""What to change if a check fails that has no hint of its own, by its code."""
+"""What to change if a check fails whose finding has no hint, by the code of the check."""
 
 
 def with_change(finding: Finding) -> Finding:

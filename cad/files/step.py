@@ -1,7 +1,7 @@
 """Canonical STEP: the same scanner gives the same bytes in every process.
 
 The kernel's writer adds the time, counts products per process, and orders colours by memory address. Every entity gets
-the hash of its own text with its references replaced by their hashes (a Merkle tree); roots are sorted by hash and
+the hash of its text with its references replaced by their hashes (a Merkle tree); roots are sorted by hash and
 everything is renumbered depth first.
 """
 

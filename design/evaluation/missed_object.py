@@ -16,7 +16,8 @@ from scanwright.design.objective.score import Score, score_on
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import DensityRules, LoadedTask
 
-LONGER = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)  # periods that are tried, in units of its own
+# periods to try, in units of that of the task
+LONGER = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 NODES = 2187  # of the region, for each of them
 
 

@@ -76,7 +76,7 @@ class Saving:
         return path
 
     def build(self, loaded: LoadedTask, setting: Setting) -> None:
-        """Save, and build the file in a process of its own."""
+        """Save, and build the file in a separate process."""
         c = self._controls
         if self._building is not None and self._building.runs:
             raise TaskError("build: one runs already")

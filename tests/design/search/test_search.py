@@ -159,14 +159,14 @@ def test_a_start_that_is_better_replaces_the_result_and_a_worse_one_does_not():
     problem, ranges = CASES["a fan without symmetry, axis fixed"]
     full = search(problem, ranges)
     best = full.best[0]
-    lacking = replace(full, best=full.best[1:])
-    assert with_starts(problem, ranges, Limits(), lacking, [full.best[2].angles_deg]) is lacking
-    mended = with_starts(problem, ranges, Limits(), lacking, [full.best[2].angles_deg, best.angles_deg])
-    assert mended.best[0].score.J == pytest.approx(best.score.J, abs=1e-5)
-    assert {family.angles_deg for family in mended.best[1:]} <= {family.angles_deg for family in lacking.best}
-    assert [family.score.J for family in mended.best] == sorted(family.score.J for family in mended.best)
+    without_best = replace(full, best=full.best[1:])
+    assert with_starts(problem, ranges, Limits(), without_best, [full.best[2].angles_deg]) is without_best
+    improved = with_starts(problem, ranges, Limits(), without_best, [full.best[2].angles_deg, best.angles_deg])
+    assert improved.best[0].score.J == pytest.approx(best.score.J, abs=1e-5)
+    assert {family.angles_deg for family in improved.best[1:]} <= {family.angles_deg for family in without_best.best}
+    assert [family.score.J for family in improved.best] == sorted(family.score.J for family in improved.best)
     dense = Limits(min_density=best.score.least + 1)  # which the start does not have
-    assert with_starts(problem, ranges, dense, lacking, [best.angles_deg]) is lacking
+    assert with_starts(problem, ranges, dense, without_best, [best.angles_deg]) is without_best
 
 
 def test_all_is_covered_with_fewer_evaluations():
