@@ -7,16 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from scanwright.design.arrays import Setting
+from scanwright.design.errors import TaskError
 from scanwright.design.evaluation.metres import AT_M, rounded
 from scanwright.design.findings import Finding
 from scanwright.design.motion import LONGEST_S, Spin, Sweep
 from scanwright.design.objective.holes import NO_BLIND_WEIGHT
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score, score_on
+from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import DensityRules, LoadedTask
 
-# periods to try, in units of that of the task
+# periods of a sweep to try, in units of that of the task
 LONGER = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 NODES = 2187  # of the region, for each of them
 
@@ -42,25 +44,29 @@ def missed_object(
     period_s = _period_that_hits(loaded, angles_rad, shadow)
     hint = "set limits.min_density = 1 to search mounts that hit it"
     if period_s is not None:
-        hint += f"; this one does with motion.period_s = {period_s:.3g}"
+        hint += f"; this one does with motion.period_s = {period_s:.6g}"
     return Finding("missed_object", "warning", "region", message, float(own.least), 1.0, "beams", hint)
 
 
 def _period_that_hits(loaded: LoadedTask, angles_rad: Setting, shadow: SelfOcclusion | None) -> float | None:
-    """Return the first period of `LONGER` with a beam on every ball of the region; None if there is none."""
+    """Return a period with a beam on every ball of the region, of a sweep the first of `LONGER`; None if unknown."""
     motion = loaded.task.motion
-    if not isinstance(motion, Spin | Sweep):
+    if isinstance(motion, Spin):
+        try:
+            return shortest_period_s(_seen(loaded, shadow), angles_rad, loaded.lidar.scan_rate_hz, 1)
+        except TaskError:
+            return None
+    if not isinstance(motion, Sweep):
         return None
     for factor in LONGER:
         period_s = float(f"{factor * motion.period_s:.3g}")
-        if period_s > LONGEST_S:
-            return None
         slower = motion.model_copy(update={"period_s": period_s})
-        problem = problem_of(replace(loaded, task=loaded.task.model_copy(update={"motion": slower})))
-        if _least(problem, angles_rad, shadow) > 0:
+        problem = _seen(replace(loaded, task=loaded.task.model_copy(update={"motion": slower})), shadow)
+        if period_s <= LONGEST_S and score_on(problem, angles_rad, NODES).least > 0:
             return period_s
     return None
 
 
-def _least(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> int:
-    return score_on(problem if shadow is None else problem.behind(shadow), angles_rad, NODES).least
+def _seen(loaded: LoadedTask, shadow: SelfOcclusion | None) -> Problem:
+    problem = problem_of(loaded)
+    return problem if shadow is None else problem.behind(shadow)
