@@ -233,7 +233,7 @@ def schema(
 
         show_json(Task.model_json_schema())
         return
-    from scanwright.cli.results.of_commands import RESULTS, result_schema
+    from scanwright.cli.results.schemas import RESULTS, result_schema
 
     if command not in RESULTS:
         raise ScanwrightError(f"{command}: no command with --json{suggest(command, RESULTS)}")

@@ -156,7 +156,7 @@ def scan(
         raise ScanwrightError("--live, --foxglove, --json: choose one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright import api
-    from scanwright.cli.results.of_commands import ScanResult
+    from scanwright.cli.results.scans import ScanResult
     from scanwright.design.angles import CALIBRATED
     from scanwright.firmware_io.scan.plan import plan_scan
 

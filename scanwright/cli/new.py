@@ -62,7 +62,6 @@ def new(
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.servo import Servo
-    from scanwright.pipeline.new_task import Answers, task_text, usual_scan_s, write_task_file
 
     products = load_catalogue()
     if lidar is not None:
@@ -78,6 +77,8 @@ def new(
         flags = {"--lidar": lidar, "--servo": servo, "--height-m": height_m, "--see": see}
         needed = ", ".join(flag for flag, value in flags.items() if not value)
         raise TaskError(f"missing options {needed} (not running in a terminal)")
+    from scanwright.pipeline.new_task import Answers, task_text, usual_scan_s, write_task_file
+
     answers = Answers(
         name=name or (out.stem if out else "my_scanner"),
         lidar=str(lidar),

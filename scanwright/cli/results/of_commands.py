@@ -1,4 +1,4 @@
-"""Records of the `--json` output of the commands, and their JSON schemas.
+"""Records of the `--json` output of the commands; `angles.py` and `scans.py` have those that import more.
 
 The attributes of a record are its documentation: `scanwright schema COMMAND` and the reference page print them.
 """
@@ -6,22 +6,11 @@ The attributes of a record are its documentation: `scanwright schema COMMAND` an
 from __future__ import annotations
 
 import csv
-import inspect
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
-from pydantic import TypeAdapter
-
-from scanwright.cli.results.angles import Compared, Evaluated, Optimised
 from scanwright.design.findings import Finding
-from scanwright.firmware_io.assembly.assemble import AssembleSummary
-from scanwright.firmware_io.recording.convert import Converted
-from scanwright.firmware_io.recording.importer import ImportSummary
-from scanwright.firmware_io.recording.repair.survey import RepairSummary
-from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,25 +180,6 @@ class Devices:
 
 
 @dataclass(frozen=True, slots=True)
-class ScanResult:
-    """A scan, or its plan.
-
-    Attributes:
-        devices: lidar and servo.
-        angles: file of the angle set.
-        duration_s: time of the recording.
-        recording: what was recorded; null with `--dry-run`.
-        cloud: the point cloud; null with `--dry-run`.
-    """
-
-    devices: Devices
-    angles: Path
-    duration_s: float
-    recording: ScanSummary | None = None
-    cloud: AssembleSummary | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Published:
     """Data that `ros2` publishes until Ctrl-C; printed before it starts.
 
@@ -246,17 +216,6 @@ class Settings:
     changes: list[str]
     undo: Path | None = None
     position_deg: float | None = None
-
-
-@dataclass(slots=True)
-class Repaired(RepairSummary):
-    """A repaired recording.
-
-    Attributes:
-        out: the new file; not written if the recording is intact.
-    """
-
-    out: Path = Path()
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,65 +314,3 @@ class OpenedPage:
     address: str | None = None
     file: Path | None = None
     scans: int | None = None
-
-
-RESULTS: dict[str, Any] = {
-    "new": Created,
-    "optimise": Optimised,
-    "evaluate": Evaluated,
-    "compare": Compared,
-    "catalogue": Products,
-    "accuracy": WrittenFiles,
-    "build": Built | Rebuilt,
-    "check": Checked,
-    "measure": MeasuredModel,
-    "report": WrittenFiles,
-    "study": Studied,
-    "emulate": Devices,
-    "doctor": Diagnosis | Settings,
-    "servo-setup": Settings,
-    "scan": ScanResult,
-    "ros2": Published,
-    "import": ImportSummary,
-    "repair": Repaired,
-    "assemble": AssembleSummary,
-    "calibrate": Calibrated,
-    "register": Registered,
-    "map": Mapped,
-    "convert": Converted,
-    "studio": OpenedPage,
-    "view": OpenedPage,
-}
-"""Command -> record that it prints with `--json`."""
-
-
-def result_schema(command: str) -> dict[str, Any]:
-    """Return the JSON schema of the `--json` output of a command, with descriptions from the records."""
-    schema = TypeAdapter(RESULTS[command]).json_schema(mode="serialization")
-    kinds = {kind.__name__: kind for kind in _records_in(RESULTS[command])}
-    for record in (schema, *schema.get("$defs", {}).values()):
-        if kind := kinds.get(record.get("title", "")):
-            record["description"] = inspect.cleandoc(kind.__doc__ or "").split("\n\n", maxsplit=1)[0]
-            for name, words in _attributes(kind).items():
-                record["properties"].get(name, {})["description"] = words
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def _records_in(kind: Any) -> Iterator[type[Any]]:
-    """Yield the dataclasses in a type."""
-    if is_dataclass(kind):
-        yield kind  # type: ignore[misc]
-        for inner in get_type_hints(kind).values():
-            yield from _records_in(inner)
-    for inner in get_args(kind):
-        yield from _records_in(inner)
-
-
-def _attributes(kind: type[Any]) -> dict[str, str]:
-    """Return attribute -> description, from the docstrings of a dataclass and its bases."""
-    described: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        _, _, text = inspect.cleandoc(base.__doc__ or "").partition("\nAttributes:\n")
-        attributes = re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", text, re.MULTILINE)
-        described |= {name: " ".join(words.split()) for name, words in attributes}
-    return described

@@ -14,7 +14,7 @@ from typer.main import get_command
 from scanwright.cli.app import app
 from scanwright.cli.console import show_json
 from scanwright.cli.results import of_commands
-from scanwright.cli.results.of_commands import RESULTS, result_schema
+from scanwright.cli.results.schemas import RESULTS, result_schema
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import write_clouds
 
