@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, show, show_result, verbosity
+from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, hint, show, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
 from scanwright.design.errors import RecordingError
@@ -65,6 +65,10 @@ def import_(
         bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or (), corrections=options
     )
     show_result(summary.lines, summary, as_json)
+    hint(
+        f"next: `scanwright assemble {out} --angles ANGLES.json -o cloud.ply`; a build folder has this file, and for "
+        "another scanner 'Bring your own recording' in the documentation shows its five lines"
+    )
 
 
 @app.command(example="repair rec.mcap")
