@@ -106,7 +106,7 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     if not better:
         rest = f", but {against}" if against else EASIER if best.simpler else ""
         return [f"{mount} is as good within {AS_GOOD - 1:.0%}{rest}"]
-    rest = f", but {against}" if against else ": fix its angles in the task to try it"
+    rest = f", but {against}" if against else ": fix its angles in the task and build, to see if its parts pass"
     return [f"{mount} has {1 / best.factor:.2f} times the beams if its parts block none{rest}"]
 
 
