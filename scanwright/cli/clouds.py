@@ -13,6 +13,7 @@ from scanwright.cli.arguments import Angles, AsJson
 from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, hint, show, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
+from scanwright.cli.results.of_commands import Mapped, Registered
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, read_time_increment
@@ -157,7 +158,6 @@ def register(
     Works without initial poses.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Registered
 
     result = api.register(
         clouds,
@@ -198,7 +198,6 @@ def map_(
     otherwise no cell is free.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Mapped
 
     summary = api.make_map(
         clouds,

@@ -12,6 +12,7 @@ from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
 from scanwright.cli.console import ConsoleProgress, Verbosity, hint, show, show_json, show_result, verbosity
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import Products, WrittenFiles
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 from scanwright.design.files.atomic_file import atomic_write
 
@@ -116,8 +117,6 @@ def accuracy(
         require_kernel("accuracy --choices")
     loaded = api.load_task(task)
     folder = out / loaded.task.name
-    from scanwright.cli.results.of_commands import WrittenFiles
-
     if choices:
         from scanwright.trials.report import report_choices
 
@@ -181,7 +180,6 @@ def catalogue(
     """List lidars, servos, slip rings and other products."""
     if sketch is not None and name is None:
         raise typer.BadParameter("draws one product, with its NAME before the option", param_hint="--sketch")
-    from scanwright.cli.results.of_commands import Products
     from scanwright.design.catalogue.catalogue import file_of, load_catalogue
     from scanwright.design.catalogue.table import chosen, table_lines
 

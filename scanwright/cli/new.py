@@ -14,6 +14,7 @@ from typer import Argument, Option
 from scanwright.cli.arguments import AsJson
 from scanwright.cli.console import hint, show, show_result, warn
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import Created
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 
 app = Commands("Design")
@@ -58,7 +59,6 @@ def new(
     On a terminal, `new` asks for what the options do not give. Otherwise --lidar, --servo, --height-m and --see are
     required.
     """
-    from scanwright.cli.results.of_commands import Created
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.servo import Servo
