@@ -149,17 +149,11 @@ def load_angles(path: str | Path) -> AngleSet:
 
 @dataclass(frozen=True, slots=True)
 class AnglesInUse:
-    """The angle set that the scanner of a build folder runs with.
+    """The angle set that the scanner of a build folder runs with."""
 
-    Attributes:
-        path: its file.
-        angles: its contents.
-        description: which one it is, and why.
-    """
-
-    path: Path
-    angles: AngleSet
-    description: str
+    path: Path  # its file
+    angles: AngleSet  # its contents
+    description: str  # which one it is, and why
 
 
 def angles_in_use(folder: Path) -> AnglesInUse:

@@ -30,17 +30,12 @@ SEED = 0
 
 @dataclass(frozen=True, slots=True)
 class MethodsMeasured:
-    """Results of all methods.
+    """Results of all methods."""
 
-    Attributes:
-        truths: the reference at each setting, in order.
-        trials: one for each method and value of its parameter; errors below those of the references are 0.
-        failed: methods without a result, with the reason.
-    """
-
-    truths: tuple[Reference, ...]
+    truths: tuple[Reference, ...]  # the reference at each setting, in order
+    # one for each method and value of its parameter; errors below those of the references are 0
     trials: tuple[Trial, ...]
-    failed: tuple[str, ...]
+    failed: tuple[str, ...]  # methods without a result, with the reason
 
 
 def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress) -> MethodsMeasured:

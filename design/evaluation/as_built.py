@@ -67,17 +67,11 @@ class ReferenceMount:
 
 @dataclass(frozen=True, slots=True)
 class AsBuilt:
-    """A scanner and the reference mounts.
+    """A scanner and the reference mounts."""
 
-    Attributes:
-        blocked: share of the beams that its parts block; None without known parts.
-        own: its view.
-        mounts: the reference mounts, the best one, with the smallest factor, first.
-    """
-
-    blocked: float | None
-    own: Seen
-    mounts: tuple[ReferenceMount, ...]
+    blocked: float | None  # share of the beams that its parts block; None without known parts
+    own: Seen  # its view
+    mounts: tuple[ReferenceMount, ...]  # the reference mounts, the best one, with the smallest factor, first
 
     @property
     def parts(self) -> str:

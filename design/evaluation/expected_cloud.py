@@ -73,23 +73,14 @@ class ExpectedError:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedCloud:
-    """The cloud of one full scan. Console, report and JSON print this record.
+    """The cloud of one full scan. Console, report and JSON print this record."""
 
-    Attributes:
-        error: of a point at 3 m.
-        far: of a point at 5 m; None if the lidar does not reach it.
-        gap: warning of a gap much wider than the spacing of the lines, if there is one.
-        missed: warning that an object of the size that the task states can be missed.
-        planes: points on ground, ceiling and walls of the task.
-        hidden: regions that the masks hide in part.
-    """
-
-    error: ExpectedError
-    far: ExpectedError | None
-    gap: Finding | None
-    missed: Finding | None
-    planes: tuple[PlaneFigures, ...]
-    hidden: tuple[Finding, ...]
+    error: ExpectedError  # of a point at 3 m
+    far: ExpectedError | None  # of a point at 5 m; None if the lidar does not reach it
+    gap: Finding | None  # warning of a gap much wider than the spacing of the lines, if there is one
+    missed: Finding | None  # warning that an object of the size that the task states can be missed
+    planes: tuple[PlaneFigures, ...]  # points on ground, ceiling and walls of the task
+    hidden: tuple[Finding, ...]  # regions that the masks hide in part
 
     def lines(self) -> list[str]:
         """Return the record as lines of text."""

@@ -156,17 +156,11 @@ def with_starts(
 
 @dataclass(frozen=True, slots=True)
 class _Best:
-    """The best mount of a grid.
+    """The best mount of a grid."""
 
-    Attributes:
-        land: the landscape; its density limit can be above that of the task, to meet that between the nodes.
-        exact: number of scan planes with exact J.
-        candidate: the mount; None if none meets the limits.
-    """
-
-    land: Landscape
-    exact: int
-    candidate: Candidate | None
+    land: Landscape  # the landscape; its density limit can be above that of the task, to meet that between the nodes
+    exact: int  # number of scan planes with exact J
+    candidate: Candidate | None  # the mount; None if none meets the limits
 
 
 def _best(space: SearchSpace, progress: Progress, effort: Effort) -> _Best:

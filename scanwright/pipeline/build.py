@@ -81,23 +81,14 @@ vary, so the remaining time is estimated only from a share of a tenth on, when t
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """The results of one build.
+    """The results of one build."""
 
-    Attributes:
-        optimum: result of the search.
-        chosen: the best mount with its parts, which was built.
-        as_built: its view without the beams that its parts block.
-        findings: to read before the parts are made.
-        cloud: expected error, gaps and points.
-        to_make: numbers of parts to print and to machine, and the time to print.
-    """
-
-    optimum: Optimum
-    chosen: Chosen
-    as_built: AsBuilt
-    findings: tuple[Finding, ...]
-    cloud: ExpectedCloud
-    to_make: str
+    optimum: Optimum  # result of the search
+    chosen: Chosen  # the best mount with its parts, which was built
+    as_built: AsBuilt  # its view without the beams that its parts block
+    findings: tuple[Finding, ...]  # to read before the parts are made
+    cloud: ExpectedCloud  # expected error, gaps and points
+    to_make: str  # numbers of parts to print and to machine, and the time to print
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,15 +28,10 @@ _NAMED = 3  # files of a kind that a message names
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """Files of a build folder that changed since its manifest was written.
+    """Files of a build folder that changed since its manifest was written."""
 
-    Attributes:
-        missing: missing files.
-        edited: files with other contents.
-    """
-
-    missing: tuple[str, ...]
-    edited: tuple[str, ...]
+    missing: tuple[str, ...]  # missing files
+    edited: tuple[str, ...]  # files with other contents
 
     def __bool__(self) -> bool:
         """Return whether any file changed."""

@@ -57,27 +57,17 @@ DECK = (
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The answers of `scanwright new`.
+    """The answers of `scanwright new`."""
 
-    Attributes:
-        name: of the task and its build folder.
-        lidar: by its name in the catalogue.
-        servo: the same.
-        height_m: of the scanner's optical centre over the ground.
-        see: regions to see, in the form of `scanwright.pipeline.seen_regions.SEEN`.
-        scan_s: time of one full scan.
-        robot: parts of the robot that block the view: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
-        ahead_m: position of the scanner ahead of the middle of the box, or of the origin of the mesh.
-    """
-
-    name: str
-    lidar: str
-    servo: str
-    height_m: float
-    see: tuple[str, ...]
-    scan_s: float
+    name: str  # of the task and its build folder
+    lidar: str  # by its name in the catalogue
+    servo: str  # the same
+    height_m: float  # of the scanner's optical centre over the ground
+    see: tuple[str, ...]  # regions to see, in the form of `scanwright.pipeline.seen_regions.SEEN`
+    scan_s: float  # time of one full scan
+    # parts of the robot that block the view: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh
     robot: str = "none"
-    ahead_m: float = 0.0
+    ahead_m: float = 0.0  # position of the scanner ahead of the middle of the box, or of the origin of the mesh
 
 
 def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -> str:

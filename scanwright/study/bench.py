@@ -40,17 +40,11 @@ BENDS = "deflection"  # of linkage and shaft, by finite elements
 
 @dataclass(frozen=True, slots=True)
 class BuiltSetting:
-    """Figures of the parts of a mount.
+    """Figures of the parts of a mount."""
 
-    Attributes:
-        shadow: the beams that they block.
-        values: columns that depend on them.
-        weakest: the load nearest to its rating.
-    """
-
-    shadow: SelfOcclusion
-    values: dict[str, float | None]
-    weakest: str
+    shadow: SelfOcclusion  # the beams that they block
+    values: dict[str, float | None]  # columns that depend on them
+    weakest: str  # the load nearest to its rating
 
 
 @dataclass(frozen=True, slots=True)

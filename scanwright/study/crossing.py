@@ -25,23 +25,14 @@ AXES = ("task", "mounting", "sensor", "servo", "slip_ring", "printer", "period")
 
 @dataclass(frozen=True, slots=True)
 class Combination:
-    """One candidate before any work.
+    """One candidate before any work."""
 
-    Attributes:
-        number: its index in the study.
-        name: of the task record, and of its build folder.
-        group: index of its task: only candidates of one task compete.
-        choice: the value on each axis; empty for that of the task.
-        loaded: the task; None if it is rejected.
-        refused: why these products cannot do this task.
-    """
-
-    number: int
-    name: str
-    group: int
-    choice: dict[str, str]
-    loaded: LoadedTask | None
-    refused: str = ""
+    number: int  # its index in the study
+    name: str  # of the task record, and of its build folder
+    group: int  # index of its task: only candidates of one task compete
+    choice: dict[str, str]  # the value on each axis; empty for that of the task
+    loaded: LoadedTask | None  # the task; None if it is rejected
+    refused: str = ""  # why these products cannot do this task
 
 
 @dataclass(frozen=True, slots=True)
