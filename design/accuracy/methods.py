@@ -168,8 +168,7 @@ def _on_a_grid(
     problem: Problem, angles_rad: Setting, rows: int, count: Callable[[Array, Array, float], Array]
 ) -> float:
     grid = equal_angle_grid(180 / rows)
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-    scan = scan_at(problem.bearings_rad, joint_rad, angles_rad)
+    scan = scan_at(problem.bearings_rad, problem.joint_rad(), angles_rad)
 
     def moment_of(moment: Moment) -> float:
         weight = moment.field.weight_at(grid) * np.sqrt(np.maximum(1 - grid[:, 2] ** 2, 0))

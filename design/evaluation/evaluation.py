@@ -257,8 +257,7 @@ def setting_rad(angles_deg: Sequence[float]) -> Setting:
 
 def simulated_beams(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 3"]:
     """Return the directions of the beams of one full scan in the world frame, shape (n, 3)."""
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-    return scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
+    return scan_at(problem.bearings_rad, problem.joint_rad(), angles_rad, problem.lever)
 
 
 def _cap(cap: BlindCone) -> str:

@@ -29,27 +29,17 @@ DIRECTIONS = 5000  # of the region, for the mean distance from the axis
 
 @dataclass(frozen=True, slots=True)
 class ExpectedError:
-    """Root mean square error of a point over the region, with calibrated mounting angles.
+    """Root mean square error of a point over the region, with calibrated mounting angles."""
 
-    Attributes:
-        at_m: range of the point.
-        range_noise_mm: noise of the lidar, along the beam.
-        encoder_mm: steps of the servo's encoder, before `assemble` smooths them.
-        backlash_mm: half of the servo's backlash, if it moves points relative to each other; null if unknown.
-        backlash_calibrated: whether `calibrate` can correct it: the servo turns both ways, without load by gravity.
-        bending_mm: largest bending by gravity that changes over a turn; null without a build.
-        total_mm: root of the sum of the squares of the known errors.
-        most_mm: the same with the largest backlash of the catalogue in place of an unknown one.
-    """
-
-    at_m: float
-    range_noise_mm: float
-    encoder_mm: float
+    at_m: float  # range of the point
+    range_noise_mm: float  # noise of the lidar, along the beam
+    encoder_mm: float  # steps of the servo's encoder, before `assemble` smooths them
+    # half of the servo's backlash, if it moves points relative to each other; null if unknown
     backlash_mm: float | None
-    backlash_calibrated: bool
-    bending_mm: float | None
-    total_mm: float
-    most_mm: float
+    backlash_calibrated: bool  # whether `calibrate` can correct it: the servo turns both ways, without load by gravity
+    bending_mm: float | None  # largest bending by gravity that changes over a turn; null without a build
+    total_mm: float  # root of the sum of the squares of the known errors
+    most_mm: float  # the same with the largest backlash of the catalogue in place of an unknown one
 
     def words(self) -> str:
         """Return the error and its parts as text."""

@@ -32,15 +32,10 @@ square root of 2, and twice that at the end of a turn."""
 
 @dataclass(frozen=True, slots=True)
 class BlindCone:
-    """A cone that no beam enters.
+    """A cone that no beam enters."""
 
-    Attributes:
-        axis_world: unit vector of its axis in the world.
-        half_angle_deg: half of its opening angle.
-    """
-
-    axis_world: tuple[float, float, float]
-    half_angle_deg: float
+    axis_world: tuple[float, float, float]  # unit vector of its axis in the world
+    half_angle_deg: float  # half of its opening angle
 
 
 @dataclass(frozen=True, slots=True)

@@ -162,7 +162,11 @@ def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
     """
     require_kernel("build")
     try:
-        made = None if is_current(target, loaded) else _make_and_log(loaded, target, progress)
+        made = None
+        if not is_current(target, loaded):
+            if edits := changes(target):
+                _LOG.warning("%s: %s: built again", target, edits)
+            made = _make(loaded, target, progress)
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
@@ -302,14 +306,6 @@ def measured(progress: Progress, step: str, fraction: float | None = None, /) ->
         ends = next((share for share in BEGINS.values() if share > begins), 1.0)
         begins += (fraction or 0.0) * (ends - begins)
     progress(step, begins)
-
-
-def _make_and_log(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
-    """Build a folder that is not up to date, and log the edits that are lost."""
-    edits = changes(target)
-    if edits:
-        _LOG.warning("%s: %s: built again", target, edits.words())
-    return _make(loaded, target, progress)
 
 
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:

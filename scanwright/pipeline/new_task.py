@@ -124,7 +124,7 @@ def _alpha_rot(answers: Answers, folder: Path) -> str:
     hangs = answers.robot == "none"
     if not hangs and answers.robot.split(":")[0] != "box":
         (table,) = tomllib.loads("\n".join(_mask(answers, folder)))["mask"]
-        hangs = math.isfinite(robot_around([MeshRegion(**table)], folder).above_m)
+        hangs = math.isfinite(robot_around([MeshRegion(**table)], folder)[1])
     if hangs:
         return "alpha_rot_deg = [-180, 180]"
     return "alpha_rot_deg = [-90, 90]  # the axis points up: the robot has nothing above the scanner to hang it from"
