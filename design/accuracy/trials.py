@@ -1,8 +1,4 @@
-"""Error against run time of other numerical choices than those of J: one record, its table and its picture.
-
-The packages that make a choice measure it (`cad.geometry.mesh_trials`, `scanwright.trials.solver`,
-`scanwright.trials.axis`).
-"""
+"""Error against run time of numerical choices: one record, its table and its picture."""
 
 from __future__ import annotations
 

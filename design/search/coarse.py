@@ -61,7 +61,7 @@ class Landscape:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Numerical choices of a search, whose effect `design.accuracy.search_trials` measures."""
+    """Numerical choices of a search, whose effect `benchmarks/trials/search_effort.py` measures."""
 
     fineness: float = 1.0  # factor of the number of nodes or directions of coarse J
     margin: float = MARGIN  # assumed error of coarse J: planes whose bound is farther above the best are not made exact

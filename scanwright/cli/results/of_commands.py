@@ -85,7 +85,6 @@ class WrittenFiles:
     folder: Path  # folder of the files
     files: list[str]  # their names
     lines: list[str]  # what the command prints without `--json`
-    passed: bool | None = None  # whether all cases passed; null if the command has no cases
 
 
 @dataclass(frozen=True, slots=True)
