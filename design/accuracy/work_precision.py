@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scanwright.design.accuracy.methods import Method, methods_for
+from scanwright.design.accuracy import methods
 from scanwright.design.accuracy.reference import Reference, is_smooth, reference
 from scanwright.design.accuracy.trials import Trial, report_trials
 from scanwright.design.arrays import Setting
@@ -63,9 +63,9 @@ def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, pr
     settings, truths = _settings(loaded, problem, first_rad, progress)
     trials: list[Trial] = []
     failed: list[str] = []
-    methods = methods_for(problem)
-    total = sum(len(values) for _, _, values in methods.values())
-    for name, (method, parameter, values) in methods.items():
+    tried = methods.METHODS if problem.sweep is None else methods.SWEPT
+    total = sum(len(values) for _, _, values in tried.values())
+    for name, (method, parameter, values) in tried.items():
         for value in values:
             progress(f"{name}, {value} {parameter}", (len(trials) + len(failed)) / total)
             try:
@@ -98,7 +98,7 @@ def _trial(
     settings: list[Setting],
     truths: list[Reference],
     name: str,
-    method: Method,
+    method: methods.Method,
     parameter: str,
     value: int,
 ) -> Trial:

@@ -50,10 +50,6 @@ class Gaps:
     # mean share of the view of a full turn that half a turn does not see; None for a sweep
     half_turn_misses: float | None
 
-    def line_gap_mm(self, range_m: float) -> float:
-        """Return the widest distance between neighbouring scan lines on a wall that faces the scanner at a range."""
-        return float(np.radians(self.line_gap_deg) * range_m * 1000)
-
 
 def gaps(problem: Problem, angles_rad: Setting) -> Gaps:
     """Return the gaps of mounting angles (alpha_rot, beta_rot, alpha_laser, beta_laser) [rad]."""

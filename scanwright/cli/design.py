@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
@@ -34,7 +35,7 @@ def optimise(task: TaskFile, as_json: AsJson = False) -> None:
     if as_json:
         from scanwright.cli.results.angles import Optimised
 
-        show_json(Optimised(**optimum.facts(), **cloud.facts(), warnings=optimum.requested.warnings()))
+        show_json(Optimised(**optimum.facts(), **asdict(cloud), warnings=optimum.requested.warnings()))
     else:
         show(
             [

@@ -319,7 +319,8 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         optimum = find_optimum(requested, progress)
         # with `period_s = "shortest"` the search has changed the motion, but `requested` is written for a rebuild
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
-        from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
+        from scanwright.design.evaluation.density_picture import density_figure  # while the kernel still loads
+        from scanwright.design.files.picture_files import save_picture
         from scanwright.pipeline import records
         from scanwright.report.parts_list import read_parts
 
@@ -342,7 +343,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
             f"{gain.mount.name}, without parts: J = {gain.mount.score.J:.3f}": gain.mount.angles_rad
             for gain in optimum.gains[:DRAWN]
         }
-        density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
+        save_picture(density_figure(problem, settings, optimum.title, chosen.shadow), work / "density.png")
         findings, left_out = exported()
         write_files(work, drawn())
         records.write_left_out(work, [*optimum.left_out, *chosen.left_out(), *parts.left_out, *left_out])

@@ -135,11 +135,6 @@ def usual_scan_s(lidar: Lidar) -> float:
     return 5.0 * math.ceil(360 / (lidar.scan_rate_hz * LINE_GAP_DEG) / 5)
 
 
-def _line_gap_deg(lidar: Lidar, scan_s: float) -> float:
-    """Return the angle between lines, in a turn of 360 deg or in 180 deg out and back."""
-    return 360 / (lidar.scan_rate_hz * scan_s)
-
-
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
     """Reject a lidar whose weight, off a horizontal axis, needs more than the continuous torque of the servo."""
     needed = torque_nm(lidar, None)
@@ -191,7 +186,8 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
 
 
 def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None) -> list[str]:
-    lines = f"its lines are {_line_gap_deg(lidar, answers.scan_s):.2g} deg apart; longer is denser"
+    gap_deg = 360 / (lidar.scan_rate_hz * answers.scan_s)  # in a turn, or in 180 deg out and back
+    lines = f"its lines are {gap_deg:.2g} deg apart; longer is denser"
     if ring is not None:
         how = "the shaft goes through it" if ring.bore_mm > 0 else "a belt turns the shaft next to it"
         return [

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from scanwright.design.angles import STANDARD_DEG, standard_settings
+from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.errors import ScanwrightError, TaskError
 from scanwright.design.progress import Progress
 from scanwright.design.search.optimum import Optimum
@@ -252,7 +252,7 @@ class Studio:
         self._task_changed()
 
     def _task_changed(self) -> None:
-        settings = [*standard_settings().values(), self.setting.angles_rad]
+        settings = [*np.radians([*STANDARD_DEG.values()]), self.setting.angles_rad]
         self._bands = bands_to(max(highest_density(self.judge.problem, angles) for angles in settings))
         self.controls.scale.content = key_html(
             self._bands,

@@ -74,7 +74,9 @@ class Crossing:
         refused = ""
         try:
             task = _merged(base.task, chosen, name, self._own_files())
-            products = Catalogue(base.products.products | self._own_products())
+            products = Catalogue(
+                base.products.products | (self.loaded.products.products if self.loaded.study.catalogue else {})
+            )
             faults = [str(fault) for fault in motion_faults(task.product_names(), task.motion, products)]
             faults = faults or replace(base, task=task, products=products).unread_angles()
             refused = faults[0] if faults else ""
@@ -84,9 +86,6 @@ class Crossing:
             refused = str(error)
         loaded = None if refused or task is None else _trimmed(replace(base, task=task, products=products))
         return Combination(number, name, int(places[0]), words, loaded, refused)
-
-    def _own_products(self) -> dict[str, Any]:
-        return self.loaded.products.products if self.loaded.study.catalogue else {}
 
     def _own_files(self) -> tuple[str, ...]:
         """Return the absolute paths of the catalogue files of the study."""

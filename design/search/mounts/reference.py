@@ -116,8 +116,10 @@ def _tuned(space: SearchSpace, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, S
                 places.append((line, angle_deg))
 
     first: list[tuple[OneFreeAngle, Setting]] = []
+    # a lidar rolled to the left can have the same view as one rolled to the right
+    rolls_alike = problem.sweep is None and len(mirrors_of(problem.bearings_rad)) > 1
     for line in lines:
-        low_deg = 0.0 if line is ROLLED and _rolls_alike(problem) else line.low_deg
+        low_deg = 0.0 if line is ROLLED and rolls_alike else line.low_deg
         first.append((line, np.arange(low_deg, line.high_deg + STEPS_DEG[0] / 2, STEPS_DEG[0])))
     if problem.sweep is not None:
         bounds = [
@@ -142,8 +144,3 @@ def _same(problem: Problem, angles_deg: Four) -> list[Four]:
     """Return mounts of the same J, itself first, with alpha_rot = -180 also as 180."""
     result = equivalents(problem, angles_deg, AngleRanges())
     return [*result, *((180.0, b, c, d) for a, b, c, d in result if a == -180)]
-
-
-def _rolls_alike(problem: Problem) -> bool:
-    """Return whether a lidar rolled to the left has the same view as one rolled to the right."""
-    return problem.sweep is None and len(mirrors_of(problem.bearings_rad)) > 1

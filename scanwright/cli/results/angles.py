@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from scanwright.design.evaluation.as_built import Seen
 from scanwright.design.evaluation.comparison import ComparisonRow
 from scanwright.design.evaluation.evaluation import Lever
-from scanwright.design.evaluation.expected_cloud import ExpectedError
+from scanwright.design.evaluation.expected_cloud import ExpectedCloud
 from scanwright.design.evaluation.gaps import BlindCone
-from scanwright.design.evaluation.metres import PlaneFigures
 from scanwright.design.evaluation.poles import PoleChances
-from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.objective.holes import BlindSpot
 
@@ -86,7 +84,7 @@ class SeenGain(GainResult):
 
 
 @dataclass(frozen=True, slots=True)
-class Optimised:
+class Optimised(ExpectedCloud):
     """The best mounting angles of a task."""
 
     task: str  # name of the task
@@ -104,13 +102,6 @@ class Optimised:
     evaluated: int  # number of values of J that it computed
     seconds: float  # run time of the search
     left_out: list[LeftOut]  # skipped work, with the reason
-    expected_error: ExpectedError  # error of a point to expect at 3 m
-    expected_error_far: ExpectedError | None  # the same at 5 m; null if the lidar does not reach it
-    wide_gap: Finding | None  # warning of a gap much wider than the spacing of lines; null if there is none
-    # warning that an object as wide as a ball of the task can get no beam; null if none can
-    missed_object: Finding | None
-    planes: list[PlaneFigures]  # points on ground, walls and ceilings of the task
-    hidden_regions: list[Finding]  # regions that the robot hides in part
     warnings: list[str]  # limits of the task that can surprise
 
 
@@ -125,7 +116,7 @@ class WithParts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Evaluated:
+class Evaluated(ExpectedCloud):
     """View of given mounting angles."""
 
     task: str  # name of the task
@@ -148,13 +139,6 @@ class Evaluated:
     crossing_deg: float | None  # mean angle at which lines cross there; null if there is no double coverage
     half_turn_misses: float | None  # share that half a turn misses of what a full turn sees; null for a sweep
     J_rises_1_deg_off: dict[str, float]  # angle -> rise of J if it is 1 deg off
-    expected_error: ExpectedError  # error of a point to expect at 3 m
-    expected_error_far: ExpectedError | None  # the same at 5 m; null if the lidar does not reach it
-    wide_gap: Finding | None  # warning of a gap much wider than the spacing of lines; null if there is none
-    # warning that an object as wide as a ball of the task can get no beam; null if none can
-    missed_object: Finding | None
-    planes: list[PlaneFigures]  # points on ground, walls and ceilings of the task
-    hidden_regions: list[Finding]  # regions that the robot hides in part
     lever: Lever | None = None  # offset of the optical centre that the figures are for; null if it is on the axis
     empty_cap: BlindCone | None = None  # largest cone without a beam, of a sweep
     # period for which the lines of the next turn fall between those of this one
