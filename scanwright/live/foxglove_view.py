@@ -129,7 +129,7 @@ def _serve(receiving: Connection, folder: Path, allow_origins: tuple[str, ...]) 
         with foxglove_server(f"scan of {folder.name}", channels(), PORT, _print, allow_origins) as server:
             shown = FoxgloveChannels(in_use.angles, own_body, urdf, server.log, wall_minus_ns=wall_minus_ns)
             for batch in batches(receiving):
-                tell(batch, shown)
+                pass_on(batch, shown)
             shown.close()
     except TaskError as error:  # the port is taken: the scan goes on
         _LOG.warning("no viewer can connect: %s", error)
@@ -139,7 +139,7 @@ def _print(step: str, _fraction: float | None = None, /) -> None:
     print(step, flush=True)
 
 
-def tell(batch: Batch, watch: Watch) -> None:
+def pass_on(batch: Batch, watch: Watch) -> None:
     """Pass on the data of a batch in the order in which they were measured."""
     angles = [JointSample(*pair) for pair in zip(batch.time_ns.tolist(), batch.position_rad.tolist(), strict=True)]
     ended = [(one.time_ns, one) for one in angles] + [(int(scan.time_ns[-1]), scan) for scan in batch.scans]

@@ -13,29 +13,17 @@ from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 @dataclass(frozen=True, slots=True)
 class ScanResult:
-    """A scan, or its plan.
+    """A scan, or its plan."""
 
-    Attributes:
-        devices: lidar and servo.
-        angles: file of the angle set.
-        duration_s: time of the recording.
-        recording: what was recorded; null with `--dry-run`.
-        cloud: the point cloud; null with `--dry-run`.
-    """
-
-    devices: Devices
-    angles: Path
-    duration_s: float
-    recording: ScanSummary | None = None
-    cloud: AssembleSummary | None = None
+    devices: Devices  # lidar and servo
+    angles: Path  # file of the angle set
+    duration_s: float  # time of the recording
+    recording: ScanSummary | None = None  # what was recorded; null with `--dry-run`
+    cloud: AssembleSummary | None = None  # the point cloud; null with `--dry-run`
 
 
 @dataclass(slots=True)
 class Repaired(RepairSummary):
-    """A repaired recording.
+    """A repaired recording."""
 
-    Attributes:
-        out: the new file; not written if the recording is intact.
-    """
-
-    out: Path = Path()
+    out: Path = Path()  # the new file; not written if the recording is intact

@@ -87,10 +87,16 @@ def _records_in(kind: Any) -> Iterator[type[Any]]:
 
 
 def _attributes(kind: type[Any]) -> dict[str, str]:
-    """Return attribute -> description, from the docstrings of a dataclass and its bases."""
+    """Return field -> description: the comment behind or above it, or else its entry in the docstring."""
     described: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        _, _, text = inspect.cleandoc(base.__doc__ or "").partition("\nAttributes:\n")
-        attributes = re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", text, re.MULTILINE)
-        described |= {name: " ".join(words.split()) for name, words in attributes}
+    for base in filter(is_dataclass, reversed(kind.__mro__)):
+        _, _, listed = inspect.cleandoc(base.__doc__ or "").partition("\nAttributes:\n")
+        entries = re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", listed, re.MULTILINE)
+        described |= {name: " ".join(words.split()) for name, words in entries}
+        fields = re.findall(
+            r"^((?: +# .*\n)*) +(\w+): .*?(?:  # (?!noqa)(.*))?$", inspect.getsource(base), re.MULTILINE
+        )
+        for above, name, behind in fields:
+            if words := " ".join([*re.findall("# (.*)", above), behind]).strip():
+                described[name] = f"{words}."
     return described

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanwright.design.accuracy.stress import StressRow, row
+from benchmarks.trials.density_stress import StressRow, row
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.motion import Spin
 from scanwright.design.scene.ray_caster import build_scene, cast
