@@ -31,7 +31,7 @@ from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
-from scanwright.firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
+from scanwright.firmware_io.recording.message_batches import blocks_in, joints_in
 from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.recording.ros_messages import Beams
 from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
@@ -194,11 +194,11 @@ def open_recording(path: Path) -> Recording:
     messages = read_messages(path, set(_TYPES))
     while some := list(islice(messages, _AT_ONCE)):
         logs.append(_joints_in(path, [data for topic, data in some if topic == JOINT_TOPIC]))
-        outlines = outlines_in([data for topic, data in some if topic == SCAN_TOPIC])
-        for outline in foreign(f"{path}: a message of {SCAN_TOPIC}", list[ScanOutline], outlines):
-            has_intensity |= outline.has_intensity
-            stamps.append(outline.stamp_ns)
-            beams += [outline.beams] * outline.stamp_ns.size
+        scans = blocks_in([data for topic, data in some if topic == SCAN_TOPIC])
+        for block in foreign(f"{path}: a message of {SCAN_TOPIC}", list[Block], scans):
+            has_intensity |= block.intensity.size > 0
+            stamps.append(block.stamp_ns)
+            beams += [block.range_m.shape[1]] * block.stamp_ns.size
     if not any(time_ns.size for time_ns, _ in logs):
         raise RecordingError(f"{path}: {JOINT_TOPIC} has no message: the servo's angle is not known")
     if not beams:
