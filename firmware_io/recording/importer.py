@@ -32,7 +32,6 @@ from scanwright.firmware_io.recording.bag_clocks import (
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
 from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
-from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, without_far
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.recording.import_checks.imu import imu_findings
@@ -88,16 +87,13 @@ class ImportSummary:
     def lines(self) -> list[str]:
         """Format the summary."""
         low, high = self.angle_deg
-        texts = [
-            line
-            for finding in self.findings
-            for line in (
-                f"{finding.severity}: {finding.message}",
-                *([f"  hint: {finding.hint}"] if finding.hint else []),
-            )
-        ]
+        lines = []
+        for finding in self.findings:
+            lines.append(f"{finding.severity}: {finding.message}")
+            if finding.hint:
+                lines.append(f"  hint: {finding.hint}")
         return [
-            *texts,
+            *lines,
             *([f"scans: {self.geometry}"] if self.geometry else []),
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
             f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
@@ -338,13 +334,18 @@ def _write(
 
     def write_scan(laser_scan: Any, beams: ros_messages.Beams | None) -> None:
         nonlocal written
-        limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
-        raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
-        scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
+        scan = ros_messages.scan_from_message(laser_scan, next(scan_times))
+        if time_increment_s is not None:
+            scan = replace(scan, time_increment_s=time_increment_s)
+        if corrections.bearings == "limits" and scan.range_m.size > 1:
+            span_rad = float(laser_scan.angle_max) - scan.angle_min_rad
+            scan = replace(scan, angle_increment_rad=span_rad / (scan.range_m.size - 1))
         if hasattr(laser_scan, "echoes"):
             range_m, intensity = laser_scan.echoes
             scan = with_all_echoes(scan, range_m, intensity, echoes)
-        scan = without_far(scan, corrections)
+        if corrections.no_return_from_m is not None:
+            far = scan.range_m >= np.float32(corrections.no_return_from_m)
+            scan = replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))
         if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int64
@@ -44,16 +44,6 @@ _BLOCK = 128  # scans, at most
 _TYPES = {SCAN_TOPIC: ros_messages.LASER_SCAN, JOINT_TOPIC: ros_messages.JOINT_STATE}
 
 
-class Sink(Protocol):
-    """Target of a recording, such as a file."""
-
-    def write(self, data: bytes, /) -> int: ...  # noqa: D102
-
-    def tell(self) -> int: ...  # noqa: D102
-
-    def flush(self) -> None: ...  # noqa: D102
-
-
 class MessageWriter:
     """Writer of scans and joint samples to an open stream, in the order of their times.
 
@@ -62,15 +52,23 @@ class MessageWriter:
 
     def __init__(
         self,
-        stream: Sink,
+        stream: Any,
         path: Path,
         note: Mapping[str, str],
         attached: Mapping[str, str],
         writer: type[Writer] = TimedChunks,
     ) -> None:
-        """`attached`: files (name -> text); `writer`: `TimedChunks`, or a plain one if only `flush` ends chunks."""
+        """Begin a recording.
+
+        Args:
+            stream: has `write`, `tell` and `flush`.
+            path: for errors.
+            note: origin of the recording.
+            attached: files, name -> text.
+            writer: `TimedChunks`, or a plain one if only `flush` ends chunks.
+        """
         self._path = path
-        self._writer = writer(cast(Any, stream))  # it requires only a Sink
+        self._writer = writer(stream)
         self._writer.start(profile="ros2", library="scanwright")
         self._writer.add_metadata(NOTE, dict(note))
         for name, text in attached.items():
@@ -193,19 +191,22 @@ def open_recording(path: Path) -> Recording:
     has_intensity = False
     messages = read_messages(path, set(_TYPES))
     while some := list(islice(messages, _AT_ONCE)):
-        logs.append(_joints_in(path, [data for topic, data in some if topic == JOINT_TOPIC]))
+        joints = [data for topic, data in some if topic == JOINT_TOPIC]
+        logs.append(foreign(f"{path}: a message of {JOINT_TOPIC}", joints_in, joints))
         scans = blocks_in([data for topic, data in some if topic == SCAN_TOPIC])
         for block in foreign(f"{path}: a message of {SCAN_TOPIC}", list[Block], scans):
             has_intensity |= block.intensity.size > 0
             stamps.append(block.stamp_ns)
             beams += [block.range_m.shape[1]] * block.stamp_ns.size
-    if not any(time_ns.size for time_ns, _ in logs):
+    time_ns = np.concatenate([part for part, _ in logs] or [np.empty(0, np.int64)])
+    position_rad = np.concatenate([part for _, part in logs] or [np.empty(0)])
+    if not time_ns.size:
         raise RecordingError(f"{path}: {JOINT_TOPIC} has no message: the servo's angle is not known")
     if not beams:
         raise RecordingError(f"{path}: {SCAN_TOPIC} has no message: there is nothing to assemble")
     return Recording(
         path=path,
-        joint_log=_sorted_log(path, *map(np.concatenate, zip(*logs, strict=True))),
+        joint_log=_sorted_log(path, time_ns, position_rad),
         beams=np.array(beams),
         stamp_ns=np.concatenate(stamps),
         has_intensity=has_intensity,
@@ -214,6 +215,8 @@ def open_recording(path: Path) -> Recording:
 
 
 def _sorted_log(path: Path, time_ns: Times, position_rad: Floats) -> JointLog:
+    if np.isnan(position_rad).any():
+        raise RecordingError(f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'")
     order = np.argsort(time_ns, kind="stable")
     try:
         return JointLog(time_ns[order], position_rad[order])
@@ -228,10 +231,3 @@ def _check_topics(path: Path) -> None:
             raise RecordingError(f"{path}: no topic {topic}{suggest(topic, types)} (`scanwright import` converts bags)")
         if types[topic] != message_type:
             raise RecordingError(f"{path}: {topic} is {types[topic]}, not {message_type}")
-
-
-def _joints_in(path: Path, messages: list[bytes]) -> tuple[Times, Floats]:
-    time_ns, position_rad = foreign(f"{path}: a message of {JOINT_TOPIC}", joints_in, messages)
-    if np.isnan(position_rad).any():
-        raise RecordingError(f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'")
-    return time_ns, position_rad
