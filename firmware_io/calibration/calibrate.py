@@ -67,13 +67,7 @@ def calibrate_recordings(
 ) -> Calibration:
     """Write the calibrated angle set to `out`, unless the result is faulty, and the record to `report_path(out)`.
 
-    Args:
-        recordings: of static scenes, possibly of several places.
-        angles: of their scanner; the search starts at its delta and lever arm.
-        out: the calibrated angle set, `.json`.
-        one_place: the scanner did not move between the recordings.
-        own_body: self-occlusion mask.
-        progress: callback.
+    The arguments are those of `scanwright.calibrate`; the search starts at the delta and lever arm of `angles`.
 
     Raises:
         RecordingError: a recording is unreadable, or they do not show the mounting errors; nothing is written.

@@ -71,14 +71,8 @@ def sums(
 ) -> Float64[ndarray, "tiles width width"]:
     """Return the normal equations of each tile, shape (m, WIDTH, WIDTH).
 
-    Args:
-        mount: of the laser.
-        x: parameters, shape (COUNT,).
-        beams: with the lag applied.
-        tile: of each beam, shape (n,).
-        weight: 1 / variance of each beam's range, shape (n,).
-        q: plane of each tile, shape (m, 3).
-        kink: standard deviations beyond which residuals count linearly (Huber).
+    `beams` include the lag; `tile`, `weight` (1 / variance of the range): of each beam, shape (n,); `q`: plane of each
+    tile, shape (m, 3); `kink`: standard deviations beyond which residuals count linearly (Huber).
     """
     return _sums(
         mount.plane(x), mount.along_m, x, beams.joint_rad, beams.speed_rad_s, beams.direction, beams.bearing_rad,

@@ -37,7 +37,7 @@ from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.recording.import_checks.imu import imu_findings
 from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
-from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
     JOINT_TOPIC,
@@ -112,19 +112,7 @@ def import_bag(
     also: Collection[str] = (),
     corrections: Corrections = _AS_IT_IS,
 ) -> ImportSummary:
-    """Write the scans and angles of a bag as a recording.
-
-    Args:
-        bag: ROS 1 or ROS 2 bag; several are the parts of a split one.
-        out: the recording to write, `.mcap`.
-        scan: TOPIC[:FIELD] of a LaserScan.
-        angle: source of the axis angle: TOPIC[:FIELD] of a number or quaternion, possibly in the same message as the
-            scan, TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
-        angle_unit: deg, rad, or counts such as 4096/turn; None for transforms and quaternions, which have none.
-        hold: the motor rests during each scan, at the angle of the scan's message or the last one before it. Not needed
-            for a bag exported from such a recording, which has a note of it.
-        also: topics that are copied unchanged, such as poses and an IMU for `assemble`.
-        corrections: of the recording.
+    """Write the scans and angles of a bag as a recording; the arguments are those of `scanwright.import_bag`.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
@@ -156,7 +144,7 @@ def import_bag(
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{parts[0]}: no scan falls into the time of the angles: {spans}")
         log, left_out = _joint_log(clock, survey, unit_rad, corrections)
-        still = hold or rests_in_scans(note_in(opened))
+        still = hold or rests_in_scans(opened.note())
         speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
         cost = f"; 10 ms of it are {10 * AT_M * speed_rad_s:,.0f} mm at {AT_M:g} m at this speed" if speed_rad_s else ""
         findings = [_remark("clock", clock.note + cost, _DELAY)] if clock.note else []

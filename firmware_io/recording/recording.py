@@ -30,9 +30,15 @@ from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of
-from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
+from scanwright.firmware_io.recording.mcap_chunks import (
+    NOTE,
+    TimedChunks,
+    read_messages,
+    read_note,
+    read_topics,
+    rests_in_scans,
+)
 from scanwright.firmware_io.recording.message_batches import blocks_in, joints_in
-from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
 from scanwright.firmware_io.recording.ros_messages import Beams
 from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
 
@@ -210,7 +216,7 @@ def open_recording(path: Path) -> Recording:
         beams=np.array(beams),
         stamp_ns=np.concatenate(stamps),
         has_intensity=has_intensity,
-        at_rest=rests_in_scans(read_note(path, NOTE)),
+        at_rest=rests_in_scans(read_note(path)),
     )
 
 

@@ -129,7 +129,8 @@ def encode_joint(time_ns: int, position_rad: float) -> bytes:
 
 
 def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
-    """Encode a `sensor_msgs/msg/PointCloud2` of a structured array."""
+    """Encode a `sensor_msgs/msg/PointCloud2` of a structured array, shape (points,) or (height, width)."""
+    height, width = np.atleast_2d(rows).shape
     types = _store().types
     fields = [
         types["sensor_msgs/msg/PointField"](
@@ -139,12 +140,12 @@ def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
     ]
     message = types[POINT_CLOUD](
         header=_header(time_ns, frame),
-        height=1,
-        width=rows.size,
+        height=height,
+        width=width,
         fields=fields,
         is_bigendian=False,
         point_step=rows.dtype.itemsize,
-        row_step=rows.dtype.itemsize * rows.size,
+        row_step=rows.dtype.itemsize * width,
         data=np.frombuffer(rows.tobytes(), np.uint8),
         is_dense=False,
     )

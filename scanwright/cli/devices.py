@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from scanwright.cli.results.of_commands import Devices
     from scanwright.firmware_io.scan.live_feed import Viewer
     from scanwright.firmware_io.scan.plan import ScanPlan
-    from scanwright.firmware_io.scan.scan_summary import ScanSummary
+    from scanwright.firmware_io.scan.scan_end import ScanSummary
 
 app = Commands("Devices", first=require_posix)
 

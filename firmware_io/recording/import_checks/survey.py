@@ -41,15 +41,7 @@ def survey_bag(
     table: tuple[Times, Floats] | None,
     corrections: Corrections,
 ) -> BagSurvey:
-    """Read all scans and angles.
-
-    Args:
-        bag: open.
-        scan_source: of the scans.
-        angle_source: of the angles; None if they are in a table.
-        table: times and angles.
-        corrections: which echo to use.
-    """
+    """Read all scans and angles; those of a table are given as times [ns] and angles, without an `angle_source`."""
     left_out: Counter[str] = Counter()
     scans: list[tuple[int, int, bool]] = []
     rows: list[tuple[Any, ...]] = []
