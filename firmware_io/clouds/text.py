@@ -230,12 +230,8 @@ def read_numbers(
 ) -> Floats:
     """Read the numbers of lines but comments and empty ones, shape (rows, columns).
 
-    Args:
-        path: of the file, for errors.
-        lines: one row each.
-        place: number of the first of them in the file.
-        separator: of the words; None for spaces.
-        columns: indices of the words to read; None for all, whose number must be constant.
+    `place`: number of the first line in the file, for errors; `columns`: indices of the words to read, None for all,
+    whose number must be constant.
     """
     last = [place - 1, ""]
 

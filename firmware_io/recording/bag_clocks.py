@@ -6,7 +6,7 @@ sensors' clocks differ from the host's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,11 +96,6 @@ def log_at_rest(
     both_ns = np.stack([begin_ns, np.minimum(end_ns, latest_ns)], axis=1).ravel()
     distinct = np.append(True, np.diff(both_ns) > 0)  # a scan without time_increment has no duration
     return JointLog(both_ns[distinct], np.repeat(angle_rad, 2)[distinct]), int(np.sum(end_ns > latest_ns))
-
-
-def times(values: Sequence[int]) -> Int64[ndarray, " n"]:
-    """Return integer nanoseconds as an array."""
-    return np.array(values, dtype=np.int64)
 
 
 def _ahead_s(stamps: Stamps) -> float:

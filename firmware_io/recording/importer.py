@@ -32,13 +32,12 @@ from scanwright.firmware_io.recording.bag_clocks import (
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
 from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
-from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, without_far
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.recording.import_checks.imu import imu_findings
 from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
-from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
     JOINT_TOPIC,
@@ -88,16 +87,13 @@ class ImportSummary:
     def lines(self) -> list[str]:
         """Format the summary."""
         low, high = self.angle_deg
-        texts = [
-            line
-            for finding in self.findings
-            for line in (
-                f"{finding.severity}: {finding.message}",
-                *([f"  hint: {finding.hint}"] if finding.hint else []),
-            )
-        ]
+        lines = []
+        for finding in self.findings:
+            lines.append(f"{finding.severity}: {finding.message}")
+            if finding.hint:
+                lines.append(f"  hint: {finding.hint}")
         return [
-            *texts,
+            *lines,
             *([f"scans: {self.geometry}"] if self.geometry else []),
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
             f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
@@ -116,19 +112,7 @@ def import_bag(
     also: Collection[str] = (),
     corrections: Corrections = _AS_IT_IS,
 ) -> ImportSummary:
-    """Write the scans and angles of a bag as a recording.
-
-    Args:
-        bag: ROS 1 or ROS 2 bag; several are the parts of a split one.
-        out: the recording to write, `.mcap`.
-        scan: TOPIC[:FIELD] of a LaserScan.
-        angle: source of the axis angle: TOPIC[:FIELD] of a number or quaternion, possibly in the same message as the
-            scan, TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
-        angle_unit: deg, rad, or counts such as 4096/turn; None for transforms and quaternions, which have none.
-        hold: the motor rests during each scan, at the angle of the scan's message or the last one before it. Not needed
-            for a bag exported from such a recording, which has a note of it.
-        also: topics that are copied unchanged, such as poses and an IMU for `assemble`.
-        corrections: of the recording.
+    """Write the scans and angles of a bag as a recording; the arguments are those of `scanwright.import_bag`.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
@@ -160,7 +144,7 @@ def import_bag(
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{parts[0]}: no scan falls into the time of the angles: {spans}")
         log, left_out = _joint_log(clock, survey, unit_rad, corrections)
-        still = hold or rests_in_scans(note_in(opened))
+        still = hold or rests_in_scans(opened.note())
         speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
         cost = f"; 10 ms of it are {10 * AT_M * speed_rad_s:,.0f} mm at {AT_M:g} m at this speed" if speed_rad_s else ""
         findings = [_remark("clock", clock.note + cost, _DELAY)] if clock.note else []
@@ -338,13 +322,18 @@ def _write(
 
     def write_scan(laser_scan: Any, beams: ros_messages.Beams | None) -> None:
         nonlocal written
-        limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
-        raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
-        scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
+        scan = ros_messages.scan_from_message(laser_scan, next(scan_times))
+        if time_increment_s is not None:
+            scan = replace(scan, time_increment_s=time_increment_s)
+        if corrections.bearings == "limits" and scan.range_m.size > 1:
+            span_rad = float(laser_scan.angle_max) - scan.angle_min_rad
+            scan = replace(scan, angle_increment_rad=span_rad / (scan.range_m.size - 1))
         if hasattr(laser_scan, "echoes"):
             range_m, intensity = laser_scan.echoes
             scan = with_all_echoes(scan, range_m, intensity, echoes)
-        scan = without_far(scan, corrections)
+        if corrections.no_return_from_m is not None:
+            far = scan.range_m >= np.float32(corrections.no_return_from_m)
+            scan = replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))
         if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:

@@ -17,6 +17,7 @@ from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.design.arrays import Floats, Pose
+from scanwright.firmware_io.clouds.filters import voxel_sums
 from scanwright.firmware_io.registration.cube_map import cells_of
 from scanwright.firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
 from scanwright.firmware_io.registration.surfels.adjust import adjust
@@ -218,7 +219,7 @@ def _sandwich(
     """
     inverse = np.linalg.inv(J.T @ J)
     free = residual_m - J @ (inverse @ (J.T @ residual_m))
-    pulls = np.stack([np.bincount(block, column) for column in (J * free[:, None]).T], axis=1)
+    pulls = voxel_sums(block, J * free[:, None])
     scatter = pulls.T @ pulls * len(pulls) / max(len(pulls) - 6, 1)
     return np.asarray(inverse @ scatter @ inverse, float)
 

@@ -34,22 +34,15 @@ _START_OFF_M, _START_OFF_SHARE = 2.0, 0.3  # of the distance of two starts: abov
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """Result of the registration of a session.
+    """Result of the registration of a session."""
 
-    Attributes:
-        T_world: pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined.
-        covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (n, 6, 6).
-        pairs: all tried pairs, the accepted ones first.
-        conflicts: pairs that overlap although one of the two scanners measured the space of the other's points to be
-            free, if some cloud has more of them than half its accepted pairs; else empty.
-        scale: factor on the stated sigmas of the pairs for them to agree, at least 1.
-    """
-
-    T_world: Float64[ndarray, "n 4 4"]
-    covariance: Float64[ndarray, "n 6 6"]
-    pairs: tuple[Pair, ...]
+    T_world: Float64[ndarray, "n 4 4"]  # pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined
+    covariance: Float64[ndarray, "n 6 6"]  # of a small motion (rotation vector [rad], translation [m]) on its right
+    pairs: tuple[Pair, ...]  # all tried pairs, the accepted ones first
+    # pairs that overlap although one of the two scanners measured the space of the other's points to be free, if some
+    # cloud has more of them than half its accepted pairs; else empty
     conflicts: tuple[Pair, ...]
-    scale: float
+    scale: float  # factor on the stated sigmas of the pairs for them to agree, at least 1
 
     @property
     def complete(self) -> bool:
@@ -58,12 +51,9 @@ class Registration:
 
 
 def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Progress) -> Registration:
-    """Find all poses.
+    """Find all poses, from start poses in the world, one for each view, or none if they are unknown.
 
-    Args:
-        views: the clouds; the frame of the first one becomes the world, unless its pose is given.
-        starts: start poses in the world, one for each view; empty if unknown.
-        progress: callback.
+    The frame of the first cloud becomes the world, unless its pose is given.
     """
     pairs: dict[tuple[int, int], Pair] = {}
     poses = _chain(views, starts, pairs, progress)

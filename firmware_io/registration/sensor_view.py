@@ -55,14 +55,10 @@ def make_view(
     scanner: AngleSet | None = None,
     joint_rad: Float64[ndarray, " n"] | None = None,
 ) -> SensorView:
-    """Prepare a cloud for registration.
+    """Prepare a cloud for registration: points of shape (n, 3), as measured; rows with NaN are left out.
 
-    Args:
-        name: for messages.
-        points_m: shape (n, 3), in the order in which they were measured; rows with NaN are left out.
-        spacing_m: edge of the finest voxels.
-        scanner: angle set that the cloud was assembled with, if its covariance is used.
-        joint_rad: angle of the axis at each point, shape (n,), if `scanner` is given.
+    `scanner`: angle set that the cloud was assembled with, if its covariance is used; it requires the angle of the axis
+    at each point, `joint_rad`, shape (n,).
     """
     points_m = np.ascontiguousarray(points_m, float)
     finite = np.isfinite(points_m).all(axis=1)

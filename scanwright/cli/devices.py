@@ -36,7 +36,7 @@ from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stop
 if TYPE_CHECKING:
     from scanwright.firmware_io.scan.live_feed import Viewer
     from scanwright.firmware_io.scan.plan import ScanPlan
-    from scanwright.firmware_io.scan.scan_summary import ScanSummary
+    from scanwright.firmware_io.scan.scan_end import ScanSummary
 
 app = Commands("Devices", first=require_posix)
 

@@ -18,8 +18,7 @@ from scanwright.design.errors import RecordingError, TaskError
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.design.progress import Progress
 from scanwright.firmware_io.assembly.own_body import own_body_of
-from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import read_note, rests_in_scans
 from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
@@ -101,7 +100,7 @@ def mcap_log(path: Path) -> Iterator[Log]:
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
     angle_set = load_angles(angles)
-    smooth = not rests_in_scans(read_note(recording, NOTE))
+    smooth = not rests_in_scans(read_note(recording))
     urdf = description(angles.parent, angle_set)
     return FoxgloveChannels(angle_set, own_body_of(angles), urdf, log, smooth=smooth)
 

@@ -82,13 +82,9 @@ def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
 
 
 def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed: bool) -> Iterator[Finding]:
-    """Check the angles in the order of their times.
+    """Check the angles, shape (n,), in the order of their times.
 
-    Args:
-        time_ns: shape (n,).
-        position_rad: shape (n,).
-        dropped: outliers are dropped.
-        timed: the times are exact enough to judge speeds by.
+    `dropped`: outliers are dropped; `timed`: the times are exact enough to judge speeds by.
     """
     wrong, off = outliers(time_ns, position_rad)
     if wrong.any():

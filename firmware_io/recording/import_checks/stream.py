@@ -98,18 +98,8 @@ def sample_findings(
 ) -> Iterator[Finding]:
     """Check scans and angles of a recording or a stream.
 
-    Args:
-        headers: of the scans.
-        scans: stamps and receipts of the scans.
-        angles: stamps and receipts of the angles.
-        angle_ns: times that the angles get, shape (n,).
-        position_rad: the angles, shape (n,).
-        speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        at_rest: whether the axis rests during each scan.
-        same_clock: whether scans and angles share a clock.
-        dropped: whether outliers of the angles are dropped.
-        stamped: whether the times of the scans are their stamps.
-        timed: whether the times of the angles are exact enough for speeds.
+    `angle_ns` are the times that the angles get, shape (n,); `stamped`: the times of the scans are their stamps; the
+    others are as in `angle_findings` and `clock_findings`.
     """
     if not at_rest:
         order = np.argsort(angle_ns, kind="stable")

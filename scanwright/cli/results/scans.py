@@ -8,7 +8,7 @@ from pathlib import Path
 from scanwright.cli.results.of_commands import Devices
 from scanwright.firmware_io.assembly.assemble import AssembleSummary
 from scanwright.firmware_io.recording.repair.survey import RepairSummary
-from scanwright.firmware_io.scan.scan_summary import ScanSummary
+from scanwright.firmware_io.scan.scan_end import ScanSummary
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
 from scanwright.firmware_io.scan import scan_end
 from scanwright.firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
-from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
+from scanwright.firmware_io.scan.scan_end import BETWEEN_STOPS, ScanSummary
 from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray
