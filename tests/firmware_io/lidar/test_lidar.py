@@ -13,6 +13,7 @@ from scanwright.design.errors import DeviceError, DeviceTimeoutError
 from scanwright.firmware_io.emulators import hokuyo_models, lidar_machine
 from scanwright.firmware_io.emulators.lidar import hokuyo_emulator
 from scanwright.firmware_io.lidar import byte_stream, sensor_line
+from scanwright.firmware_io.lidar.byte_stream import SerialStream
 from scanwright.firmware_io.lidar.scip import dialogue, protocol
 from scanwright.firmware_io.lidar.scip.driver import ScipLidar
 from scanwright.firmware_io.lidar.scip.raw_scan import to_laser_scan
@@ -229,7 +230,24 @@ def test_a_port_where_no_lidar_answers(monkeypatch):
         os.close(slave)
 
 
-class SlowPort(byte_stream.SerialStream):
+class LossyPort(SerialStream):
+    """A line that loses what is sent at the wrong speed: a reply is waited for long only where one can come."""
+
+    @property
+    def baud(self):
+        return super().baud
+
+    @baud.setter
+    def baud(self, baud):
+        SerialStream.baud.fset(self, baud)
+        dialogue._REPLY_S = 5.0 if self.passes() else 0.1
+
+    def write(self, data):
+        if self.passes():
+            super().write(data)
+
+
+class SlowPort(LossyPort):
     """A real line, whose sensor listens at the speed that it has after power-up, until it is told another one."""
 
     listens = 19_200
@@ -238,11 +256,13 @@ class SlowPort(byte_stream.SerialStream):
     def can(self, baud):
         return baud <= self.fastest
 
+    def passes(self):
+        return self.baud == self.listens
+
     def write(self, data):
-        if self.baud == self.listens:
-            super().write(data)
-            if data.startswith(b"SS"):
-                self.listens = int(data[2:])
+        super().write(data)
+        if self.passes() and data.startswith(b"SS"):
+            self.listens = int(data[2:])
 
 
 @pytest.mark.parametrize("fastest", [750_000, 115_200])
@@ -250,7 +270,7 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     """A URG-04LX needs 216 kbit/s for ten scans; 115,200 is all that some adapters give."""
     monkeypatch.setattr(byte_stream, "SerialStream", SlowPort)
     monkeypatch.setattr(SlowPort, "fastest", fastest)
-    monkeypatch.setattr(dialogue, "_REPLY_S", 0.4)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 0.1)
     with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         assert lidar._dialogue.line.stream.listens == lidar._dialogue.line.stream.baud == 115_200
         lidar.start()
@@ -262,17 +282,16 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
         check(lidar.read_raw(), 682)
 
 
-class BadLine(byte_stream.SerialStream):
+class BadLine(LossyPort):
     """A line that loses what is faster than 115,200, whatever both ends are set to."""
 
-    def write(self, data):
-        if self.baud == 115_200:
-            super().write(data)
+    def passes(self):
+        return self.baud == 115_200
 
 
 def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(byte_stream, "SerialStream", BadLine)
-    monkeypatch.setattr(dialogue, "_REPLY_S", 0.2)
+    monkeypatch.setattr(dialogue, "_REPLY_S", 5.0)
     with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start()
         assert lidar._dialogue.line.stream.baud == 115_200

@@ -401,4 +401,5 @@ def test_in_a_browser_a_page_of_another_origin_reads_nothing(browser):
             [server.address, SUBPROTOCOL],
         )
         assert outcome == "refused"
+        page.context.close()  # its console may still report the refusal; after this nothing comes any more
     browser.complaints.clear()
