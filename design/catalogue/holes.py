@@ -12,7 +12,7 @@ from scanwright.design.files.record import Record
 
 Face = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Kind = Literal["tapped", "through", "self_tapping", "case_screw", "pin", "slot"]
-Size = Literal["M1.6", "M2", "M2.5", "M3", "M4", "M5", "M6"]
+Size = Literal["M1.6", "M2", "M2.5", "M3", "M4", "M5", "M6", "M8"]
 Point = tuple[float, float, float]
 
 USABLE: tuple[Kind, ...] = ("tapped", "self_tapping", "through")
