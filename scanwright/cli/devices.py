@@ -265,7 +265,8 @@ def ros2(
             "--foxglove, --recording: choose one of them (`scanwright view` serves a recording to Foxglove)"
         )
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
-    from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
+    from scanwright.firmware_io.ros.node import Publishing
+    from scanwright.firmware_io.ros.serve import serve_devices, serve_recording
     from scanwright.firmware_io.scan.plan import plan_scan
 
     node_arguments = ros_args or []
