@@ -50,9 +50,9 @@ class Problem:
         """Return the ranges of the polar angle about the axis that are blind at every start phase."""
         return blind_zones(self.bearings_rad, beam_polar_rad, self.ball_rad)
 
-    def joint_rad(self, start: float = 0.5) -> Float[ndarray, " lines"]:
-        """Return the axis angles of the lines of one full scan, of a sweep at a start phase in 0 .. 1."""
-        return self.lines.angles_rad if self.sweep is None else self.sweep.angles_rad(start)
+    def joint_rad(self) -> Float[ndarray, " lines"]:
+        """Return the axis angles of the lines of one full scan, of a sweep at a start phase of a half."""
+        return self.lines.angles_rad if self.sweep is None else self.sweep.angles_rad(0.5)
 
     @property
     def field(self) -> Field:
