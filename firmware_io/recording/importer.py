@@ -26,16 +26,15 @@ from scanwright.firmware_io.recording.angle_sources import (
 from scanwright.firmware_io.recording.bag_clocks import (
     OneClock,
     Stamps,
-    gap_warnings,
     log_at_rest,
     one_clock,
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
-from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
-from scanwright.firmware_io.recording.import_checks.headers import AT_M
+from scanwright.firmware_io.recording.import_checks.headers import AT_M, header_findings
 from scanwright.firmware_io.recording.import_checks.imu import imu_findings
-from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
 from scanwright.firmware_io.recording.mcap_chunks import rests_in_scans
 from scanwright.firmware_io.recording.recording import (
@@ -50,6 +49,7 @@ from scanwright.firmware_io.samples import JointLog, with_all_echoes
 _AS_IT_IS = Corrections()
 _DELAY = "stamp scans and angles with one clock; scan_offset_s = 0.01 delays scans, calibrate estimates the delay"
 _ZERO_BEYOND = 0.2  # of the sweep
+_LONG_GAP = 10.0  # times the median gap between angles, to warn
 _PER_SCAN = 1.2  # angles per scan; fewer are one for each scan
 
 
@@ -152,19 +152,21 @@ def import_bag(
             findings.append(_remark("angle_zero", survey.angle_note, "angle_zero sets the joint position 0"))
         doubts = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
         findings += [_remark("angle_unit", doubt, hint) for doubt, hint in doubts]
-        findings += sample_findings(
-            headers.corrected(increment_s, corrections),
-            Stamps(clock.scan_ns, survey.scan_stamps.receive_ns),
-            survey.angle_stamps,
-            clock.angle_ns,
-            survey.angle * unit_rad,
-            speed_rad_s,
-            at_rest=still,
-            dropped=corrections.drop_outliers,
-            stamped=not clock.note and corrections.stamp != "receipt",
-            timed=not clock.note,
-            same_clock=angle_source is not None and angle_source.topic == scan_source.topic,
-        )
+        if not still:
+            order = np.argsort(clock.angle_ns, kind="stable")
+            time_ns, angle_rad, dropped = (
+                clock.angle_ns[order],
+                survey.angle[order] * unit_rad,
+                corrections.drop_outliers,
+            )
+            findings += angle_findings(time_ns, angle_rad, dropped=dropped, timed=not clock.note)
+        checked = headers.corrected(increment_s, corrections)
+        findings += header_findings(checked, speed_rad_s)
+        if not clock.note and corrections.stamp != "receipt":  # the times of the scans are their stamps
+            stamps = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
+            same_clock = angle_source is not None and angle_source.topic == scan_source.topic
+            arcs_ns = checked.judged().arc_ns
+            findings += clock_findings(stamps, survey.angle_stamps, arcs_ns, speed_rad_s, same_clock=same_clock)
         findings += _scan_findings(survey)
         findings += imu_findings(opened, survey.angle_stamps.receive_ns, np.unwrap(survey.angle * unit_rad))
         findings += _zero_outside(log, unit_rad, corrections)
@@ -281,18 +283,15 @@ def _zero_outside(log: JointLog, unit_rad: float, corrections: Corrections) -> I
         middle = (low + high) / 2 / corrections.angle_scale
         square = round(middle / (math.pi / 2)) * math.pi / 2
         zero = (square if abs(square - middle) < (high - low) / 4 else middle) / unit_rad
-        yield Finding(
-            "zero_outside",
-            "note",
-            "angle",
-            "the axis never comes near joint position 0, at which the angle set describes the scanner",
-            hint=f"angle_zero = {zero:.6g} if it is level there",
-        )
+        never = "the axis never comes near joint position 0, at which the angle set describes the scanner"
+        yield Finding("zero_outside", "note", "angle", never, hint=f"angle_zero = {zero:.6g} if it is level there")
 
 
 def _between_angles(log: JointLog, scan_ns: Times, speed_rad_s: float) -> Iterator[Finding]:
     """Report sparse angles: with gaps, or only one for each scan."""
-    for gap, gap_s in gap_warnings(log):
+    gaps_s = np.diff(log.time_ns) / 1e9
+    if gaps_s.size and (gap_s := float(gaps_s.max())) > _LONG_GAP * (usual_s := float(np.median(gaps_s))):
+        gap = f"between two angles lie up to {gap_s:.2f} s (usually {usual_s:.3f} s): the angle goes straight across"
         off_mm = 1000 * AT_M * speed_rad_s * gap_s / 2
         cost = f", up to {off_mm:,.0f} mm off at {AT_M:g} m at this speed if it turned back" if off_mm else ""
         yield _remark("angle_gaps", gap + cost, "publish angles at 50 Hz or more; distrust walls seen at these times")

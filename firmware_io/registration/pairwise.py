@@ -70,7 +70,7 @@ def align(a: SensorView, b: SensorView, T_a_b: Pose) -> Pair:
     pair = judge_pair(a, b, T)
     exact = None if pair.why_not else adjust(a.beams, b.beams, T, a.spacing_m)
     if exact is not None:  # also if small_gicp did not settle: in sparse clouds its neighbours change at every step
-        return replace(pair, T_a_b=exact.T_a_b, covariance=exact.covariance)
+        return replace(pair, T_a_b=exact[0], covariance=exact[1])
     return pair if converged else refused(pair, f"small_gicp had not settled after {_MAX_STEPS} steps")
 
 

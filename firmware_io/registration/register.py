@@ -105,30 +105,20 @@ def _chain(
 ) -> dict[int, Floats]:
     """Return a first pose for every cloud that can be joined to the first; neighbours in the list are tried first."""
     poses = {0: starts[0] if starts else np.eye(4)}
-    while joined := _next_joined(views, starts, poses, pairs, progress):
-        poses.update(joined)
-    return poses
-
-
-def _next_joined(
-    views: Sequence[SensorView],
-    starts: Sequence[Floats],
-    poses: dict[int, Floats],
-    pairs: dict[tuple[int, int], Pair],
-    progress: Progress,
-) -> dict[int, Floats]:
-    """Return the index and pose of one more cloud; empty if all pairs were tried."""
-    missing = [k for k in range(len(views)) if k not in poses]
-    untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
-    for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
-        low, high = min(i, k), max(i, k)
-        progress(f"aligning {views[low].name} and {views[high].name}")
-        pair = _pair(views[low], views[high], [starts[low], starts[high]] if starts else [])
-        pairs[low, high] = pair
-        _LOG.info("%s and %s: %s", pair.a, pair.b, "; ".join(pair.why_not) or f"{pair.overlap:.0%} overlap")
-        if not pair.why_not:
-            return {k: poses[i] @ (pair.T_a_b if i == low else np.linalg.inv(pair.T_a_b))}
-    return {}
+    while True:
+        missing = [k for k in range(len(views)) if k not in poses]
+        untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
+        for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
+            low, high = min(i, k), max(i, k)
+            progress(f"aligning {views[low].name} and {views[high].name}")
+            pair = _pair(views[low], views[high], [starts[low], starts[high]] if starts else [])
+            pairs[low, high] = pair
+            _LOG.info("%s and %s: %s", pair.a, pair.b, "; ".join(pair.why_not) or f"{pair.overlap:.0%} overlap")
+            if not pair.why_not:
+                poses[k] = poses[i] @ (pair.T_a_b if i == low else np.linalg.inv(pair.T_a_b))
+                break
+        else:
+            return poses
 
 
 def _pair(a: SensorView, b: SensorView, starts: Sequence[Floats]) -> Pair:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import small_gicp
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 from numpy import ndarray
 
 from scanwright.design.angles import AngleSet
@@ -72,7 +72,12 @@ def make_view(
             f"{name}: {len(thinned)} points {spacing_m:g} m apart: register needs at least {_MIN_POINTS}"
         )
     coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m)
-    beams = _beams(points_m, voxels_m, counts, joint_rad, scanner)
+    eye_m, frame, covariance = np.zeros(3), np.zeros((3, 2)), None
+    if scanner is not None:
+        T = scanner.T_world_rot(0.0)
+        eye_m, frame, covariance = T[:3, 3].copy(), T[:3, :2].copy(), np.array(scanner.covariance)
+    turned = np.remainder(joint_rad, 2 * np.pi).astype(np.float32)
+    beams = Beams(points_m.astype(np.float32), voxels_m, counts, eye_m, turned, frame, covariance)
     return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE), beams)
 
 
@@ -99,18 +104,3 @@ def _joints(
             "assemble the cloud with it, or register without the angle set"
         )
     return joint_rad
-
-
-def _beams(
-    points_m: Float64[ndarray, "n 3"],
-    voxels_m: Float64[ndarray, "k 3"],
-    counts: Int64[ndarray, " k"],
-    joint_rad: Float64[ndarray, " joints"],
-    scanner: AngleSet | None,
-) -> Beams:
-    eye_m, frame, covariance = np.zeros(3), np.zeros((3, 2)), None
-    if scanner is not None:
-        T = scanner.T_world_rot(0.0)
-        eye_m, frame, covariance = T[:3, 3].copy(), T[:3, :2].copy(), np.array(scanner.covariance)
-    turned = np.remainder(joint_rad, 2 * np.pi).astype(np.float32)
-    return Beams(points_m.astype(np.float32), voxels_m, counts, eye_m, turned, frame, covariance)

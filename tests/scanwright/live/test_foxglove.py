@@ -19,10 +19,10 @@ from patience import BOUND_S, until
 from rosbags.typesys import Stores, get_typestore
 from websockets.sync.client import connect
 
+from benchmarks.firmware_io.deskew import deskew
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError, TaskError
-from scanwright.firmware_io.assembly.deskew import deskew
 from scanwright.firmware_io.recording.recording import open_recording, recording_writer
 from scanwright.firmware_io.samples import straight
 from scanwright.firmware_io.scan.live_feed import Batch

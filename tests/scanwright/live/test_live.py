@@ -19,11 +19,11 @@ from PIL import Image
 from scipy.stats import kstest
 from websockets.sync.client import connect
 
+from benchmarks.firmware_io.deskew import deskew
 from scanwright.cli import devices
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import DeviceError, ScanwrightError, UnsafeError, UnsafeNote
 from scanwright.design.task.task import load_task
-from scanwright.firmware_io.assembly.deskew import deskew
 from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
 from scanwright.firmware_io.scan import scan_end
