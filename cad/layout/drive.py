@@ -184,6 +184,7 @@ class DriveLayout:
     bears: Callable[[float, float], bool]
     built: tuple[str, ...]  # parts and products in assembly order; other parts state which one they follow
     left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    plain: bool  # whether two pairs of front holes, away from all that turns, carry the parts on the servo
     # parts that another one fixes along the axis without a screw, by a bearing or a retaining ring
     borne: tuple[tuple[str, str], ...] = ()
 

@@ -89,6 +89,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         bears=partial(_bears, scanner, stack),
         built=BUILT,
         left_out=tuple(_left_out(scanner, stack, frame)),
+        plain=framed is None,
         borne=() if cage is None else ((names.JOURNAL_SLEEVE, names.SERVO_SHAFT),),
     )
 

@@ -79,7 +79,7 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
         body, top = cage_base(cage), cage.foot
     high_end = stack.ring_bottom + min(30.0, stack.ring_length - (5.0 if cage is None else UNDER_ROOF))
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
-        arms = [
+        arms: list[cq.Shape] = [
             solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end))
             for low, high in ((root, outer), (-outer, -root))
         ]
