@@ -161,10 +161,11 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
     """Return the slip ring for continuous rotation; None for a servo that must sweep.
 
     Rings that are rated for the lidar's data are preferred, then those with a bore, which need no belt, then those with
-    a known speed. A servo must sweep if it does not read its angle all around, or no ring has a layout with it.
+    a known speed. A servo sweeps if it does not read its angle all around, or no ring has a layout with it. One whose
+    case has no holes for the parts of a ring sweeps too, with fewer parts, if it can.
 
     Raises:
-        TaskError: lidar and servo have no layout without a ring either.
+        TaskError: lidar and servo have no layout.
     """
 
     def order(ring: SlipRing) -> tuple[bool, bool, bool, str]:
@@ -172,16 +173,20 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
 
     rings = sorted((product for product in products if isinstance(product, SlipRing)), key=order)
     strong = [ring for ring in rings if torque_nm(lidar, ring) <= servo.continuous_torque_nm]
-    why = ""
+    why, found = "", list[SlipRing]()
     for ring in (*(strong if servo.position_feedback_deg == 360 else ()), None):
         name = None if ring is None else ring.name
         angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=name)
         try:
-            placement_of(scanner_of(angles, "fdm-0.4", products))
+            drive = placement_of(scanner_of(angles, "fdm-0.4", products)).drive
         except BuildError as error:
             why = str(error)
-        else:
+            continue
+        if ring is None or drive.plain:
             return ring
+        found.append(ring)
+    if found:
+        return found[0]
     raise TaskError(f"{lidar.name} on {servo.name}: these cannot work together: {why}")
 
 
@@ -199,7 +204,7 @@ def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None)
         ]
     why = f"{servo.name} does not read its angle all around"
     if servo.position_feedback_deg == 360:
-        why = f"no slip ring of the catalogue fits {servo.name}"
+        why = f"the case of {servo.name} has no holes for the parts of a slip ring"
     return [
         "",
         f"[motion]  # {why}: it sweeps back and forth, and its cable hangs in a loop",
