@@ -66,10 +66,10 @@ def test_a_servo_with_two_front_threads_is_refused_with_a_ring(ring):
         laid_out(scanner_for("XM430-W350", "UTM-30LX", ring))
 
 
-@pytest.mark.parametrize("lidar", ["LMS111", "LD06"])
-def test_a_lidar_that_no_plate_below_it_can_hold_is_refused_with_the_holes_it_has(lidar):
-    with pytest.raises(BuildError, match=rf"{lidar} has fewer than two equal .* in its base \(\d x M"):
-        laid_out(scanner_for("MX-64R", lidar, None))
+def test_a_lidar_with_its_equal_holes_sunk_into_the_base_is_refused_with_the_holes_it_has():
+    found = r"LD06 has fewer than two equal .* in the face of its base.*1 x M2.5 self tapping in -z.*not in its face"
+    with pytest.raises(BuildError, match=found):
+        laid_out(scanner_for("MX-64R", "LD06", None))
 
 
 def test_a_frame_on_a_tilted_axis_stands_on_the_mount():
