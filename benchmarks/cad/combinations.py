@@ -34,6 +34,7 @@ from scanwright.design.scanner import scanner_of
 TILTED = (0.0, 31.0, 6.0, 15.0)
 SAME_MM = 2.1  # slots take a screw this far from its place
 EXACT_MM = 0.01  # rounding
+FACING = 0.999  # cosine, between a screw and its hole
 
 
 def main(angles: tuple[float, ...] = TILTED) -> None:
@@ -79,26 +80,39 @@ def laid_out_at(catalogue: Catalogue, angles: tuple[float, ...], lidar: str, ser
 
 def screws_without_a_hole(layout: Layout) -> Iterator[str]:
     """Yield a line for each screw into a lidar or a servo's case that no usable hole of its record takes."""
-    lidar, servo, (R, t) = layout.scanner.lidar, layout.scanner.servo, layout.drive.servo_pose
+    (R, t), seat = layout.drive.servo_pose, np.array([0.0, 0.0, layout.scanner.lidar.optical_height_mm])
     for joint in layout.joints:
-        start = np.array([axis.start for axis in joint.axes])
+        start, along = (np.array([getattr(axis, name) for axis in joint.axes]) for name in ("start", "along"))
         if joint.onto == LIDAR_BODY:
-            yield from _misses(joint, start @ layout.stack.R(), [hole for hole in lidar.holes if hole.axis == "-z"])
+            lidar = layout.stack.R()
+            yield from _misses(joint, start @ lidar + seat, along @ lidar, layout.scanner.lidar.holes)
         elif joint.onto == SERVO_CASE:
-            face = "-z" if joint.axes[0].along[2] > 0 else "+z"
-            holes = [hole for hole in servo.holes if hole.axis == face]
-            yield from _misses(joint, (start - t * [1.0, 1.0, 0.0]) @ R, holes)
+            yield from _misses(joint, (start - t) @ R, along @ R, layout.scanner.servo.holes)
 
 
-def _misses(joint: Joint, start: Array, holes: list[Hole]) -> Iterator[str]:
+def _misses(joint: Joint, start: Array, along: Array, holes: tuple[Hole, ...]) -> Iterator[str]:
+    """Yield the screws, in the frame of a device, on whose line there is no hole that faces them."""
     fit = [hole for hole in holes if hole.kind in USABLE and hole.size == joint.screw.name]
-    for x, y, _ in start:
-        reach_mm = SAME_MM if joint.slot_mm else EXACT_MM
-        near = [hole for hole in fit if np.hypot(x - hole.at_mm[0], y - hole.at_mm[1]) < reach_mm]
+    reach_mm = SAME_MM if joint.slot_mm else EXACT_MM
+    for at, into in zip(start, along, strict=True):
+        near = [hole for hole in fit if into @ _outwards(hole) < -FACING and _aside(hole, at, into) < reach_mm]
         if not near:
-            yield f"{joint.part} on {joint.onto}: no hole for {joint.screw.name} at ({x:.1f}, {y:.1f})"
+            place = ", ".join(f"{value:.1f}" for value in at)
+            yield f"{joint.part} on {joint.onto}: no hole for {joint.screw.name} at ({place})"
         elif near[0].kind != "through" and joint.length_mm - joint.grip_mm > near[0].depth_mm:
             yield f"{joint.part} on {joint.onto}: {joint.number} is longer than the thread of {near[0].depth_mm:g} mm"
+
+
+def _outwards(hole: Hole) -> Array:
+    if not isinstance(hole.axis, str):
+        return np.array(hole.axis) / np.linalg.norm(hole.axis)
+    return (1.0 if hole.axis[0] == "+" else -1.0) * np.eye(3)["xyz".index(hole.axis[1])]
+
+
+def _aside(hole: Hole, at: Array, into: Array) -> float:
+    """Return the distance of a hole's mouth from a screw's line [mm], infinite if it is not in front of the head."""
+    way = np.array(hole.at_mm) - at
+    return float(np.linalg.norm(way - (way @ into) * into)) if way @ into > 0 else np.inf
 
 
 def general(reason: str, lidar: str) -> str:

@@ -46,7 +46,7 @@ OFF_MM = 2.1  # slots take a screw this far from its place
 
 
 def random_holes(random: np.random.Generator, half: tuple[float, float], tall: float) -> list[dict[str, Any]]:
-    """Return holes: a set in the base, or in ears, or in sides only, and some that carry no load."""
+    """Return holes: a set in the base, or in ears, or in sides or the rear only, and some that carry no load."""
     size, depth = str(random.choice(SIZES)), float(random.uniform(2.0, 12.0))
     x, y = random.uniform(0.5, 0.92) * half[0], random.uniform(0.5, 0.92) * half[1]
     square = [(x, y), (-x, y), (-x, -y), (x, -y)]
@@ -67,10 +67,13 @@ def random_holes(random: np.random.Generator, half: tuple[float, float], tall: f
         for hole in holes:
             hole |= {"kind": "through", "depth_mm": 3.5, "head_space_mm": float(random.uniform(2.0, 20.0))}
     if pattern == "sides":
-        for side in (1.0, -1.0):
-            at = (side * half[0], float(random.uniform(-0.5, 0.5) * half[1]), tall / 2)
-            face = "+x" if side > 0 else "-x"
-            holes.append({"at_mm": at, "axis": face, "kind": kind, "size": size, "depth_mm": depth})
+        faces = [("+y", "-y"), ("-x",), ("+x", "-x"), ("+y",), ("+y", "-x")][int(random.integers(5))]
+        height = float(random.uniform(0.1, 0.6) * tall)
+        for face in faces:
+            across, sign = "xy".index(face[1]), 1.0 if face[0] == "+" else -1.0
+            for aside in random.uniform(-0.8, 0.8, int(random.integers(1, 4))).tolist():
+                at = np.insert([aside * half[1 - across], height], across, sign * half[across]).tolist()
+                holes.append({"at_mm": at, "axis": face, "kind": kind, "size": size, "depth_mm": depth})
     for _ in range(int(random.integers(0, 3))):
         at = (*tuple(random.uniform(-0.9, 0.9, 2) * half), 0.0)
         holes.append(
@@ -132,11 +135,12 @@ def screws_without_a_bore(scanner: Scanner, layout: Layout) -> Iterator[str]:
         if joint.onto != LIDAR_BODY:
             continue
         mesh = assembly.mesh(joint.part)
-        R = layout.stack.R()  # the lidar's axis is one that walls are looked for along
-        walls = [wall for wall in walls_of(mesh.vertices[mesh.faces] @ R) if wall.hole and abs(wall.axis[2]) > 0.99]
+        R = layout.stack.R()  # the lidar's axes are those that walls are looked for along
+        walls = [wall for wall in walls_of(mesh.vertices[mesh.faces] @ R) if wall.hole]
         for axis in joint.axes:
-            at = np.asarray(axis.start) @ R
-            near = [w for w in walls if np.hypot(*(np.asarray(w.middle) - at)[:2]) < OFF_MM]
+            at, along = np.asarray(axis.start) @ R, np.asarray(axis.along) @ R
+            in_line = [wall for wall in walls if abs(np.asarray(wall.axis) @ along) > 0.99]
+            near = [w for w in in_line if np.linalg.norm(np.cross(np.asarray(w.middle) - at, along)) < OFF_MM]
             if not any(2 * wall.radius >= joint.screw.nominal for wall in near):
                 yield f"{joint.part}: no hole passes {joint.screw.name} at {at.round(2).tolist()}"
 

@@ -5,11 +5,13 @@ axis as z; ring, bearing and belt are in the rotation frame at gamma = 0. Teeth 
 """
 
 import cadquery as cq
+import numpy as np
 
 from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
-from scanwright.cad.layout.joints import horn_centres, lidar_thread_mm
+from scanwright.cad.layout.envelope import lidar_thread_mm
+from scanwright.cad.layout.joints import horn_centres
 from scanwright.cad.layout.names import BELT, RING_STATOR
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
@@ -30,8 +32,13 @@ STUB = 0.4  # between the stub of a capsule's rotor and its body
 def lidar_body(lidar: Lidar) -> cq.Solid:
     """Return the case of a lidar below its window, with its holes."""
     half_x, half_y, low = lidar.body_mm[0] / 2, lidar.body_mm[1] / 2, lidar.window_z_mm[0]
-    radius = SCREWS[lidar.base.screw].nominal / 2 + (THROUGH if lidar.base.kind == "through" else 0.0)
-    threads = [solids.upright(radius, -1.0, lidar_thread_mm(lidar), x, y) for x, y in lidar.base.places]
+    threads = []
+    for face, pattern in lidar.held.items():
+        across, sign = "xyz".index(face[1]), 1.0 if face[0] == "+" else -1.0
+        radius = SCREWS[pattern.screw].nominal / 2 + (THROUGH if pattern.kind == "through" else 0.0)
+        for place in pattern.places:
+            start = np.insert(place, across, pattern.z_mm + sign)
+            threads.append(solids.cylinder(radius, start, -sign * np.eye(3)[across], lidar_thread_mm(lidar) + 1.0))
     body: cq.Shape = solids.box((-half_x, -half_y, 0.0), (half_x, half_y, low))
     if lidar.ears_mm:
         body = body.fuse(*(solids.box(*ear) for ear in lidar.ears_mm)).clean()

@@ -118,7 +118,7 @@ def _rows(scanner: Scanner, stack: Hub) -> list[_Row]:
     fits, screws = _around(printer.fit_clearance_mm), _around(printer.screw_clearance_mm)
     # a cup is printed too, and the screws clamp it: bores as wide as that would take an hour to print
     rows = [] if stack.cup_bore > 0 else [_Row(f"{stack.shaft_diameter:g}", stack.shaft_diameter, fits)]
-    for name in sorted({scanner.lidar.base.screw, scanner.servo.front.screw}):
+    for name in sorted({scanner.servo.front.screw, *(held.screw for held in scanner.lidar.held.values())}):
         rows.append(_Row(name, SCREWS[name].nominal, screws))
     return rows if trap_of(NUT, printer) is None else [*rows, _Row(POCKETS, NUT.nut_across, fits)]
 

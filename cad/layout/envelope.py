@@ -4,14 +4,16 @@ The same boxes do both, so the two cannot disagree.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
-from scanwright.cad.screws import SCREWS
+from scanwright.cad.screws import SCREWS, Screw
 from scanwright.design.arrays import Array
+from scanwright.design.catalogue.holes import Face, HolePattern
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
@@ -19,7 +21,14 @@ from scanwright.design.task.equivalent_settings import BOUNDS, advice
 
 PLATE_THICKNESS = 8.0
 BODY_GAP = 0.6  # around the lidar's body
-SUB_PLATE_THICKNESS = 4.0
+CABLE_GAP = 2.0  # around its cables
+SUB_PLATE_THICKNESS = 4.0  # without walls
+WALL_SHARE = 0.1  # thickness of walls and floor, over the height of their highest screw: stiffness
+WALL_STEP = 0.5  # of that thickness
+WALL_GAP = 0.4  # to a lidar between two walls; against a single one it is pushed
+WALL_AROUND = 3.0  # of a wall around the heads of its screws
+WALL_ROOT = 8.0  # of a wall inside the floor's edge
+UNDER_WINDOW = 2.0  # from a wall to the window above it
 SLOT_TRAVEL = 2.0  # to either side of the unverified place of a screw of the lidar
 SLOT_WALL = 2.0  # of such a slot at the edge of the plate, around a normal hole
 EAR_REACH = 9.0  # of the sub-plate's ears beyond the lidar
@@ -33,17 +42,29 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, slots=True)
+class Wall:
+    """A wall of the sub-plate at a side of the lidar, with one joint's screws; laser frame."""
+
+    outwards: tuple[float, float, float]  # unit vector from the lidar
+    box: Box  # from the floor's lower face upwards
+    root: Box  # that joins it with the floor
+    screw: Screw
+    screws: tuple[tuple[float, float, float], ...]  # places of their heads
+    grip_mm: float  # from the heads to the lidar's threads
+
+
+@dataclass(frozen=True, slots=True)
 class Envelope:
     """A lidar with gaps as boxes (low corner, high corner) in the laser frame."""
 
     lidar: Lidar  # the product
-    body: Box  # its body
+    body: Box  # its body, and the walls of its sub-plate
     cables: tuple[Box, ...]  # their straight pieces
 
     def plate(self, sub_plate: Axis | None) -> Box:
         """Return the plate of the linkage, with a sub-plate if there is one."""
         (x, y), seat = self.lidar.half_mm, -self.lidar.optical_height_mm
-        lower = seat - (0.0 if sub_plate is None else SUB_PLATE_THICKNESS) - PLATE_THICKNESS
+        lower = seat - (0.0 if sub_plate is None else sub_plate_mm(self.lidar)) - PLATE_THICKNESS
         return (-x, -y, lower), (x, y, seat)
 
     def under(self, sub_plate: Axis | None) -> Box:
@@ -83,9 +104,84 @@ def rows_of(R: Array) -> tuple[tuple[float, float, float], ...]:
     return tuple((float(row[0]), float(row[1]), float(row[2])) for row in R)
 
 
-def leaning_least(R: Array) -> Axis:
-    """Return the laser's axis along which a sub-plate's ears reach no lower than the lidar's corners."""
-    return "x" if abs(R[2, 0]) <= abs(R[2, 1]) else "y"
+def sub_plate_of(lidar: Lidar, stack: Hub) -> Axis | None:
+    """Return the laser's axis along which the ears of a sub-plate stick out; None if there is no need for one.
+
+    They are clear of its walls and of the heads in them; without walls they reach no lower than the lidar's corners.
+    """
+    if lidar.sides:
+        return "x" if "+y" in lidar.sides else "y"
+    leaning = np.abs(stack.R()[2])
+    return None if not covered_screws(lidar, stack) else "x" if leaning[0] <= leaning[1] else "y"
+
+
+def sub_plate_mm(lidar: Lidar) -> float:
+    """Return the thickness of a sub-plate and of its walls."""
+    highest = max((z for side in lidar.sides.values() for _, z in side.places), default=0.0)
+    return max(SUB_PLATE_THICKNESS, WALL_STEP * math.ceil(WALL_SHARE / WALL_STEP * highest - 1e-9))
+
+
+def sub_plate_cm3(lidar: Lidar) -> float:
+    """Return the volume of walls and the floor between them; 0 without walls."""
+    walls = walls_of(lidar)
+    if not walls:
+        return 0.0
+    floor = 4 * lidar.half_mm[0] * lidar.half_mm[1] * sub_plate_mm(lidar)
+    return (floor + sum(float(np.prod(np.subtract(wall.box[1], wall.box[0]))) for wall in walls)) / 1000
+
+
+def lidar_thread_mm(lidar: Lidar) -> float:
+    """Return the drawn depth of the threads that hold a lidar, or the thickness of its ears."""
+    if lidar.sides:
+        return min(side.depth_mm for side in lidar.sides.values())
+    return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
+
+
+def walls_of(lidar: Lidar) -> tuple[Wall, ...]:
+    """Return the walls that hold a lidar by threads in its sides; none if it is held by its base.
+
+    Raises:
+        BuildError: the head of a screw would be in front of the window, or at a cable.
+    """
+    return tuple(_wall(lidar, face, pattern) for face, pattern in lidar.sides.items())
+
+
+def _wall(lidar: Lidar, face: Face, pattern: HolePattern) -> Wall:
+    across, sign = "xy".index(face[1]), 1.0 if face[0] == "+" else -1.0
+    seat, thick, head = -lidar.optical_height_mm, sub_plate_mm(lidar), SCREWS[pattern.screw].driver_radius
+    sideways, heights = zip(*pattern.places, strict=True)
+    top = min(max(heights) + head + WALL_AROUND, lidar.window_z_mm[0] - UNDER_WINDOW)
+    place = f"{ALIGNMENT_LINKAGE}: seat: holes: the {pattern.screw} of {lidar.name} in {face}"
+    if max(heights) + head > top:
+        raise BuildError(
+            f"{place}: {max(heights):g} mm over the base: a head of {2 * head:g} mm needs a wall up to "
+            f"{UNDER_WINDOW:g} mm below the window at {lidar.window_z_mm[0]:g} mm; take another lidar"
+        )
+    near = lidar.cable_diameter_mm / 2 + CABLE_GAP + head
+    if face == "-x" and any(abs(at - y) < near for at in sideways for y in lidar.cable_y_mm):
+        raise BuildError(f"{place}: a head is within {near:g} mm of the cables at cable_y_mm; take another lidar")
+    half = lidar.half_mm[across]
+    inner = half + (WALL_GAP if len(lidar.sides) > 1 else 0.0)
+    outer, around = inner + thick, head + WALL_AROUND
+    ends = min(sideways) - around, max(sideways) + around
+
+    def at(away: float, aside: float, height: float) -> tuple[float, float, float]:
+        return (sign * away, aside, seat + height) if across == 0 else (aside, sign * away, seat + height)
+
+    return Wall(
+        outwards=(sign, 0.0, 0.0) if across == 0 else (0.0, sign, 0.0),
+        box=_box(at(inner, ends[0], -thick), at(outer, ends[1], top)),
+        root=_box(at(half - WALL_ROOT, ends[0], -thick), at(outer, ends[1], 0.0)),
+        screw=SCREWS[pattern.screw],
+        screws=tuple(at(outer, *place) for place in pattern.places),
+        grip_mm=outer - abs(pattern.z_mm),
+    )
+
+
+def _box(one: Sequence[float], other: Sequence[float]) -> Box:
+    """Return the box between two opposite corners."""
+    (x0, y0, z0), (x1, y1, z1) = np.sort([one, other], axis=0).tolist()
+    return (x0, y0, z0), (x1, y1, z1)
 
 
 def screw_travel_mm(lidar: Lidar) -> float:
@@ -140,7 +236,7 @@ def envelope_of(lidar: Lidar) -> Envelope:
     """Return the boxes of one lidar (origin at the optical centre)."""
     half_x, half_y = lidar.half_mm
     seat = -lidar.optical_height_mm
-    half = lidar.cable_diameter_mm / 2 + 2.0
+    half = lidar.cable_diameter_mm / 2 + CABLE_GAP
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
     cables = tuple(
         (
@@ -149,8 +245,16 @@ def envelope_of(lidar: Lidar) -> Envelope:
         )
         for y in lidar.cable_y_mm
     )
-    top, gap = lidar.body_mm[2] - lidar.optical_height_mm, BODY_GAP
-    return Envelope(lidar, ((-half_x - gap, -half_y - gap, seat), (half_x + gap, half_y + gap, top)), cables)
+    corners: list[Sequence[float]] = [
+        (-half_x, -half_y, seat),
+        (half_x, half_y, lidar.body_mm[2] - lidar.optical_height_mm),
+    ]
+    for wall in walls_of(lidar):
+        heads = np.array(wall.screws) + wall.screw.head_height * np.array(wall.outwards)
+        corners += [*wall.box, *heads.tolist()]
+    (x0, y0, low), (x1, y1, top) = np.min(corners, axis=0).tolist(), np.max(corners, axis=0).tolist()
+    gap = BODY_GAP
+    return Envelope(lidar, ((x0 - gap, y0 - gap, low), (x1 + gap, y1 + gap, top)), cables)
 
 
 def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:

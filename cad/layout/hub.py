@@ -33,8 +33,8 @@ Axis = Literal["x", "y"]
 class Hub(ABC):
     """The hub along the axis: radii, lengths and the z of each plane (rotation frame, mm).
 
-    If the hub covers a screw of the lidar, the lidar is screwed to a sub-plate on the bench, and that to the linkage by
-    its ears, from the lidar's side.
+    If the hub covers a screw of the lidar, or its threads are in its sides, the lidar is screwed to a sub-plate on the
+    bench, and that to the linkage by its ears, from the lidar's side.
     """
 
     h: float

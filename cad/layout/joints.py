@@ -15,7 +15,6 @@ from scanwright.cad.outlines import polygon
 from scanwright.cad.screws import SCREWS, Screw, Thread
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.holes import HolePattern
-from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.servo import Servo
 
 # ISO 4762 and ISO 4026
@@ -150,11 +149,6 @@ def round_wall_mm(inner_radius: float, outer: float, hole: float) -> float:
 def screws(onto: str, part: str = "") -> str:
     """Return the mark for the screws of a step's part, or of another one, that end in a body."""
     return f"{{{part}>{onto}}}" if part else f"{{{onto}}}"
-
-
-def lidar_thread_mm(lidar: Lidar) -> float:
-    """Return the drawn depth of the threads in a lidar's base, or the thickness of its ears."""
-    return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
 
 
 def fixing_of(pattern: HolePattern) -> Fixing:

@@ -1,7 +1,7 @@
 """Hole patterns of bought devices and of the deck that the joints use, as seen on the device. Millimetres."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,8 +29,11 @@ def screw_patterns(joints: Sequence[Joint], R_rot_lidar: Array) -> list[ScrewPat
     patterns: dict[ScrewPattern, None] = {}
     for device in DEVICES:
         for joint in joints:
-            if device in (joint.part, joint.onto) and joint.fixing != "grub":
-                patterns[_pattern(joint, device, R_rot_lidar if device == LIDAR_BODY else np.eye(3))] = None
+            if device not in (joint.part, joint.onto) or joint.fixing == "grub":
+                continue
+            for along in dict.fromkeys(axis.along for axis in joint.axes):  # a face each
+                in_face = replace(joint, axes=tuple(axis for axis in joint.axes if axis.along == along))
+                patterns[_pattern(in_face, device, R_rot_lidar if device == LIDAR_BODY else np.eye(3))] = None
     return list(patterns)
 
 

@@ -17,6 +17,10 @@ Point = tuple[float, float, float]
 
 USABLE: tuple[Kind, ...] = ("tapped", "self_tapping", "through")
 """Kinds that may carry a load: never the screws that close a case, locating pins, or slots."""
+SIDES: tuple[tuple[Face, ...], ...] = (("+y", "-y"), ("-x",), ("+x", "-x"))
+"""Sides of a lidar that can hold it together, the best first: two opposite ones, or the rear."""
+ENOUGH = 4  # screws in sides: more do not make a set better than one earlier in SIDES
+FLUSH_MM = 0.5  # from the mouth of a hole to the outermost face of its side: a wall lies on both
 OLD_LIDAR = ("mount_screw", "mount_holes_mm", "mount_thread_depth_mm")
 OLD_SERVO = ("case_screw", "case_holes_mm", "case_holes_z_mm", "case_rear_holes_mm", "case_rear_holes_z_mm")
 """Fields of version 0.1 that stated the holes."""
@@ -49,22 +53,51 @@ class HolePattern:
 
     screw: Size  # size of the screws
     kind: Kind  # of the holes
-    places: tuple[tuple[float, float], ...]  # x and y of each
-    z_mm: float  # of the plane
+    places: tuple[tuple[float, float], ...]  # of each, the two coordinates along the plane; x and y in a base
+    z_mm: float  # of the plane, along its normal
     depth_mm: float  # of the thread, or of the material around a through hole
 
 
 def mounting_holes(holes: Iterable[Hole], face: Face) -> HolePattern:
     """Return the largest set of equal, usable holes in one plane of a face; without places if there is none."""
+    across = "xyz".index(face[1])
+    first, second = (i for i in range(3) if i != across)
     groups: dict[tuple[Size, Kind, float], list[Hole]] = {}
     for hole in holes:
         if hole.axis == face and hole.kind in USABLE:
-            groups.setdefault((hole.size, hole.kind, hole.at_mm[2]), []).append(hole)
+            groups.setdefault((hole.size, hole.kind, hole.at_mm[across]), []).append(hole)
     if not groups:
         return HolePattern("M3", "tapped", (), 0.0, 0.0)
-    (size, kind, z), chosen = max(groups.items(), key=lambda group: len(group[1]))
-    places = tuple((hole.at_mm[0], hole.at_mm[1]) for hole in chosen)
-    return HolePattern(size, kind, places, z, min(hole.depth_mm for hole in chosen))
+    (size, kind, plane), chosen = max(groups.items(), key=lambda group: len(group[1]))
+    places = tuple((hole.at_mm[first], hole.at_mm[second]) for hole in chosen)
+    return HolePattern(size, kind, places, plane, min(hole.depth_mm for hole in chosen))
+
+
+def side_holes(holes: Iterable[Hole], half_mm: tuple[float, float]) -> dict[Face, HolePattern]:
+    """Return two or more equal threads in two opposite sides or in the rear, by side; empty if there are none.
+
+    `half_mm` are the half sides of the body along x and y: a thread counts if its mouth is in the outermost face.
+    """
+    outer = [
+        hole
+        for hole in holes
+        if hole.kind in ("tapped", "self_tapping")
+        and isinstance(hole.axis, str)
+        and hole.axis[1] != "z"
+        and abs(abs(hole.at_mm["xy".index(hole.axis[1])]) - half_mm["xy".index(hole.axis[1])]) <= FLUSH_MM
+    ]
+    found: list[dict[Face, HolePattern]] = []
+    for faces in SIDES:
+        for size, kind in dict.fromkeys((hole.size, hole.kind) for hole in outer):
+            equal = [hole for hole in outer if (hole.size, hole.kind) == (size, kind)]
+            sides = {face: mounting_holes(equal, face) for face in faces}
+            if all(side.places for side in sides.values()) and _count(sides) >= 2:
+                found.append(sides)
+    return max(found, key=lambda sides: min(_count(sides), ENOUGH), default={})
+
+
+def _count(sides: Mapping[Face, HolePattern]) -> int:
+    return sum(len(side.places) for side in sides.values())
 
 
 def what_holds(holes: Iterable[Hole]) -> str:

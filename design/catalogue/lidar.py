@@ -11,7 +11,7 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from scanwright.design.catalogue.holes import Hole, HolePattern, mounting_holes
+from scanwright.design.catalogue.holes import Face, Hole, HolePattern, mounting_holes, side_holes
 from scanwright.design.catalogue.lidar_cable import Cable
 from scanwright.design.catalogue.product_base import (
     Box,
@@ -101,6 +101,16 @@ class Lidar(Product):
     def base(self) -> HolePattern:
         """Holes in its base that a plate below it can be screwed to."""
         return mounting_holes((hole for hole in self.holes if hole.at_mm[2] == 0), "-z")
+
+    @property
+    def sides(self) -> dict[Face, HolePattern]:
+        """Holes of the sides that walls are screwed to, by side; empty if it is held by its base, or by nothing."""
+        return {} if len(self.base.places) >= 2 else side_holes(self.holes, self.half_mm)
+
+    @property
+    def held(self) -> dict[Face, HolePattern]:
+        """Holes that hold it, by face: of its sides, or of its base."""
+        return self.sides or {"-z": self.base}
 
     @property
     def half_mm(self) -> Pair:

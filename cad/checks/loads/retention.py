@@ -39,7 +39,10 @@ def material_of(assembly: Assembly, body: str) -> Material:
     if body not in assembly.parts:
         scanner = assembly.layout.scanner
         servo = scanner.servo
-        kinds = {SERVO_CASE: {servo.front.kind, servo.rear.kind}, LIDAR_BODY: {scanner.lidar.base.kind}}
+        kinds = {
+            SERVO_CASE: {servo.front.kind, servo.rear.kind},
+            LIDAR_BODY: {held.kind for held in scanner.lidar.held.values()},
+        }
         kinds |= {horn: {servo.horn_kind or "tapped"} for horn in (SERVO_HORN, SERVO_OUTPUT)}
         return MOULDED if "self_tapping" in kinds.get(body, ()) else BOUGHT
     process = assembly.parts[body].process

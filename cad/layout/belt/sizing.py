@@ -14,7 +14,7 @@ from scanwright.cad.layout.belt.stack import (
     BeltStack,
     drive_corners,
 )
-from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height, leaning_least, lidar_pose, rows_of
+from scanwright.cad.layout.envelope import Envelope, hub_height, lidar_pose, rows_of, sub_plate_of
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
 from scanwright.cad.screws import SCREWS
@@ -81,8 +81,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
             "one to its teeth"
         )
     stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
-    if covered_screws(scanner.lidar, stack):
-        axis = leaning_least(R)
+    if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
         stack = replace(stack, h=hub_height(envelope, R, hub, 0.0, axis), sub_plate=axis)
     return replace(stack, quarter=_quarter(scanner, stack, envelope.radius(stack.sub_plate)))
 

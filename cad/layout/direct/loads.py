@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import sub_plate_cm3
 from scanwright.cad.layout.hub import BUNDLE_GAP, JOURNAL_WALL
 from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
@@ -182,7 +183,7 @@ def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
     middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
     bodies = [  # mass [g], height, distance from the axis
         (lidar.mass_g, middle * float(normal[2]), abs(middle) * math.hypot(normal[0], normal[1])),
-        (LINKAGE_CM3 * scanner.printer.density_g_cm3, -stack.h / 2, LINKAGE_OFF_AXIS_MM),
+        ((LINKAGE_CM3 + sub_plate_cm3(lidar)) * scanner.printer.density_g_cm3, -stack.h / 2, LINKAGE_OFF_AXIS_MM),
         (_shaft_g(scanner, stack), (stack.spigot_top + stack.horn) / 2, 0.0),
     ]
     if ring is not None:

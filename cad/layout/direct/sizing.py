@@ -11,7 +11,7 @@ from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
 from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
-from scanwright.cad.layout.envelope import Envelope, covered_screws, hub_height, leaning_least, lidar_pose, rows_of
+from scanwright.cad.layout.envelope import Envelope, hub_height, lidar_pose, rows_of, sub_plate_of
 from scanwright.cad.layout.hub import HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT
 from scanwright.cad.screws import SCREWS
@@ -37,8 +37,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
     """
     R = lidar_pose(scanner)
     stack = _without_sub_plate(scanner, envelope, R)
-    if covered_screws(scanner.lidar, stack):
-        axis = leaning_least(R)
+    if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
         h = hub_height(envelope, R, stack.hub_radius, stack.ring_radius, axis)
         stack = replace(stack, h=h, sub_plate=axis)
     if stack.bearing is None:

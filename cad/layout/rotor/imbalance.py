@@ -44,6 +44,9 @@ def estimated_moment(scanner: Scanner, p: AlignmentLinkage, neck: Array) -> Arra
         solid &= ~((z > p.top - p.screw.head_height) & (z < p.top) & at_screws(in_laser, p))  # pockets for heads
         solid |= on_plate & (z > p.top) & (z < p.seat)  # the sub-plate
     printed = CELL**3 * scanner.printer.density_g_cm3 / 1000 * cells[solid, :2].sum(axis=0)
+    for low, high in (wall.box for wall in p.walls):
+        grams = scanner.printer.density_g_cm3 / 1000 * float(np.prod(np.subtract(high, low)))
+        printed += grams * (R @ np.add(low, high) / 2)[:2]
     return printed + lidar.mass_g * (lidar.body_mm[2] / 2 - lidar.optical_height_mm) * R[:2, 2]
 
 

@@ -10,13 +10,15 @@ from scanwright.cad.layout.envelope import (
     BODY_GAP,
     EAR_SCREW,
     PLATE_THICKNESS,
-    SUB_PLATE_THICKNESS,
     Box,
     Envelope,
+    Wall,
     box_corners,
     ear_screws,
     screw_travel_mm,
     slot_ends,
+    sub_plate_mm,
+    walls_of,
 )
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import round_wall_mm
@@ -65,15 +67,16 @@ class AlignmentLinkage:
     half_y: float
     chamfer: float
     body: Box
+    walls: tuple[Wall, ...]  # of a sub-plate
     ears: Box | None  # space of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: Thread
     cables: tuple[Box, ...]
     fan_z: tuple[float, float]  # the window's edges in the laser frame
     fan: tuple[tuple[float, float], ...]  # ranges of bearings that the linkage must leave free
-    screw: Screw
+    screw: Screw  # of the lidar
     screw_hole: float  # diameter
-    holes: tuple[tuple[float, float], ...]
+    holes: tuple[tuple[float, float], ...]  # in the base; none if walls hold the lidar
     screw_travel: float  # of the screws to either side, in slots
     fit: float  # diametral clearance of the spigot
     cross_hole: float  # diameter, in the hub
@@ -91,34 +94,39 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         BuildError: the screw holes come too near to the plate's edge.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    screw = SCREWS[lidar.base.screw]
+    held, walls = next(iter(lidar.held.values())), walls_of(lidar)
+    screw = SCREWS[held.screw]
     hole = passing_hole(screw, printer)
     half_x, half_y, _ = envelope.plate(stack.sub_plate)[1]
-    if len(lidar.base.places) < 2:
+    holes = () if walls else held.places
+    if len(holes) < 2 and not walls:
+        sunk = "" if all(hole.at_mm[2] == 0 for hole in lidar.holes if hole.axis == "-z") else ", some not in its face"
         raise BuildError(
-            f"{ALIGNMENT_LINKAGE}: seat: holes: {lidar.name} has fewer than two equal threads or through holes in its "
-            f"base ({what_holds(lidar.holes)}): this linkage carries a lidar from below; take another one"
+            f"{ALIGNMENT_LINKAGE}: seat: holes: {lidar.name} has fewer than two equal threads or through holes in the "
+            f"face of its base, and no equal threads in two opposite sides or its rear "
+            f"({what_holds(lidar.holes)}{sunk}); take another one"
         )
     travel = screw_travel_mm(lidar)
-    outermost = [slot_ends(place, travel)[1] for place in lidar.base.places]
-    edge = min(min(half_x - abs(x), half_y - abs(y)) for x, y in outermost) - hole / 2
+    outermost = [slot_ends(place, travel)[1] for place in holes]
+    edge = min((min(half_x - abs(x), half_y - abs(y)) for x, y in outermost), default=math.inf) - hole / 2
     if edge < printer.min_wall_mm:
         raise BuildError(
             f"{ALIGNMENT_LINKAGE}: seat: holes at {list(lidar.base.places)}: leaves a wall of {edge:.2f} mm "
             f"at the edge of the plate, {lidar.name} with {printer.name} needs min_wall_mm = {printer.min_wall_mm:g}"
         )
     # the cut corner leaves the wall that the straight edge leaves
-    corner = min(half_x + half_y - abs(x) - abs(y) for x, y in outermost)
-    chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0))
+    corner = min((half_x + half_y - abs(x) - abs(y) for x, y in outermost), default=math.inf)
+    chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0)) if holes else 4.0
     low, high = lidar.window_z_mm
     return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
-        top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else SUB_PLATE_THICKNESS),
+        top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else sub_plate_mm(lidar)),
         half_x=half_x,
         half_y=half_y,
         chamfer=chamfer,
         body=envelope.body,
+        walls=walls,
         ears=None if stack.sub_plate is None else _grown(envelope.under(stack.sub_plate)),
         ear_screws=() if stack.sub_plate is None else ear_screws(lidar, stack.sub_plate),
         ear_thread=thread_in_part(EAR_SCREW, printer, carries=True),
@@ -127,7 +135,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         fan=_free_bearings(stack, lidar.bearings_rad()),
         screw=screw,
         screw_hole=hole,
-        holes=lidar.base.places,
+        holes=holes,
         screw_travel=travel,
         fit=printer.fit_clearance_mm,
         cross_hole=passing_hole(CROSS_SCREW, printer),

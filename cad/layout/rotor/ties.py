@@ -35,8 +35,8 @@ PLATE_LOW, BELOW_SEAT = 5.0, 0.5  # lower and upper face of a tab of the plate, 
 
 def plate_ties_of(lidar: Lidar, p: AlignmentLinkage, neck: Array) -> tuple[TieSeat, ...] | LeftOut:
     """Return a tab below each cable of the lidar, laser frame, or why there is none."""
-    if p.stack.sub_plate == "x" or not lidar.cable_y_mm:
-        return _without(PLATE_TIE, "an ear of the sub-plate is in its place, or there is no cable")
+    if p.stack.sub_plate == "x" or "-x" in lidar.sides or not lidar.cable_y_mm:
+        return _without(PLATE_TIE, "an ear or a wall of the sub-plate is in its place, or there is no cable")
     seats = tuple(
         TieSeat(
             azimuth=math.pi,

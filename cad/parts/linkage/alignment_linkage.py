@@ -36,30 +36,13 @@ from scanwright.cad.layout.rotor.linkage import (
 )
 from scanwright.cad.parts.linkage.fins import FAR, fins_of
 from scanwright.cad.parts.linkage.linkage_hub import hub, hub_cuts, tie_lug, tie_slots
-from scanwright.cad.parts.linkage.sub_plate import front_mark, lidar_joint
+from scanwright.cad.parts.linkage.sub_plate import OF_LIDAR, front_mark, lidar_joint
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 
-LIDAR_STEP = Step(
-    "Lidar on its seat",
-    "On the bench: put the lidar on its seat, its front towards the V in the edge (FRONT), its cables to the other "
-    f"side. {screws(LIDAR_BODY)}",
-    "no light shows under the lidar: a gap of 0.1 mm tilts its plane by about a tenth of a degree",
-)
-OF_LIDAR = (
-    "lidar.body_mm",
-    "lidar.optical_height_mm",
-    "lidar.window_z_mm",
-    "lidar.holes",
-    "lidar.ears_mm",
-    "lidar.cable_y_mm",
-    "lidar.cable_z_mm",
-    "lidar.cable_diameter_mm",
-    "lidar.cable_straight_mm",
-)
 RETRIES = 5
 WIDER = 0.03  # of the paths of drivers, in each attempt: they may graze the rim of the hub
 TRAP_LENGTH = 15.0  # below the plate: the neck may begin there
@@ -97,7 +80,16 @@ def linkage_spec(place: Placement) -> PartSpec:
         seat=p.top,
         joints=(crossed, *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)])),
         avoid=tuple(_around(place)),
-        steps={LIDAR: LIDAR_STEP},
+        steps={LIDAR: _lidar_step(p)},
+    )
+
+
+def _lidar_step(p: AlignmentLinkage) -> Step:
+    return Step(
+        "Lidar on its seat",
+        "On the bench: put the lidar on its seat, its front towards the V in the edge (FRONT), its cables to the other "
+        f"side. {'Press it onto the seat while you tighten. ' if p.walls else ''}{screws(LIDAR_BODY)}",
+        "no light shows under the lidar: a gap of 0.1 mm tilts its plane by about a tenth of a degree",
     )
 
 

@@ -26,7 +26,8 @@ def _mx(number: int, firmware: int) -> list[TableItem]:
 
 
 _INDIRECT = ((168, 224, 28), (578, 634, 28))  # first address of the targets, of the data, and their number
-_INDIRECT_XL330 = ((168, 208, 20),)
+_INDIRECT_330 = ((168, 208, 20),)
+_330 = (1200, 1220, 1240)
 
 
 def _protocol_2(
@@ -84,13 +85,15 @@ ITEMS: dict[int, list[TableItem]] = {  # by model number
     1020: _protocol_2(1020, speed=350, current=1193, position_p=800, acceleration=True),
     1060: _protocol_2(1060, speed=265, volts=(60, 140), hot=72, position_p=640),
     1120: _protocol_2(1120, speed=128, current=2047, position_p=800),
-    1200: _protocol_2(1200, speed=445, current=1750, volts=(35, 70), hot=70, position_p=400, indirect=_INDIRECT_XL330),
+    1200: _protocol_2(1200, speed=445, current=1750, volts=(35, 70), hot=70, position_p=400, indirect=_INDIRECT_330),
+    1220: _protocol_2(1220, speed=320, current=910, volts=(55, 140), hot=70, position_p=900, indirect=_INDIRECT_330),
+    1240: _protocol_2(1240, speed=350, current=2352, volts=(35, 70), hot=70, position_p=1100, indirect=_INDIRECT_330),
 }
 
 INDIRECT = {  # by model number: address of the target of each byte of indirect data
     number: {
         data + k: low + 2 * k
-        for low, data, many in (_INDIRECT_XL330 if number == 1200 else _INDIRECT)
+        for low, data, many in (_INDIRECT_330 if number in _330 else _INDIRECT)
         for k in range(many)
     }
     for number, items in ITEMS.items()

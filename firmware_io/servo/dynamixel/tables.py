@@ -1,9 +1,9 @@
 """Control tables of the Dynamixel.
 
 Sources are ROBOTIS' e-manual pages ax/ax-12a, mx/mx-28, mx/mx-64, mx/mx-106, their second editions for protocol 2.0,
-x/xl330-m288, x/xl430-w250, x/xh430-w350, x/xm430-w350 and x/xm540-w270; numbers of models and currents agree with the
-parameters of ROBOTIS' hardware interface for ROS 2. Load is the current relative to the stall current at 12 V (XL330:
-5 V); the XL430 and MX-28 measure none and report their duty.
+x/xl330-m288, x/xc330-m288, x/xc330-t288, x/xl430-w250, x/xh430-w350, x/xm430-w350 and x/xm540-w270; numbers of models
+and currents agree with the parameters of ROBOTIS' hardware interface for ROS 2. Load is the current relative to the
+stall current at 12 V (models M288: 5 V); the XL430 and MX-28 measure none and report their duty.
 """
 
 from __future__ import annotations
@@ -141,4 +141,6 @@ TABLES = (
     _protocol_2("XL430-W250", 1060, load=_LOAD),
     _protocol_2("XM540-W270", 1120, load=_current(2.69, 4.4)),
     _protocol_2("XL330-M288", 1200, load=_current(1.0, 1.47), most_baud=4_000_000),
+    _protocol_2("XC330-T288", 1220, load=_current(1.0, 0.88), most_baud=4_000_000),
+    _protocol_2("XC330-M288", 1240, load=_current(1.0, 1.80), most_baud=4_000_000),
 )

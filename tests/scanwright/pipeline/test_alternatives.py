@@ -48,5 +48,5 @@ def test_every_servo_and_ring_that_is_named_can_be_laid_out_and_is_strong_enough
 
 
 def test_a_lidar_that_nothing_holds_is_said_to_be_so(tmp_path):
-    loaded, angles = refused(tmp_path, "LMS111")
-    assert what_fits(loaded, angles).startswith("; no servo and slip ring of the catalogue fit LMS111")
+    loaded, angles = refused(tmp_path, "LD06")
+    assert what_fits(loaded, angles).startswith("; no servo and slip ring of the catalogue fit LD06")
