@@ -11,7 +11,16 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import shape_of
-from scanwright.cad.layout.direct.frame import EAR_DEPTH, EAR_NUT, FOOT, GRIP, HEADER, LEAST_BRIDGE, ServoFrame
+from scanwright.cad.layout.direct.frame import (
+    EAR_DEPTH,
+    EAR_NUT,
+    EAR_SCREW,
+    FOOT,
+    GRIP,
+    HEADER,
+    LEAST_BRIDGE,
+    ServoFrame,
+)
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import front_joint, screws, upright_axes
@@ -27,8 +36,11 @@ def frame_spec(place: Placement) -> PartSpec | None:
     if frame is None:
         return None
     heel = frame.heel_mm if len(frame.holes) == 2 else None
+    nuts = ""
+    if frame.ears is not None and frame.ears.thread is not None and frame.ears.thread.trap is not None:
+        nuts = f"Push a nut {EAR_SCREW.name} into each of the four slots in the outer faces of the frame. "
     words = (
-        "Push the servo into the frame from below, its horn through the opening. "
+        f"{nuts}Push the servo into the frame from below, its horn through the opening. "
         f"{screws(SERVO_CASE)} Do not loosen the screws that close its case."
     )
     return PartSpec(
