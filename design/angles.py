@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, ValidationError
 
 from scanwright.design import frames
-from scanwright.design.arrays import Pose, Rotation, Setting, Vector
+from scanwright.design.arrays import Pose, Rotation, Vector
 from scanwright.design.errors import MissingFileError, TaskError
 from scanwright.design.files.faults import format_validation_error
 from scanwright.design.files.record import Record
@@ -40,11 +40,6 @@ STANDARD_DEG = {"rolling": (0.0, 90.0, 0.0, -90.0), "pitching": (-90.0, 0.0, 90.
 def angles_words(angles_deg: Iterable[float]) -> str:
     """Return angles as they are shown to people, `(0, 90, 0, -90)`."""
     return "(" + ", ".join(f"{angle:g}" for angle in angles_deg) + ")"
-
-
-def standard_settings() -> dict[str, Setting]:
-    """Return the standard alignments in radians, which optima are compared with."""
-    return {name: np.radians(angles) for name, angles in STANDARD_DEG.items()}
 
 
 Degrees = Annotated[float, Field(ge=-360, le=360)]
@@ -149,17 +144,11 @@ def load_angles(path: str | Path) -> AngleSet:
 
 @dataclass(frozen=True, slots=True)
 class AnglesInUse:
-    """The angle set that the scanner of a build folder runs with.
+    """The angle set that the scanner of a build folder runs with."""
 
-    Attributes:
-        path: its file.
-        angles: its contents.
-        description: which one it is, and why.
-    """
-
-    path: Path
-    angles: AngleSet
-    description: str
+    path: Path  # its file
+    angles: AngleSet  # its contents
+    description: str  # which one it is, and why
 
 
 def angles_in_use(folder: Path) -> AnglesInUse:

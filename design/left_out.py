@@ -7,16 +7,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """Work that was skipped; what it saved is a count, not seconds, since builds are reproducible.
+    """Work that was skipped; what it saved is a count, not seconds, since builds are reproducible."""
 
-    Attributes:
-        what: what was skipped.
-        why: reason.
-        saved: count that it saved; 0 for mounts that were rejected.
-        unit: unit of the count.
-    """
-
-    what: str
-    why: str
-    saved: int
-    unit: str
+    what: str  # what was skipped
+    why: str  # reason
+    saved: int  # count that it saved; 0 for mounts that were rejected
+    unit: str  # unit of the count

@@ -39,24 +39,17 @@ NO_MODULES = Modules()
 
 @dataclass(frozen=True, slots=True)
 class Scanner:
-    """Angles with their products; `slip_ring` is None if the motion needs none.
-
-    Attributes:
-        bearings: candidates for a tilted axis, smallest bore first.
-        belts: candidates for a scanner with a capsule ring, the narrowest first.
-        deck: holes for the base mount; None if the mount can choose them.
-        modules: optional parts.
-    """
+    """Angles with their products; `slip_ring` is None if the motion needs none."""
 
     angles: AngleSet
     lidar: Lidar
     servo: Servo
     slip_ring: SlipRing | None
     printer: Printer
-    bearings: tuple[Bearing, ...]
-    belts: tuple[Belt, ...] = ()
-    deck: Rectangle | Circle | None = None
-    modules: Modules = NO_MODULES
+    bearings: tuple[Bearing, ...]  # candidates for a tilted axis, smallest bore first
+    belts: tuple[Belt, ...] = ()  # candidates for a scanner with a capsule ring, the narrowest first
+    deck: Rectangle | Circle | None = None  # holes for the base mount; None if the mount can choose them
+    modules: Modules = NO_MODULES  # optional parts
 
 
 def scanner_of(

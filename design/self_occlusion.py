@@ -18,14 +18,10 @@ AXIS_STEPS = 720  # equal steps of the axis angle in [0, 2 pi), 0.5 deg each
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SelfOcclusion:
-    """Blocked beams.
+    """Blocked beams."""
 
-    Attributes:
-        beams: blocked at every axis angle, by parts that turn with the laser, shape (B,).
-        stator: blocked by fixed parts, at `AXIS_STEPS` axis angles, shape (B, G); None if not computed.
-    """
-
-    beams: Bool[ndarray, " beams"]
+    beams: Bool[ndarray, " beams"]  # blocked at every axis angle, by parts that turn with the laser, shape (B,)
+    # blocked by fixed parts, at `AXIS_STEPS` axis angles, shape (B, G); None if not computed
     stator: Bool[ndarray, "beams angles"] | None
 
     def hidden(self) -> Float[ndarray, " beams"]:

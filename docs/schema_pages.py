@@ -67,7 +67,7 @@ def _write_sketches(folder: Path) -> None:
 
 def _json_page() -> Iterator[str]:
     """Yield the lines of the page on `--json`: a table for each record, where it is used first."""
-    from scanwright.cli.results.of_commands import RESULTS, result_schema
+    from scanwright.cli.results.schemas import RESULTS, result_schema
 
     yield from ("# JSON output", "")
     yield (

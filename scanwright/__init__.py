@@ -15,28 +15,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.2.0"
 
 if TYPE_CHECKING:
-    from scanwright.api import assemble as assemble
-    from scanwright.api import build as build
-    from scanwright.api import calibrate as calibrate
-    from scanwright.api import check as check
-    from scanwright.api import compare as compare
-    from scanwright.api import draw_density as draw_density
-    from scanwright.api import evaluate as evaluate
-    from scanwright.api import import_bag as import_bag
-    from scanwright.api import load_angles as load_angles
-    from scanwright.api import load_task as load_task
-    from scanwright.api import make_map as make_map
-    from scanwright.api import make_parts as make_parts
-    from scanwright.api import open_lidar as open_lidar
-    from scanwright.api import open_recording as open_recording
-    from scanwright.api import open_servo as open_servo
-    from scanwright.api import optimise as optimise
-    from scanwright.api import read_cloud as read_cloud
-    from scanwright.api import register as register
-    from scanwright.api import scan as scan
-    from scanwright.api import set_up_servo as set_up_servo
-    from scanwright.api import simulate as simulate
-    from scanwright.api import write_cloud as write_cloud
+    from scanwright.api import *  # noqa: F403, the names of `_FUNCTIONS`
     from scanwright.api.devices import Scanned as Scanned
     from scanwright.cad.assembly.assembly import Assembly as Assembly
     from scanwright.design.angles import AngleSet as AngleSet

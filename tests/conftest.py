@@ -138,7 +138,7 @@ def cheapest_task() -> str:
 
 def require_documented(command, text):
     """Raise if a text is no JSON object as the schema of the command describes it, further keys excluded."""
-    from scanwright.cli.results.of_commands import result_schema
+    from scanwright.cli.results.schemas import result_schema
 
     schema = result_schema(command)
     for record in (schema, *schema.get("$defs", {}).values()):

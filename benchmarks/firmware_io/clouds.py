@@ -31,15 +31,15 @@ import numpy as np
 from kiss_icp.preprocess import Preprocessor
 from mcap_ros2.reader import read_ros2_messages
 
+from benchmarks.firmware_io.deskew import place
+from benchmarks.trials.axis import interpolations
 from scanwright.design.angles import Angles, AngleSet, load_angles
 from scanwright.design.arrays import Floats
-from scanwright.firmware_io.assembly.deskew import place
 from scanwright.firmware_io.assembly.deskew_kernel import place_block
 from scanwright.firmware_io.clouds.ply import ply_writer
 from scanwright.firmware_io.poses.trajectory import Trajectory
 from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import AxisCurve, Block, JointLog, Scan, blocks, straight
-from scanwright.trials.axis import interpolations
 
 ROUNDS = 7
 PROGRAM_ROUNDS = 2

@@ -209,8 +209,8 @@ Eight tasks for eight uses, with the scanner that was built for each. Choose the
 
 Each picture shows the scanner on the left, and one full scan of a simulated world on the right, with the noise of
 the data sheet. The red ball is the scanner, larger than in reality. `python -m benchmarks.scanwright.gallery` makes
-this page: tasks, parts, scans, pictures and figures. No slip ring fits servos of the X series, so `new` writes a sweep
-for them.
+this page: tasks, parts, scans, pictures and figures. A slip ring on a servo of the X series needs more parts, so `new`
+writes a sweep for them.
 """
 
 

@@ -29,6 +29,7 @@ KEYS_MM = {
     "M4": (1.9, 66.0),
     "M5": (2.4, 74.0),
     "M6": (3.0, 85.0),
+    "M8": (3.6, 96.0),
 }
 BY_HAND_MM = (3.0, 0.0)  # a screw of another size has a knob
 RAYS = 12  # around the one along the screw's axis

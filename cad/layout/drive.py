@@ -13,9 +13,9 @@ import numpy as np
 
 from scanwright.cad.layout.envelope import Envelope
 from scanwright.cad.layout.hub import Hub
-from scanwright.cad.layout.joints import Fixing
+from scanwright.cad.layout.joints import Fixing, fixing_of
 from scanwright.cad.layout.loads import ShaftBend
-from scanwright.cad.layout.names import BASE_MOUNT
+from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole
 from scanwright.design.arrays import Array
@@ -73,21 +73,31 @@ class Station:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ears:
-    """The front holes of a servo that a plate is screwed to, heights above the horn; x and y of the servo's frame."""
+    """The holes of a servo's case or frame that a plate is screwed to, from above.
 
-    front: float  # of the case
+    Heights above the horn; x and y of the servo's frame.
+    """
+
+    onto: str  # body that has the holes
+    front: float  # of its face below the plate
     seats: float  # of the planes around the holes
     opening: float  # radius, or half width of a fork, around the horn
     half_x: float  # of the plate
     screw: Screw
-    hole: float  # diameter
+    hole: float  # diameter, in the plate
     holes: tuple[tuple[float, float], ...]
+    fixing: Fixing
+    thread_mm: float  # of thread, or of material before the nut
+    thread: Thread | None = None  # of a printed one
+    # from the line of a pair to the edge over which the plate tips, which then lies on the entire face; None for others
+    heel_mm: float | None = None
 
 
 def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], ...]) -> Ears:
     """Return holes in the front of a servo's case with the numbers of a plate on them."""
     servo, screw = scanner.servo, SCREWS[scanner.servo.front.screw]
     return Ears(
+        onto=SERVO_CASE,
         front=servo.case_max_mm[2],
         seats=servo.front.z_mm,
         opening=opening,
@@ -95,6 +105,8 @@ def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], 
         screw=screw,
         hole=passing_hole(screw, scanner.printer),
         holes=holes,
+        fixing=fixing_of(servo.front),
+        thread_mm=servo.front.depth_mm,
     )
 
 
@@ -172,6 +184,7 @@ class DriveLayout:
     bears: Callable[[float, float], bool]
     built: tuple[str, ...]  # parts and products in assembly order; other parts state which one they follow
     left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
+    plain: bool  # whether two pairs of front holes, away from all that turns, carry the parts on the servo
     # parts that another one fixes along the axis without a screw, by a bearing or a retaining ring
     borne: tuple[tuple[str, str], ...] = ()
 

@@ -27,6 +27,7 @@ LENGTHS = {
     "M4": (5, 6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
     "M5": (6, 8, 10, 12, 16, 20, 25, 30, 35, 40),
     "M6": (8, 10, 12, 16, 20, 25, 30, 35, 40),
+    "M8": (10, 12, 16, 20, 25, 30, 35, 40),
 }
 HOLDS = 2.0  # diameters of thread that are sufficient
 NUT = 1.0  # diameters: a nut, 0.8, and the protruding thread

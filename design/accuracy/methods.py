@@ -27,6 +27,7 @@ from scanwright.design.objective.score import quick_J
 from scanwright.design.sphere.directions import equal_angle_grid, sample_set
 
 Method = Callable[[Problem, Setting, int], float]
+Methods = dict[str, tuple[Method, str, tuple[int, ...]]]  # name -> method, name of its parameter, values to try
 
 
 def by_segments(problem: Problem, angles_rad: Setting, nodes: int) -> float:
@@ -108,7 +109,7 @@ def by_mean_count_swept(problem: Problem, angles_rad: Setting, directions: int) 
     return _joined(problem, moment_of)
 
 
-METHODS: dict[str, tuple[Method, str, tuple[int, ...]]] = {
+METHODS: Methods = {
     "segments": (by_segments, "nodes", (81, 243, 729, 2187, 6561, 19683, 59049)),
     "mean count": (by_mean_count, "nodes", (243, 2187, 19683)),
     "rings": (by_rings, "rings", (90, 180, 360, 720, 2880, 11520, 46080)),
@@ -118,17 +119,12 @@ METHODS: dict[str, tuple[Method, str, tuple[int, ...]]] = {
     "ball search": (by_ball_search, "grid rows", (30, 60, 90, 180, 360)),
     "ball count": (by_ball_count, "grid rows", (30, 60, 90, 180, 360, 720)),
 }
-SWEPT: dict[str, tuple[Method, str, tuple[int, ...]]] = {
+SWEPT: Methods = {
     "directions": (by_segments, "directions", (800, 2187, 6561, 19683, 59049)),
     "mean count": (by_mean_count_swept, "directions", (729, 6561, 59049)),
     "ball search": (by_ball_search, "grid rows", (30, 60, 90, 180)),
     "ball count": (by_ball_count, "grid rows", (30, 60, 90, 180, 360)),
 }
-
-
-def methods_for(problem: Problem) -> dict[str, tuple[Method, str, tuple[int, ...]]]:
-    """Return by name: method, name of its parameter, and the values to try."""
-    return METHODS if problem.sweep is None else SWEPT
 
 
 def _joined(problem: Problem, moment_of: Callable[[Moment], float]) -> float:
@@ -168,8 +164,7 @@ def _on_a_grid(
     problem: Problem, angles_rad: Setting, rows: int, count: Callable[[Array, Array, float], Array]
 ) -> float:
     grid = equal_angle_grid(180 / rows)
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-    scan = scan_at(problem.bearings_rad, joint_rad, angles_rad)
+    scan = scan_at(problem.bearings_rad, problem.joint_rad(), angles_rad)
 
     def moment_of(moment: Moment) -> float:
         weight = moment.field.weight_at(grid) * np.sqrt(np.maximum(1 - grid[:, 2] ** 2, 0))

@@ -1,8 +1,4 @@
-"""Error against run time of other numerical choices than those of J: one record, its table and its picture.
-
-The packages that make a choice measure it (`cad.geometry.mesh_trials`, `scanwright.trials.solver`,
-`scanwright.trials.axis`).
-"""
+"""Error against run time of numerical choices: one record, its table and its picture."""
 
 from __future__ import annotations
 
@@ -35,27 +31,16 @@ GREYS = ("#000000", "#1f77b4", "#8a8a8a", "#d95f02", "#1b9e77", "#7570b3", "#a67
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One method with one value of its parameter.
+    """One method with one value of its parameter."""
 
-    Attributes:
-        choice: the choice, such as "mesh of a part".
-        method: its name.
-        setting: the parameter and its value.
-        error: against a separate reference; 0 if below the error of that.
-        unit: of the error.
-        seconds: of the repeats, shortest to longest.
-        size: other costs, as text.
-        chosen: whether the program uses it.
-    """
-
-    choice: str
-    method: str
-    setting: str
-    error: float
-    unit: str
-    seconds: tuple[float, ...]
-    size: str = ""
-    chosen: bool = False
+    choice: str  # the choice, such as "mesh of a part"
+    method: str  # its name
+    setting: str  # the parameter and its value
+    error: float  # against a separate reference; 0 if below the error of that
+    unit: str  # of the error
+    seconds: tuple[float, ...]  # of the repeats, shortest to longest
+    size: str = ""  # other costs, as text
+    chosen: bool = False  # whether the program uses it
 
     @property
     def median_s(self) -> float:

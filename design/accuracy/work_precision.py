@@ -9,16 +9,19 @@ from __future__ import annotations
 import time
 import tracemalloc
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from scanwright.design.accuracy.methods import Method, methods_for
+from scanwright.design.accuracy import methods
 from scanwright.design.accuracy.reference import Reference, is_smooth, reference
-from scanwright.design.accuracy.trials import Trial
+from scanwright.design.accuracy.trials import Trial, report_trials
 from scanwright.design.arrays import Setting
 from scanwright.design.errors import ScanwrightError
 from scanwright.design.objective.problem import Problem
+from scanwright.design.objective.stated_error import error_words
 from scanwright.design.progress import Progress
+from scanwright.design.search.optimum import find_optimum
 from scanwright.design.task.angle_ranges import NAMES
 from scanwright.design.task.task import LoadedTask
 
@@ -30,17 +33,29 @@ SEED = 0
 
 @dataclass(frozen=True, slots=True)
 class MethodsMeasured:
-    """Results of all methods.
+    """Results of all methods."""
 
-    Attributes:
-        truths: the reference at each setting, in order.
-        trials: one for each method and value of its parameter; errors below those of the references are 0.
-        failed: methods without a result, with the reason.
-    """
-
-    truths: tuple[Reference, ...]
+    truths: tuple[Reference, ...]  # the reference at each setting, in order
+    # one for each method and value of its parameter; errors below those of the references are 0
     trials: tuple[Trial, ...]
-    failed: tuple[str, ...]
+    failed: tuple[str, ...]  # methods without a result, with the reason
+
+
+def report_precision(loaded: LoadedTask, folder: Path, progress: Progress) -> list[str]:
+    """Measure every method to compute J at the optimum of a task; write `work_precision.csv` and `.png`; return lines.
+
+    Raises:
+        TaskError: no direction has a weight, or no setting meets the limits.
+    """
+    optimum = find_optimum(loaded, progress)
+    measured = measure_methods(loaded, optimum.problem, optimum.search.best[0].angles_rad, progress)
+    truth = measured.truths[0]
+    return [
+        f"reference J = {truth.J:.9f} +- {error_words(truth.J, truth.J_error)}; errors: the worst of "
+        f"{len(measured.truths)} settings, this one and others of its ranges; times of this one",
+        *report_trials(measured.trials, folder, "work_precision"),
+        *measured.failed,
+    ]
 
 
 def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, progress: Progress) -> MethodsMeasured:
@@ -48,9 +63,9 @@ def measure_methods(loaded: LoadedTask, problem: Problem, first_rad: Setting, pr
     settings, truths = _settings(loaded, problem, first_rad, progress)
     trials: list[Trial] = []
     failed: list[str] = []
-    methods = methods_for(problem)
-    total = sum(len(values) for _, _, values in methods.values())
-    for name, (method, parameter, values) in methods.items():
+    tried = methods.METHODS if problem.sweep is None else methods.SWEPT
+    total = sum(len(values) for _, _, values in tried.values())
+    for name, (method, parameter, values) in tried.items():
         for value in values:
             progress(f"{name}, {value} {parameter}", (len(trials) + len(failed)) / total)
             try:
@@ -83,7 +98,7 @@ def _trial(
     settings: list[Setting],
     truths: list[Reference],
     name: str,
-    method: Method,
+    method: methods.Method,
     parameter: str,
     value: int,
 ) -> Trial:

@@ -12,7 +12,7 @@ from scanwright.design.files.record import Record
 
 Face = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Kind = Literal["tapped", "through", "self_tapping", "case_screw", "pin", "slot"]
-Size = Literal["M1.6", "M2", "M2.5", "M3", "M4", "M5", "M6"]
+Size = Literal["M1.6", "M2", "M2.5", "M3", "M4", "M5", "M6", "M8"]
 Point = tuple[float, float, float]
 
 USABLE: tuple[Kind, ...] = ("tapped", "self_tapping", "through")
@@ -45,21 +45,13 @@ class Hole(Record):
 
 @dataclass(frozen=True, slots=True)
 class HolePattern:
-    """Equal holes in one plane, for one part.
+    """Equal holes in one plane, for one part."""
 
-    Attributes:
-        screw: size of the screws.
-        kind: of the holes.
-        places: x and y of each.
-        z_mm: of the plane.
-        depth_mm: of the thread, or of the material around a through hole.
-    """
-
-    screw: Size
-    kind: Kind
-    places: tuple[tuple[float, float], ...]
-    z_mm: float
-    depth_mm: float
+    screw: Size  # size of the screws
+    kind: Kind  # of the holes
+    places: tuple[tuple[float, float], ...]  # x and y of each
+    z_mm: float  # of the plane
+    depth_mm: float  # of the thread, or of the material around a through hole
 
 
 def mounting_holes(holes: Iterable[Hole], face: Face) -> HolePattern:

@@ -39,17 +39,11 @@ class Cable(Record):
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """A plug in its socket, ready for use.
+    """A plug in its socket, ready for use."""
 
-    Attributes:
-        words: name of the part to buy.
-        size_mm: of the mated pair: along the cable, across it, and height.
-        mass_g: of the mated pair.
-    """
-
-    words: str
-    size_mm: tuple[float, float, float]
-    mass_g: float
+    words: str  # name of the part to buy
+    size_mm: tuple[float, float, float]  # of the mated pair: along the cable, across it, and height
+    mass_g: float  # of the mated pair
 
 
 CONNECTORS: dict[End, Connector] = {  # sizes and masses assumed: usual parts, with 10 mm of straight cable

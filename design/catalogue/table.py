@@ -22,19 +22,12 @@ MOST_COLUMNS = 100
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One column.
+    """One column."""
 
-    Attributes:
-        title: with its unit.
-        fields: fields of the record that it depends on; it is unverified if one of them is.
-        value: returns the figure of a product; None if it has none.
-        brief: whether a short table has this column.
-    """
-
-    title: str
-    fields: tuple[str, ...]
-    value: Callable[[Any], float | str | None]
-    brief: bool = True
+    title: str  # with its unit
+    fields: tuple[str, ...]  # fields of the record that it depends on; it is unverified if one of them is
+    value: Callable[[Any], float | str | None]  # returns the figure of a product; None if it has none
+    brief: bool = True  # whether a short table has this column
 
 
 def _of(title: str, field: str, scale: float = 1.0, *, brief: bool = True) -> Figure:

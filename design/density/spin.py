@@ -36,19 +36,12 @@ EXACT_TURN = 1e-9  # of a step: closer to an integer number of steps, a turn has
 
 @dataclass(frozen=True, slots=True)
 class PhaseStatistics:
-    """Statistics of the count over the start phase, at n polar angles or directions.
+    """Statistics of the count over the start phase, at n polar angles or directions."""
 
-    Attributes:
-        mean_g: mean over the start phase of g of the true count.
-        mean: mean count.
-        least: lowest count at any phase.
-        most: highest count at any phase; 0 is blind.
-    """
-
-    mean_g: Float[ndarray, " n"]
-    mean: Float[ndarray, " n"]
-    least: Float[ndarray, " n"]
-    most: Float[ndarray, " n"]
+    mean_g: Float[ndarray, " n"]  # mean over the start phase of g of the true count
+    mean: Float[ndarray, " n"]  # mean count
+    least: Float[ndarray, " n"]  # lowest count at any phase
+    most: Float[ndarray, " n"]  # highest count at any phase; 0 is blind
 
     def of(self, some: slice) -> PhaseStatistics:
         """Return the statistics of a part of the angles."""

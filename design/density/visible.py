@@ -23,21 +23,13 @@ from scanwright.design.density.sweep import SweepLines
 
 @dataclass(frozen=True, slots=True)
 class FreeLines:
-    """Mean number of lines over the start phase in which each beam is free, cumulated over the joint angle.
+    """Mean number of lines over the start phase in which each beam is free, cumulated over the joint angle."""
 
-    Attributes:
-        low_rad: lowest joint angle.
-        edges_rad: joint angles relative to the lowest one, increasing from 0.
-        lines: free lines of each beam up to each edge.
-        first: place of the first edge on the regular grid of edges, in steps.
-        step_rad: step of that grid.
-    """
-
-    low_rad: float
-    edges_rad: Float[ndarray, " n"]
-    lines: Float[ndarray, "beams n"]
-    first: float
-    step_rad: float
+    low_rad: float  # lowest joint angle
+    edges_rad: Float[ndarray, " n"]  # joint angles relative to the lowest one, increasing from 0
+    lines: Float[ndarray, "beams n"]  # free lines of each beam up to each edge
+    first: float  # place of the first edge on the regular grid of edges, in steps
+    step_rad: float  # step of that grid
 
 
 def free_lines(blocked: Bool[ndarray, "beams angles"], lines: ScanLines, sweep: SweepLines | None) -> FreeLines:

@@ -20,27 +20,16 @@ CHANGER = {5.0: "step-down 12 V to 5 V", 24.0: "step-up 12 V to 24 V"}
 
 @dataclass(frozen=True, slots=True)
 class ElectricLoad:
-    """A device and the current that it draws.
+    """A device and the current that it draws."""
 
-    Attributes:
-        name: of its box.
-        title: its heading.
-        volts: nominal supply voltage.
-        continuous_a: in operation.
-        busy_a: largest current for longer than a moment: the voltage must stay in its bounds.
-        peak_a: largest current, inrush included: circuits, fuse, converter and supply carry it.
-        bounds_v: lowest and highest voltage that its maker allows.
-        behind_ring: whether its current passes the slip ring.
-    """
-
-    name: str
-    title: str
-    volts: float
-    continuous_a: float
-    busy_a: float
-    peak_a: float
-    bounds_v: tuple[float, float] | None = None
-    behind_ring: bool = False
+    name: str  # of its box
+    title: str  # its heading
+    volts: float  # nominal supply voltage
+    continuous_a: float  # in operation
+    busy_a: float  # largest current for longer than a moment: the voltage must stay in its bounds
+    peak_a: float  # largest current, inrush included: circuits, fuse, converter and supply carry it
+    bounds_v: tuple[float, float] | None = None  # lowest and highest voltage that its maker allows
+    behind_ring: bool = False  # whether its current passes the slip ring
 
     @property
     def set_v(self) -> float:

@@ -11,52 +11,30 @@ Pin = tuple[str, str]  # box and pin
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """One device.
+    """One device."""
 
-    Attributes:
-        name: unique.
-        title: its heading.
-        lines: further text in it.
-        left: pins towards the supply, from the top.
-        right: pins away from it.
-        column: its place from left to right.
-        free: pins that stay open on purpose.
-        bought: whether the parts list has a row for it.
-    """
-
-    name: str
-    title: str
-    lines: tuple[str, ...]
-    left: tuple[str, ...]
-    right: tuple[str, ...]
-    column: int
-    free: tuple[str, ...] = ()
-    bought: bool = False
+    name: str  # unique
+    title: str  # its heading
+    lines: tuple[str, ...]  # further text in it
+    left: tuple[str, ...]  # pins towards the supply, from the top
+    right: tuple[str, ...]  # pins away from it
+    column: int  # its place from left to right
+    free: tuple[str, ...] = ()  # pins that stay open on purpose
+    bought: bool = False  # whether the parts list has a row for it
 
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """One wire.
+    """One wire."""
 
-    Attributes:
-        start: pin nearer to the supply.
-        end: the other one.
-        net: what it carries, such as "12 V" or "D+".
-        amps: largest current; 0 for signals.
-        mm2: cross-section; 0 if it is part of a ready-made cable.
-        colour: of its insulation; empty if no verified source names one.
-        source: of the colour; empty if there is no colour.
-        note: text on the sheet in place of a colour.
-    """
-
-    start: Pin
-    end: Pin
-    net: str
-    amps: float
-    mm2: float
-    colour: str = ""
-    source: str = ""
-    note: str = ""
+    start: Pin  # pin nearer to the supply
+    end: Pin  # the other one
+    net: str  # what it carries, such as "12 V" or "D+"
+    amps: float  # largest current; 0 for signals
+    mm2: float  # cross-section; 0 if it is part of a ready-made cable
+    colour: str = ""  # of its insulation; empty if no verified source names one
+    source: str = ""  # of the colour; empty if there is no colour
+    note: str = ""  # text on the sheet in place of a colour
 
     @property
     def words(self) -> str:
@@ -67,59 +45,35 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class Circuit:
-    """One circuit of the slip ring.
+    """One circuit of the slip ring."""
 
-    Attributes:
-        number: from 1; our own, since no maker in the catalogue numbers them.
-        rated_a: continuous current.
-        net: its use; empty for a spare one.
-        amps: largest current.
-    """
-
-    number: int
-    rated_a: float
-    net: str
-    amps: float
+    number: int  # from 1; our own, since no maker in the catalogue numbers them
+    rated_a: float  # continuous current
+    net: str  # its use; empty for a spare one
+    amps: float  # largest current
 
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """The wires and the device that one fuse protects.
+    """The wires and the device that one fuse protects."""
 
-    Attributes:
-        name: of the fuse.
-        feeds: title of the device.
-        continuous_a: at 12 V, in operation.
-        peak_a: at 12 V, the largest.
-        fuse_a: its rating.
-        mm2: of its wires.
-    """
-
-    name: str
-    feeds: str
-    continuous_a: float
-    peak_a: float
-    fuse_a: float
-    mm2: float
+    name: str  # of the fuse
+    feeds: str  # title of the device
+    continuous_a: float  # at 12 V, in operation
+    peak_a: float  # at 12 V, the largest
+    fuse_a: float  # its rating
+    mm2: float  # of its wires
 
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """The voltage at a device.
+    """The voltage at a device."""
 
-    Attributes:
-        device: its name.
-        volts: at its largest continuous current.
-        idle_v: without current.
-        least: lowest voltage that its maker allows.
-        most: highest voltage that its maker allows.
-    """
-
-    device: str
-    volts: float
-    idle_v: float
-    least: float
-    most: float
+    device: str  # its name
+    volts: float  # at its largest continuous current
+    idle_v: float  # without current
+    least: float  # lowest voltage that its maker allows
+    most: float  # highest voltage that its maker allows
 
 
 @dataclass(frozen=True, slots=True)

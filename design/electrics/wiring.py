@@ -117,10 +117,6 @@ def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
     return tuple(Circuit(i + 1, amps, *used.get(i, ("", 0.0))) for i, (amps, _) in enumerate(rated))
 
 
-def _feed(load: ElectricLoad) -> str:
-    return f"{load.volts:g} V"
-
-
 def _boxes(
     scanner: Scanner,
     loads: list[ElectricLoad],
@@ -247,7 +243,7 @@ def _wires(
             feeds, amps = [(box, "out +"), (box, "out -")], load.peak_a
         mm2 = max(branch.mm2, wire_for(fuse_for(amps)))
         for feed, sign, end in zip(feeds, "+-", ends[load.name], strict=True):
-            net = _feed(load) if sign == "+" else "0 V"
+            net = f"{load.volts:g} V" if sign == "+" else "0 V"
             pin = inside.get(end, end) if target == "ring" else end
             lead = _lead(lidar, sign) if target == "lidar" else {}
             wires.append(Wire(feed, (target, pin), net, amps, mm2, **lead))

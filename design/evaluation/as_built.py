@@ -26,25 +26,15 @@ from scanwright.design.task.task import Task
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """View of one mount.
+    """View of one mount."""
 
-    Attributes:
-        J: the objective, rounded to its error.
-        J_error: its error.
-        blind: descriptions of the blind spots.
-        blind_weight: blind share of the weight of the task.
-        blind_fraction: blind share of the sphere outside the masks.
-        least: lowest number of beams per ball in the weighted region at any start phase.
-        line_gap_deg: widest distance between neighbouring scan lines.
-    """
-
-    J: float
-    J_error: float
-    blind: tuple[str, ...]
-    blind_weight: float
-    blind_fraction: float
-    least: int
-    line_gap_deg: float
+    J: float  # the objective, rounded to its error
+    J_error: float  # its error
+    blind: tuple[str, ...]  # descriptions of the blind spots
+    blind_weight: float  # blind share of the weight of the task
+    blind_fraction: float  # blind share of the sphere outside the masks
+    least: int  # lowest number of beams per ball in the weighted region at any start phase
+    line_gap_deg: float  # widest distance between neighbouring scan lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +57,11 @@ class ReferenceMount:
 
 @dataclass(frozen=True, slots=True)
 class AsBuilt:
-    """A scanner and the reference mounts.
+    """A scanner and the reference mounts."""
 
-    Attributes:
-        blocked: share of the beams that its parts block; None without known parts.
-        own: its view.
-        mounts: the reference mounts, the best one, with the smallest factor, first.
-    """
-
-    blocked: float | None
-    own: Seen
-    mounts: tuple[ReferenceMount, ...]
+    blocked: float | None  # share of the beams that its parts block; None without known parts
+    own: Seen  # its view
+    mounts: tuple[ReferenceMount, ...]  # the reference mounts, the best one, with the smallest factor, first
 
     @property
     def parts(self) -> str:

@@ -18,6 +18,7 @@ the difference is part of `J_error`. Not modelled: azimuth offsets of single las
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,7 +29,7 @@ from numpy import ndarray
 from scanwright.design.angles import angles_words
 from scanwright.design.arrays import Array, Counts, Setting
 from scanwright.design.catalogue.lidar import Lidar
-from scanwright.design.catalogue.products import Multibeam
+from scanwright.design.catalogue.products import Bearing, Belt, Multibeam
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.density.ball_count import ball_count
@@ -51,6 +52,7 @@ from scanwright.design.task.task import LoadedTask, load_task
 LAYERED = 5.0  # factor of the usual error estimate, since every layer has edges inside the segments
 UPRIGHT_RAD = np.radians([0.0, 0.0, 90.0, 0.0])  # scan plane x-z that turns about z: bearings are elevations
 AS_BUILT = "as built, with parts"
+Bought = Lidar | Servo | SlipRing | Bearing | Belt
 SCANNERS = ("ground_ahead", "low_cost")  # shipped tasks
 PHASES = 4  # start phases for a scanner that sees part of a turn, so is not rotationally symmetric
 DIRECTIONS = 10_000  # for the same
@@ -152,7 +154,7 @@ def ready_made(problem: Problem, product: Multibeam, turns: int) -> ComparisonRo
         range_stated_m=None,
         range_practical_m=None,
         range_sigma_mm=None,
-        **_value(problem, J, product.price_usd),
+        **per_ball(beams_per_ball(problem.objective, J), product.price_usd),
     )
 
 
@@ -214,8 +216,6 @@ def _rotating(
     shadow: SelfOcclusion | None = None,
 ) -> ComparisonRow:
     seen = seen_of(problem, angles_rad, judged, shadow)
-    prices = [product.price_usd for product in bought(loaded)]
-    known = [price for price in prices if price is not None]
     return ComparisonRow(
         name=name,
         setting=angles_words(np.degrees(angles_rad).round(2) + 0.0),
@@ -231,19 +231,25 @@ def _rotating(
         range_stated_m=loaded.lidar.stated_range_m,
         range_practical_m=loaded.lidar.practical_range_m,
         range_sigma_mm=loaded.lidar.range_sigma_mm,
-        **_value(problem, judged.J, sum(known) if len(known) == len(prices) else None),
+        **per_ball(beams_per_ball(problem.objective, judged.J), price_usd(bought(loaded))),
     )
 
 
-def bought(loaded: LoadedTask) -> list[Lidar | Servo | SlipRing]:
+def bought(loaded: LoadedTask) -> list[Bought]:
     """Return the products whose prices are the cost of a task."""
     ring = loaded.task.slip_ring
     return [loaded.lidar, loaded.servo, *([loaded.products.get(ring, SlipRing)] if ring else [])]
 
 
-def _value(problem: Problem, J: float, cost_usd: float | None) -> dict[str, float | None]:
-    """Return beams per ball, cost, and their ratio, by the names of the fields of a row."""
-    beams = beams_per_ball(problem.objective, J)
+def price_usd(products: Iterable[Bought]) -> float | None:
+    """Return the sum of the prices; None if one is unknown."""
+    prices = [product.price_usd for product in products]
+    known = [price for price in prices if price is not None]
+    return sum(known) if len(known) == len(prices) else None
+
+
+def per_ball(beams: float | None, cost_usd: float | None) -> dict[str, float | None]:
+    """Return beams per ball, cost, and their ratio, by the names of the fields of a row; None if unknown."""
     each = None if beams is None or cost_usd is None else beams / cost_usd
     return {"beams_per_ball": beams, "beams_per_ball_per_usd": each, "cost_usd": cost_usd}
 

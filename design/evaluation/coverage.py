@@ -62,15 +62,10 @@ def hidden_share(loaded: LoadedTask, region: Region) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Shares of solid angle.
+    """Shares of solid angle."""
 
-    Attributes:
-        blind_fraction: share of the unmasked sphere that is blind at every start phase.
-        masked_fraction: masked share of the sphere.
-    """
-
-    blind_fraction: float
-    masked_fraction: float
+    blind_fraction: float  # share of the unmasked sphere that is blind at every start phase
+    masked_fraction: float  # masked share of the sphere
 
 
 def coverage(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None = None) -> Coverage:

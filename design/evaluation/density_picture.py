@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool
@@ -14,7 +13,6 @@ from numpy import ndarray
 
 from scanwright.design.arrays import Array, Setting
 from scanwright.design.evaluation.coverage import mean_density_at
-from scanwright.design.files.picture_files import save_picture
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion
 
@@ -24,13 +22,6 @@ SEEN = 1e-9  # mean beams in a ball
 EXTENT = (-180, 180, 180, 0)
 LEAST_FACTOR, MOST_FACTOR = 2.0, 10.0  # bounds of the colour scale of a ratio
 ROUND = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
-
-
-def density_picture(
-    path: Path, problem: Problem, settings: Mapping[str, Setting], title: str, shadow: SelfOcclusion | None = None
-) -> None:
-    """Write `density_figure` to a PNG and an SVG of the same name."""
-    save_picture(density_figure(problem, settings, title, shadow), path)
 
 
 def density_figure(

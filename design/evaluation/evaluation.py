@@ -138,7 +138,7 @@ class Evaluation:
             "J_rises_1_deg_off": self.rises,
             **({} if self.hit is None else {"pole": asdict(self.hit)}),
             **(self.surfaces or {}),
-            **self.cloud.facts(),
+            **asdict(self.cloud),
             **({} if self.as_built is None else {"as_built": self.as_built.facts()}),
         }
 
@@ -167,7 +167,8 @@ class Evaluation:
         lines += [f"blind cone     {_cap(cone)}" for cone in gap.blind_cones]
         if self.cap is not None:
             lines.append(f"empty cap      {_cap(self.cap)}, the largest without a beam")
-        lines.append(f"line gap       {gap.line_gap_deg:.3f} deg at the widest, {gap.line_gap_mm(10):.0f} mm at 10 m")
+        gap_mm = 10_000 * np.radians(gap.line_gap_deg)
+        lines.append(f"line gap       {gap.line_gap_deg:.3f} deg at the widest, {gap_mm:.0f} mm at 10 m")
         crossing = "" if gap.crossing_deg is None else f"; scan lines cross at {gap.crossing_deg:.0f} deg (mean)"
         lines.append(f"seen twice     {gap.seen_twice:.1%} of the weight{crossing}")
         if gap.half_turn_misses is not None:
@@ -257,8 +258,7 @@ def setting_rad(angles_deg: Sequence[float]) -> Setting:
 
 def simulated_beams(problem: Problem, angles_rad: Setting) -> Float[ndarray, "n 3"]:
     """Return the directions of the beams of one full scan in the world frame, shape (n, 3)."""
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
-    return scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
+    return scan_at(problem.bearings_rad, problem.joint_rad(), angles_rad, problem.lever)
 
 
 def _cap(cap: BlindCone) -> str:

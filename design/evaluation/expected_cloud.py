@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,27 +28,17 @@ DIRECTIONS = 5000  # of the region, for the mean distance from the axis
 
 @dataclass(frozen=True, slots=True)
 class ExpectedError:
-    """Root mean square error of a point over the region, with calibrated mounting angles.
+    """Root mean square error of a point over the region, with calibrated mounting angles."""
 
-    Attributes:
-        at_m: range of the point.
-        range_noise_mm: noise of the lidar, along the beam.
-        encoder_mm: steps of the servo's encoder, before `assemble` smooths them.
-        backlash_mm: half of the servo's backlash, if it moves points relative to each other; null if unknown.
-        backlash_calibrated: whether `calibrate` can correct it: the servo turns both ways, without load by gravity.
-        bending_mm: largest bending by gravity that changes over a turn; null without a build.
-        total_mm: root of the sum of the squares of the known errors.
-        most_mm: the same with the largest backlash of the catalogue in place of an unknown one.
-    """
-
-    at_m: float
-    range_noise_mm: float
-    encoder_mm: float
+    at_m: float  # range of the point
+    range_noise_mm: float  # noise of the lidar, along the beam
+    encoder_mm: float  # steps of the servo's encoder, before `assemble` smooths them
+    # half of the servo's backlash, if it moves points relative to each other; null if unknown
     backlash_mm: float | None
-    backlash_calibrated: bool
-    bending_mm: float | None
-    total_mm: float
-    most_mm: float
+    backlash_calibrated: bool  # whether `calibrate` can correct it: the servo turns both ways, without load by gravity
+    bending_mm: float | None  # largest bending by gravity that changes over a turn; null without a build
+    total_mm: float  # root of the sum of the squares of the known errors
+    most_mm: float  # the same with the largest backlash of the catalogue in place of an unknown one
 
     def words(self) -> str:
         """Return the error and its parts as text."""
@@ -73,44 +62,25 @@ class ExpectedError:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedCloud:
-    """The cloud of one full scan. Console, report and JSON print this record.
+    """The cloud of one full scan. Console, report and JSON print this record; its fields are keys of the JSON."""
 
-    Attributes:
-        error: of a point at 3 m.
-        far: of a point at 5 m; None if the lidar does not reach it.
-        gap: warning of a gap much wider than the spacing of the lines, if there is one.
-        missed: warning that an object of the size that the task states can be missed.
-        planes: points on ground, ceiling and walls of the task.
-        hidden: regions that the masks hide in part.
-    """
-
-    error: ExpectedError
-    far: ExpectedError | None
-    gap: Finding | None
-    missed: Finding | None
-    planes: tuple[PlaneFigures, ...]
-    hidden: tuple[Finding, ...]
+    expected_error: ExpectedError  # error of a point to expect at 3 m
+    expected_error_far: ExpectedError | None  # the same at 5 m; null if the lidar does not reach it
+    wide_gap: Finding | None  # warning of a gap much wider than the spacing of lines; null if there is none
+    # warning that an object as wide as a ball of the task can get no beam; null if none can
+    missed_object: Finding | None
+    planes: tuple[PlaneFigures, ...]  # points on ground, walls and ceilings of the task
+    hidden_regions: tuple[Finding, ...]  # regions that the robot hides in part
 
     def lines(self) -> list[str]:
         """Return the record as lines of text."""
-        far = "" if self.far is None else f", {self.far.short()}"
+        far = "" if self.expected_error_far is None else f", {self.expected_error_far.short()}"
         return [
-            f"{self.error.words()}{far}",
+            f"{self.expected_error.words()}{far}",
             *(f"one full scan, {plane.words()}" for plane in self.planes),
-            *(f"warning: {sentence(each)}" for each in (self.missed, self.gap) if each is not None),
-            *(f"{each.severity}: {sentence(each)}" for each in self.hidden),
+            *(f"warning: {sentence(each)}" for each in (self.missed_object, self.wide_gap) if each is not None),
+            *(f"{each.severity}: {sentence(each)}" for each in self.hidden_regions),
         ]
-
-    def facts(self) -> dict[str, Any]:
-        """Return names with units and values, for JSON."""
-        return {
-            "expected_error": asdict(self.error),
-            "expected_error_far": None if self.far is None else asdict(self.far),
-            "wide_gap": None if self.gap is None else asdict(self.gap),
-            "missed_object": None if self.missed is None else asdict(self.missed),
-            "planes": [asdict(plane) for plane in self.planes],
-            "hidden_regions": [asdict(each) for each in self.hidden],
-        }
 
 
 def expected_cloud(

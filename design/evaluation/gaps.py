@@ -32,38 +32,23 @@ square root of 2, and twice that at the end of a turn."""
 
 @dataclass(frozen=True, slots=True)
 class BlindCone:
-    """A cone that no beam enters.
+    """A cone that no beam enters."""
 
-    Attributes:
-        axis_world: unit vector of its axis in the world.
-        half_angle_deg: half of its opening angle.
-    """
-
-    axis_world: tuple[float, float, float]
-    half_angle_deg: float
+    axis_world: tuple[float, float, float]  # unit vector of its axis in the world
+    half_angle_deg: float  # half of its opening angle
 
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Gaps of one mount; shares are of the weight of the task.
+    """Gaps of one mount; shares are of the weight of the task."""
 
-    Attributes:
-        blind_cones: about the axis and its opposite, the wider one first, if beams do not reach the axis.
-        line_gap_deg: widest distance between neighbouring scan lines of one family, perpendicular to them.
-        seen_twice: share that both families of lines cover.
-        crossing_deg: mean angle at which they cross, 0 to 90; None if nothing is seen twice.
-        half_turn_misses: mean share of the view of a full turn that half a turn does not see; None for a sweep.
-    """
-
+    # about the axis and its opposite, the wider one first, if beams do not reach the axis
     blind_cones: tuple[BlindCone, ...]
-    line_gap_deg: float
-    seen_twice: float
-    crossing_deg: float | None
+    line_gap_deg: float  # widest distance between neighbouring scan lines of one family, perpendicular to them
+    seen_twice: float  # share that both families of lines cover
+    crossing_deg: float | None  # mean angle at which they cross, 0 to 90; None if nothing is seen twice
+    # mean share of the view of a full turn that half a turn does not see; None for a sweep
     half_turn_misses: float | None
-
-    def line_gap_mm(self, range_m: float) -> float:
-        """Return the widest distance between neighbouring scan lines on a wall that faces the scanner at a range."""
-        return float(np.radians(self.line_gap_deg) * range_m * 1000)
 
 
 def gaps(problem: Problem, angles_rad: Setting) -> Gaps:

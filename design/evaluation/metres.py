@@ -42,29 +42,18 @@ SLACK = 0.02  # relative error of a stated diameter, which is never too small
 
 @dataclass(frozen=True, slots=True)
 class PlaneFigures:
-    """Points of one full scan on the rectangle of a region.
+    """Points of one full scan on the rectangle of a region."""
 
-    Attributes:
-        region: description of the region.
-        range_m: practical range of the lidar.
-        beyond_range: share of the area beyond that range; the other figures refer to the rest.
-        points: number of points.
-        points_per_m2: mean over the unmasked area.
-        at_m: distance of `gap_cm` from the optical centre: `AT_M`, or the nearest distance within the region.
-        gap_cm: diameter of the largest disc without a point, centred at that distance; null if there are no points.
-        gap_off_axis_cm: the same outside the blind cones around the axis.
-        twice_cm: diameter of the smallest disc that has two points at any place.
-    """
-
-    region: str
-    range_m: float
-    beyond_range: float
-    points: int
-    points_per_m2: float
-    at_m: float
+    region: str  # description of the region
+    range_m: float  # practical range of the lidar
+    beyond_range: float  # share of the area beyond that range; the other figures refer to the rest
+    points: int  # number of points
+    points_per_m2: float  # mean over the unmasked area
+    at_m: float  # distance of `gap_cm` from the optical centre: `AT_M`, or the nearest distance within the region
+    # diameter of the largest disc without a point, centred at that distance; null if there are no points
     gap_cm: Infinite
-    gap_off_axis_cm: Infinite
-    twice_cm: Infinite
+    gap_off_axis_cm: Infinite  # the same outside the blind cones around the axis
+    twice_cm: Infinite  # diameter of the smallest disc that has two points at any place
 
     def words(self) -> str:
         """Return the figures as a line of text."""
@@ -107,7 +96,7 @@ def on_planes(
 
 def free_beams(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Float[ndarray, "n 3"]:
     """Return the beams of one full scan that no mask and no part blocks, as unit vectors in the world, shape (n, 3)."""
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    joint_rad = problem.joint_rad()
     beams = scan_at(problem.bearings_rad, joint_rad, angles_rad, problem.lever)
     free = np.ones(len(beams), bool) if shadow is None else shadow.free(joint_rad).ravel()
     return beams[free & ~problem.field.masked_at(beams)]

@@ -57,30 +57,20 @@ class Pole:
 
 @dataclass(frozen=True, slots=True)
 class Chance:
-    """Probability that a pole gets at least `beams` beams in one full scan, over its azimuth and the start phase.
+    """Probability that a pole gets at least `beams` beams in one full scan, over its azimuth and the start phase."""
 
-    Attributes:
-        beams: required number of beams.
-        chance: probability, 0 to 1.
-        error: four standard errors of the mean over start phases, and the width of a cell of azimuth.
-    """
-
-    beams: int
-    chance: float
-    error: float
+    beams: int  # required number of beams
+    chance: float  # probability, 0 to 1
+    error: float  # four standard errors of the mean over start phases, and the width of a cell of azimuth
 
 
 @dataclass(frozen=True, slots=True)
 class PoleChances:
-    """Probability of hitting a pole with one mount.
+    """Probability of hitting a pole with one mount."""
 
-    Attributes:
-        chances: for each of `BEAMS`.
-        stands: distribution of the azimuth of the pole: "weighted" by the weight of the task; or "unmasked", uniform
-            outside the masks, if the region does not contain any of the pole.
-    """
-
-    chances: tuple[Chance, ...]
+    chances: tuple[Chance, ...]  # for each of `BEAMS`
+    # distribution of the azimuth of the pole: "weighted" by the weight of the task; or "unmasked", uniform outside the
+    # masks, if the region does not contain any of the pole
     stands: str
 
 

@@ -19,15 +19,10 @@ _LONGEST_STATEMENT = 1000  # lines: bounds the time that a file without an end o
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One fault of a file. Unlike a `Finding` it has the path of its key, which gives the line, and no severity.
+    """One fault of a file. Unlike a `Finding` it has the path of its key, which gives the line, and no severity."""
 
-    Attributes:
-        path: keys and array indices from the top of the file; empty for the entire file.
-        message: value, bound and suggestion, with the punctuation that follows the path.
-    """
-
-    path: tuple[str, ...]
-    message: str
+    path: tuple[str, ...]  # keys and array indices from the top of the file; empty for the entire file
+    message: str  # value, bound and suggestion, with the punctuation that follows the path
 
     def __str__(self) -> str:
         return f"{'.'.join(self.path) or '(entire file)'}{self.message}".removeprefix("(entire file): ")

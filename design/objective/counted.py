@@ -44,40 +44,24 @@ X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """Result of a count.
+    """Result of a count."""
 
-    Attributes:
-        J: the objective; for `worst` a lower bound of it.
-        J_error: three standard errors; infinite if a set of directions has no beam, 0 for `worst`.
-        least: lowest count of all directions.
-        weighted: share of the drawn directions that have a weight.
-    """
-
-    J: float
-    J_error: float
-    least: int
-    weighted: float
+    J: float  # the objective; for `worst` a lower bound of it
+    J_error: float  # three standard errors; infinite if a set of directions has no beam, 0 for `worst`
+    least: int  # lowest count of all directions
+    weighted: float  # share of the drawn directions that have a weight
 
 
 @dataclass(frozen=True, slots=True)
 class _Sample:
-    """Directions with a weight, and their counts.
+    """Directions with a weight, and their counts."""
 
-    Attributes:
-        counts: at several start phases, shape (n, phases).
-        mean: mean count over all start phases, shape (n,); NaN without a closed form.
-        value: weight, shape (n,).
-        area: solid angle that each direction represents, shape (n,).
-        required: required count, shape (n,).
-        keep: whether each drawn direction is one of these, shape (drawn,).
-    """
-
-    counts: Ints
-    mean: Array
-    value: Array
-    area: Array
-    required: Array
-    keep: Mask
+    counts: Ints  # at several start phases, shape (n, phases)
+    mean: Array  # mean count over all start phases, shape (n,); NaN without a closed form
+    value: Array  # weight, shape (n,)
+    area: Array  # solid angle that each direction represents, shape (n,)
+    required: Array  # required count, shape (n,)
+    keep: Mask  # whether each drawn direction is one of these, shape (drawn,)
 
 
 def counted_J(

@@ -26,21 +26,13 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One region of a task.
+    """One region of a task."""
 
-    Attributes:
-        region: its shape; None for the surfaces of a scene.
-        table: values of its cells, shape (rows, columns); None if it has no cells.
-        value: of the region; entries of the table are multiplied by it.
-        required: required count, a number or a table like `table`.
-        chances: probability of drawing each cell of the table, shape (rows, columns).
-    """
-
-    region: object
-    table: Array | None
-    value: float
-    required: float | Array
-    chances: Array | None = None
+    region: object  # its shape; None for the surfaces of a scene
+    table: Array | None  # values of its cells, shape (rows, columns); None if it has no cells
+    value: float  # of the region; entries of the table are multiplied by it
+    required: float | Array  # required count, a number or a table like `table`
+    chances: Array | None = None  # probability of drawing each cell of the table, shape (rows, columns)
 
     def holds(self, d: Array) -> Mask:
         """Return whether directions lie in the region, shape (n,)."""

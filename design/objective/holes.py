@@ -32,21 +32,13 @@ UPRIGHT_DEG = 80.0  # elevation above which no heading is stated
 
 @dataclass(frozen=True, slots=True)
 class BlindSpot:
-    """Directions that get no beam at any start phase: a cone, or a ring if `inner_deg` is above 0.
+    """Directions that get no beam at any start phase: a cone, or a ring if `inner_deg` is above 0."""
 
-    Attributes:
-        centre: unit vector in the world.
-        half_angle_deg: from the centre to the outer edge.
-        inner_deg: from the centre to the inner edge of a ring.
-        weight: share of the weight of the task.
-        scattered: whether only a part of the cone is blind.
-    """
-
-    centre: tuple[float, float, float]
-    half_angle_deg: float
-    inner_deg: float
-    weight: float
-    scattered: bool = False
+    centre: tuple[float, float, float]  # unit vector in the world
+    half_angle_deg: float  # from the centre to the outer edge
+    inner_deg: float  # from the centre to the inner edge of a ring
+    weight: float  # share of the weight of the task
+    scattered: bool = False  # whether only a part of the cone is blind
 
     def words(self) -> str:
         """Return its place, width and weight as text."""

@@ -28,30 +28,18 @@ NODES = 6561  # of the quadrature of one mount
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A task as numbers.
+    """A task as numbers."""
 
-    Attributes:
-        bearings_rad: of the beams.
-        lines: of one full turn; of a sweep, as many as one period has, at the widest step.
-        sweep: the trajectory, if the servo sweeps.
-        scan_rate_hz: scan rate of the lidar.
-        ball_rad: ball radius.
-        objective: to minimise.
-        grid_step_deg: step of the paper's equal-angle sum, or None for solid angles.
-        nodes: initial quadrature nodes of a score, from the task's `tolerance` or `budget_s`.
-        tolerance: largest error of J; a score uses more nodes until its error is smaller.
-        lever: offset of the optical centre from the axis, `t_rot_laser / range`; 0 by design and in the search.
-    """
-
-    bearings_rad: Float[ndarray, " beams"]
-    lines: ScanLines
-    sweep: SweepLines | None
-    scan_rate_hz: float
-    ball_rad: float
-    objective: Objective
-    grid_step_deg: float | None
-    nodes: int = NODES
-    tolerance: float = 1e-3
+    bearings_rad: Float[ndarray, " beams"]  # of the beams
+    lines: ScanLines  # of one full turn; of a sweep, as many as one period has, at the widest step
+    sweep: SweepLines | None  # the trajectory, if the servo sweeps
+    scan_rate_hz: float  # scan rate of the lidar
+    ball_rad: float  # ball radius
+    objective: Objective  # to minimise
+    grid_step_deg: float | None  # step of the paper's equal-angle sum, or None for solid angles
+    nodes: int = NODES  # initial quadrature nodes of a score, from the task's `tolerance` or `budget_s`
+    tolerance: float = 1e-3  # largest error of J; a score uses more nodes until its error is smaller
+    # offset of the optical centre from the axis, `t_rot_laser / range`; 0 by design and in the search
     lever: tuple[float, float, float] = NO_LEVER
 
     def beams_rot(self, plane_rad: Plane) -> Float[ndarray, "beams 3"]:
@@ -61,6 +49,10 @@ class Problem:
     def blind_zones(self, beam_polar_rad: Float[ndarray, " beams"]) -> Float[ndarray, "zones 2"]:
         """Return the ranges of the polar angle about the axis that are blind at every start phase."""
         return blind_zones(self.bearings_rad, beam_polar_rad, self.ball_rad)
+
+    def joint_rad(self) -> Float[ndarray, " lines"]:
+        """Return the axis angles of the lines of one full scan, of a sweep at a start phase of a half."""
+        return self.lines.angles_rad if self.sweep is None else self.sweep.angles_rad(0.5)
 
     @property
     def field(self) -> Field:

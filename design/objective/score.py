@@ -41,21 +41,13 @@ SURE = 4.5  # standard errors of their mean: exceeded in 0.3 % of cases (Student
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """J of one mount.
+    """J of one mount."""
 
-    Attributes:
-        J: the objective.
-        J_error: conservative estimate of its numerical error (`score_on`).
-        J_lower: J of the mean counts, a lower bound of J since g is convex.
-        least: lowest count of beams per ball in the weighted region at any start phase.
-        blind_weight: share of the weight farther than a ball radius from all scan lines.
-    """
-
-    J: float
-    J_error: float
-    J_lower: float
-    least: int
-    blind_weight: float
+    J: float  # the objective
+    J_error: float  # conservative estimate of its numerical error (`score_on`)
+    J_lower: float  # J of the mean counts, a lower bound of J since g is convex
+    least: int  # lowest count of beams per ball in the weighted region at any start phase
+    blind_weight: float  # share of the weight farther than a ball radius from all scan lines
 
 
 def score(problem: Problem, angles_rad: Setting) -> Score:

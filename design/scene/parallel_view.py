@@ -21,15 +21,10 @@ DARKEST = 0.35  # brightness of a surface seen edge on
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The pixels of a body, row by row from the top left.
+    """The pixels of a body, row by row from the top left."""
 
-    Attributes:
-        away_m: distance from the plane of the view, inf without the body, shape (n,).
-        brightness: 0 to 1, shape (n,).
-    """
-
-    away_m: Float[ndarray, " n"]
-    brightness: Float[ndarray, " n"]
+    away_m: Float[ndarray, " n"]  # distance from the plane of the view, inf without the body, shape (n,)
+    brightness: Float[ndarray, " n"]  # 0 to 1, shape (n,)
 
 
 def in_front(views: Sequence[Shown]) -> Shown:
@@ -41,21 +36,13 @@ def in_front(views: Sequence[Shown]) -> Shown:
 
 @dataclass(frozen=True, slots=True)
 class ParallelView:
-    """Position and direction of the viewer.
+    """Position and direction of the viewer."""
 
-    Attributes:
-        axes: rows to the right, up, and back to the viewer.
-        low: centre of the lowest pixel at the left, in right and up [m].
-        away_m: distance of the plane of the view from the origin, along back; no body is in front of it.
-        pixel_m: width of a pixel.
-        size: pixels, columns and rows.
-    """
-
-    axes: Rotation
-    low: Float[ndarray, " 2"]
-    away_m: float
-    pixel_m: float
-    size: tuple[int, int]
+    axes: Rotation  # rows to the right, up, and back to the viewer
+    low: Float[ndarray, " 2"]  # centre of the lowest pixel at the left, in right and up [m]
+    away_m: float  # distance of the plane of the view from the origin, along back; no body is in front of it
+    pixel_m: float  # width of a pixel
+    size: tuple[int, int]  # pixels, columns and rows
 
     def at(self, points_m: Float[ndarray, "*k 3"]) -> Float[ndarray, "*k 2"]:
         """Return columns and rows of points, from the centre of the top left pixel, shape (..., 2)."""

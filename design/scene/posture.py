@@ -10,19 +10,12 @@ SUFFIX = ".urdf"
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """The posture of a robot.
+    """The posture of a robot."""
 
-    Attributes:
-        joint_deg: joint that turns -> its angle; 0 for the others.
-        joint_mm: joint that slides -> its length; 0 for the others.
-        frame: link in whose frame the triangles are; empty for the root.
-        omit: links without geometry, such as the scanner's own.
-    """
-
-    joint_deg: Mapping[str, float] = field(default_factory=dict)
-    joint_mm: Mapping[str, float] = field(default_factory=dict)
-    frame: str = ""
-    omit: tuple[str, ...] = ()
+    joint_deg: Mapping[str, float] = field(default_factory=dict)  # joint that turns -> its angle; 0 for the others
+    joint_mm: Mapping[str, float] = field(default_factory=dict)  # joint that slides -> its length; 0 for the others
+    frame: str = ""  # link in whose frame the triangles are; empty for the root
+    omit: tuple[str, ...] = ()  # links without geometry, such as the scanner's own
 
 
 AS_IT_IS = Posture()

@@ -31,34 +31,22 @@ _BATCH = 1 << 17  # rays; bounds the memory of one cast
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Triangles, ready to be hit from either side.
+    """Triangles, ready to be hit from either side."""
 
-    Attributes:
-        triangles_m: corners, shape (t, 3, 3).
-        normals: unit normals by the right-hand rule, shape (t, 3).
-        origin_m: middle of the scene, shape (3,); the search sees the scene from there, where float32 is finest.
-        nearest: finds the triangle that a ray hits first.
-    """
-
-    triangles_m: Float[ndarray, "t 3 3"]
-    normals: Float[ndarray, "t 3"]
-    origin_m: Vector
-    nearest: Nearest
+    triangles_m: Float[ndarray, "t 3 3"]  # corners, shape (t, 3, 3)
+    normals: Float[ndarray, "t 3"]  # unit normals by the right-hand rule, shape (t, 3)
+    origin_m: Vector  # middle of the scene, shape (3,); the search sees the scene from there, where float32 is finest
+    nearest: Nearest  # finds the triangle that a ray hits first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hits:
-    """The first hit of each ray; row i is ray i.
+    """The first hit of each ray; row i is ray i."""
 
-    Attributes:
-        range_m: shape (n,), inf without a hit.
-        incidence_rad: angle between ray and surface normal, 0 .. pi/2, shape (n,), NaN without a hit.
-        triangle: row of `Scene.triangles_m` and `Scene.normals`, shape (n,), -1 without a hit.
-    """
-
-    range_m: Float[ndarray, " n"]
+    range_m: Float[ndarray, " n"]  # shape (n,), inf without a hit
+    # angle between ray and surface normal, 0 .. pi/2, shape (n,), NaN without a hit
     incidence_rad: Float[ndarray, " n"]
-    triangle: Int32[ndarray, " n"]
+    triangle: Int32[ndarray, " n"]  # row of `Scene.triangles_m` and `Scene.normals`, shape (n,), -1 without a hit
 
 
 def load_scene(path: Path, unit_m: float = 1.0, T_world_mesh: ArrayLike = _AS_IT_IS) -> Scene:

@@ -22,19 +22,13 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """Rays at the middles of cells: rows theta 0 .. 180, columns phi 0 .. 360 of the world.
+    """Rays at the middles of cells: rows theta 0 .. 180, columns phi 0 .. 360 of the world."""
 
-    Attributes:
-        directions: unit vectors in the world, shape (rows, columns, 3).
-        range_m: inf without a hit, shape (rows, columns).
-        incidence_rad: between ray and surface normal, NaN without a hit, shape (rows, columns).
-        points_m: the points hit, in the frame of the mesh, shape (rows, columns, 3).
-    """
-
-    directions: Float[ndarray, "rows columns 3"]
-    range_m: Float[ndarray, "rows columns"]
+    directions: Float[ndarray, "rows columns 3"]  # unit vectors in the world, shape (rows, columns, 3)
+    range_m: Float[ndarray, "rows columns"]  # inf without a hit, shape (rows, columns)
+    # between ray and surface normal, NaN without a hit, shape (rows, columns)
     incidence_rad: Float[ndarray, "rows columns"]
-    points_m: Float[ndarray, "rows columns 3"]
+    points_m: Float[ndarray, "rows columns 3"]  # the points hit, in the frame of the mesh, shape (rows, columns, 3)
 
     def area_per_sr(self) -> Float[ndarray, "rows columns"]:
         """Square metres of surface per steradian, `r^2 / cos(incidence)`; 0 without a hit."""

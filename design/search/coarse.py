@@ -32,29 +32,18 @@ SCOUTED = 0.05  # how far the lowest J over this subset may be above that over a
 
 @dataclass(frozen=True, slots=True)
 class Landscape:
-    """Coarse J over all planes and axes: the factors of its products, and the lowest of each plane and axis.
+    """Coarse J over all planes and axes: the factors of its products, and the lowest of each plane and axis."""
 
-    Attributes:
-        space: the mounts.
-        nodes: over which the factors are given.
-        objective: joins the moments to J.
-        g: `<g(d)>` of each moment and plane class, or its bound, (moments, planes, nodes).
-        weights: for each moment, the share of its weight at the nodes about each axis class, (axes, nodes).
-        blind: 1 if a node is blind for a plane class, else 0, (planes, nodes).
-        constraints: of the mounts.
-        plain: lowest J of all mounts.
-        feasible: lowest J of the mounts that meet the constraints.
-    """
-
-    space: SearchSpace
-    nodes: Nodes
-    objective: Objective
-    g: Array
+    space: SearchSpace  # the mounts
+    nodes: Nodes  # over which the factors are given
+    objective: Objective  # joins the moments to J
+    g: Array  # `<g(d)>` of each moment and plane class, or its bound, (moments, planes, nodes)
+    # for each moment, the share of its weight at the nodes about each axis class, (axes, nodes)
     weights: tuple[Array, ...]
-    blind: Array
-    constraints: tuple[Constraint, ...]
-    plain: Lowest
-    feasible: Lowest
+    blind: Array  # 1 if a node is blind for a plane class, else 0, (planes, nodes)
+    constraints: tuple[Constraint, ...]  # of the mounts
+    plain: Lowest  # lowest J of all mounts
+    feasible: Lowest  # lowest J of the mounts that meet the constraints
 
     def about_axes(self, planes: slice) -> Float[ndarray, "planes orientations axes"]:
         """Return J of plane classes, not flipped, about each axis class, not flipped and flipped: (planes, 2, axes)."""
@@ -72,17 +61,11 @@ class Landscape:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Numerical choices of a search, whose effect `design.accuracy.search_trials` measures.
+    """Numerical choices of a search, whose effect `benchmarks/trials/search_effort.py` measures."""
 
-    Attributes:
-        fineness: factor of the number of nodes or directions of coarse J.
-        margin: assumed error of coarse J: planes whose bound is farther above the best are not made exact.
-        rounds: of refinement: 0 none, 1 rough, 2 rough and fine.
-    """
-
-    fineness: float = 1.0
-    margin: float = MARGIN
-    rounds: int = 2
+    fineness: float = 1.0  # factor of the number of nodes or directions of coarse J
+    margin: float = MARGIN  # assumed error of coarse J: planes whose bound is farther above the best are not made exact
+    rounds: int = 2  # of refinement: 0 none, 1 rough, 2 rough and fine
 
 
 USUAL = Effort()

@@ -70,23 +70,14 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A group of mounts of equal coarse J, represented by the one that is easiest to build.
+    """A group of mounts of equal coarse J, represented by the one that is easiest to build."""
 
-    Attributes:
-        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        J_coarse: coarse J.
-        score: exact score of a local minimum; None for a mount on the slope of a better one.
-        members: number of mounts of the grid in the group.
-        axes: number of their axes.
-        every_axis: whether these are all axes of the grid.
-    """
-
-    angles_deg: Setting
-    J_coarse: float
-    score: Score | None
-    members: int
-    axes: int
-    every_axis: bool
+    angles_deg: Setting  # (alpha_rot, beta_rot, alpha_laser, beta_laser)
+    J_coarse: float  # coarse J
+    score: Score | None  # exact score of a local minimum; None for a mount on the slope of a better one
+    members: int  # number of mounts of the grid in the group
+    axes: int  # number of their axes
+    every_axis: bool  # whether these are all axes of the grid
 
 
 def find_candidates(land: Landscape, space: SearchSpace) -> list[Candidate]:

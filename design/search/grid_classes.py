@@ -22,25 +22,15 @@ from scanwright.design.task.angle_ranges import AngleRanges
 
 @dataclass(frozen=True, slots=True)
 class Folded:
-    """Classes of the axes, or of the scan planes, of the grid.
+    """Classes of the axes, or of the scan planes, of the grid."""
 
-    Attributes:
-        settings_deg: the two angles of each of the n axes or planes.
-        points: unit vectors of the axes (n, 3), or (q0, q1) of the scan planes (n, 2).
-        classes: class of each.
-        flip: whether each is the opposite of the first one of its class.
-        first: index of the first one of each class.
-        has: whether a class has a member that is not flipped, and one that is.
-        own: whether a class equals its opposite.
-    """
-
-    settings_deg: Float[ndarray, "n 2"]
-    points: Float[ndarray, "n k"]
-    classes: Int64[ndarray, " n"]
-    flip: Bool[ndarray, " n"]
-    first: Int64[ndarray, " classes"]
-    has: Bool[ndarray, "2 classes"]
-    own: Bool[ndarray, " classes"]
+    settings_deg: Float[ndarray, "n 2"]  # the two angles of each of the n axes or planes
+    points: Float[ndarray, "n k"]  # unit vectors of the axes (n, 3), or (q0, q1) of the scan planes (n, 2)
+    classes: Int64[ndarray, " n"]  # class of each
+    flip: Bool[ndarray, " n"]  # whether each is the opposite of the first one of its class
+    first: Int64[ndarray, " classes"]  # index of the first one of each class
+    has: Bool[ndarray, "2 classes"]  # whether a class has a member that is not flipped, and one that is
+    own: Bool[ndarray, " classes"]  # whether a class equals its opposite
 
     @property
     def representatives(self) -> Float[ndarray, "classes k"]:

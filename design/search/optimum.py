@@ -54,12 +54,6 @@ class Optimum:
         verb = "out and back" if task.motion.mode == "sweep" else "one turn"
         return f"{task.sensor}, {verb} in {task.motion.duration_s:g} s"
 
-    @property
-    def long_title(self) -> str:
-        """`title`, and the origin of the duration."""
-        shortest = isinstance(self.requested.task.motion, Shortest)
-        return f"{self.title}, the shortest found that keeps the limits" if shortest else self.title
-
     def angle_set(self, rank: int = 0) -> AngleSet:
         """Return the designed angles of a family of the search, 0 is the best."""
         return angle_set(self.loaded, self.search.best[rank])
@@ -112,10 +106,11 @@ class Optimum:
         """Return the result as lines; `in_full` with the skipped work."""
         result = self.search
         skipped = self.left_out if in_full else ()
+        shortest = isinstance(self.requested.task.motion, Shortest)
         return [
             *self.table(),
             *gain_lines(self.gains),
-            self.long_title,
+            f"{self.title}, the shortest found that keeps the limits" if shortest else self.title,
             f"searched {result.covered:,} mounts in {result.seconds:.1f} s ({result.evaluated:,} values of J computed)",
             *(f"skipped {entry.what}: {entry.why} ({entry.saved:,} {entry.unit})" for entry in skipped),
         ]

@@ -35,19 +35,12 @@ def gathered(
 
 @dataclass(frozen=True, slots=True)
 class Lowest:
-    """The lowest J of each plane and about each axis.
+    """The lowest J of each plane and about each axis."""
 
-    Attributes:
-        by_plane: lowest J of a plane class, not flipped and flipped, over the axes of the grid, (2, planes).
-        its_class: class of the axis with that J, (2, planes).
-        its_flip: whether that axis is flipped, (2, planes).
-        by_axis: lowest J about an axis class, not flipped and flipped, over the planes of the grid, (2, axes).
-    """
-
-    by_plane: Array
-    its_class: Ints
-    its_flip: Ints
-    by_axis: Array
+    by_plane: Array  # lowest J of a plane class, not flipped and flipped, over the axes of the grid, (2, planes)
+    its_class: Ints  # class of the axis with that J, (2, planes)
+    its_flip: Ints  # whether that axis is flipped, (2, planes)
+    by_axis: Array  # lowest J about an axis class, not flipped and flipped, over the planes of the grid, (2, axes)
 
 
 def lowest(

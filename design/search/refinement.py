@@ -38,23 +38,14 @@ PAIRS = slice(0, 2), slice(2, 4)  # of the axis, and of the scan plane
 
 @dataclass(frozen=True, slots=True)
 class SimplexRun:
-    """Parameters of one run of the simplex method.
+    """Parameters of one run of the simplex method."""
 
-    Attributes:
-        reach: first step along each coordinate, in steps of the grid.
-        nodes: of the quadrature of J.
-        size_deg: largest size in each coordinate at the end.
-        spread: largest difference of values at the end.
-        values: largest number of values for each coordinate.
-        blind_cost: of `SearchSpace.J`.
-    """
-
-    reach: float
-    nodes: int
-    size_deg: float
-    spread: float
-    values: int
-    blind_cost: float
+    reach: float  # first step along each coordinate, in steps of the grid
+    nodes: int  # of the quadrature of J
+    size_deg: float  # largest size in each coordinate at the end
+    spread: float  # largest difference of values at the end
+    values: int  # largest number of values for each coordinate
+    blind_cost: float  # of `SearchSpace.J`
 
 
 WIDE = SimplexRun(0.5, 243, 0.1, 1e-4, 60, 10.0)
@@ -64,21 +55,13 @@ NARROW = SimplexRun(0.1, 1215, 0.005, 1e-7, 30, 1000.0)
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """State of the refinement of one mount of the grid.
+    """State of the refinement of one mount of the grid."""
 
-    Attributes:
-        start: index of the mount.
-        any_axis: whether J does not depend on its axis, which then stays.
-        angles_deg: the refined angles.
-        J: of these, on the nodes of the runs; with a tolerance of the mounting the highest within it.
-        gain: expected gain of the next run.
-    """
-
-    start: int
-    any_axis: bool
-    angles_deg: Setting
-    J: float = np.inf
-    gain: float = np.inf
+    start: int  # index of the mount
+    any_axis: bool  # whether J does not depend on its axis, which then stays
+    angles_deg: Setting  # the refined angles
+    J: float = np.inf  # of these, on the nodes of the runs; with a tolerance of the mounting the highest within it
+    gain: float = np.inf  # expected gain of the next run
 
 
 def descended(space: SearchSpace, starts: list[tuple[Setting, bool]], most: int, progress: Progress) -> list[Descent]:

@@ -84,17 +84,16 @@ def search(
     space = SearchSpace(problem, ranges, limits, avoid_holes=ranges.holes == "avoid")
     progress(_size_words(space))
     least_blind = None
-    result = _best(space, progress, effort)
-    if space.avoid_holes and problem.sweep is not None and result.candidate is None:
+    land, exact, winner = _best(space, progress, effort)
+    if space.avoid_holes and problem.sweep is not None and winner is None:
         space = replace(space, to_the_outline=False)
-        result = replace(result, candidate=best_candidate(result.land, space))
-    if space.avoid_holes and result.candidate is None:  # every mount has a blind spot: use the lowest J
+        winner = best_candidate(land, space)
+    if space.avoid_holes and winner is None:  # every mount has a blind spot: use the lowest J
         _reject_blinding_limits(space, progress, effort)
-        least_blind = _least_blind(result.land)
+        least_blind = _least_blind(land)
         progress("no mount of the grid sees all of the region: the lowest J of all")
         space = replace(space, avoid_holes=False)
-        result = _best(space, progress, effort)
-    land, winner = result.land, result.candidate
+        land, exact, winner = _best(space, progress, effort)
     if winner is None:
         raise TaskError(_none_keeps(land, limits))
     coarse_land = land
@@ -114,7 +113,7 @@ def search(
         covered=space.covered,
         evaluated=space.different,
         seconds=time.perf_counter() - start,
-        left_out=_left_out(space, len(space.planes.first) - result.exact),
+        left_out=_left_out(space, len(space.planes.first) - exact),
         lowest=families[0] if simple else None,
         planes=_plane_table(land),
         axes=np.column_stack([axes.settings_deg, land.plain.by_axis[axes.flip.astype(int), axes.classes]]),
@@ -154,29 +153,18 @@ def with_starts(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Best:
-    """The best mount of a grid.
+def _best(space: SearchSpace, progress: Progress, effort: Effort) -> tuple[Landscape, int, Candidate | None]:
+    """Return the landscape of a grid, its number of planes with exact J, and its best mount within the limits, if any.
 
-    Attributes:
-        land: the landscape; its density limit can be above that of the task, to meet that between the nodes.
-        exact: number of scan planes with exact J.
-        candidate: the mount; None if none meets the limits.
+    The density limit of the landscape can be above that of the task, to meet that between the nodes.
     """
-
-    land: Landscape
-    exact: int
-    candidate: Candidate | None
-
-
-def _best(space: SearchSpace, progress: Progress, effort: Effort) -> _Best:
     stricter = space
     while True:
         land, exact = coarse_landscape(stricter, progress, effort)
         candidate = best_candidate(land, space)
         density = stricter.limits.min_density
         if candidate is not None or density is None or not np.isfinite(land.feasible.by_plane).any():
-            return _Best(land, exact, candidate)
+            return land, exact, candidate
         stricter = replace(stricter, limits=stricter.limits.model_copy(update={"min_density": DENSER * density}))
 
 
@@ -189,9 +177,9 @@ def _reject_blinding_limits(space: SearchSpace, progress: Progress, effort: Effo
     limits = space.limits.model_copy(update={"max_line_gap_deg": None, "max_blind_cone_deg": None})
     if limits == space.limits:
         return
-    free = _best(replace(space, limits=limits), progress, effort)
-    if free.candidate is not None:
-        raise TaskError(blinding_words(space.problem, space.limits, free.candidate.angles_deg))
+    _, _, free = _best(replace(space, limits=limits), progress, effort)
+    if free is not None:
+        raise TaskError(blinding_words(space.problem, space.limits, free.angles_deg))
 
 
 def _size_words(space: SearchSpace) -> str:

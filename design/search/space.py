@@ -24,21 +24,14 @@ from scanwright.design.task.task import Limits
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """The mounts of a search and their limits.
+    """The mounts of a search and their limits."""
 
-    Attributes:
-        problem: the task as numbers.
-        ranges: of the angles.
-        limits: of the task.
-        avoid_holes: whether a mount with a blind spot is rejected.
-        to_the_outline: whether a sweep with a blind spot that lies between the directions of a score, and reaches the
-            outline of the region, is rejected too.
-    """
-
-    problem: Problem
-    ranges: AngleRanges
-    limits: Limits
-    avoid_holes: bool
+    problem: Problem  # the task as numbers
+    ranges: AngleRanges  # of the angles
+    limits: Limits  # of the task
+    avoid_holes: bool  # whether a mount with a blind spot is rejected
+    # whether a sweep with a blind spot that lies between the directions of a score, and reaches the outline of the
+    # region, is rejected too
     to_the_outline: bool = True
     _scores: dict[tuple[float, ...], Score] = field(default_factory=dict, init=False, repr=False, compare=False)
 

@@ -60,27 +60,16 @@ class Workshop(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The best mount with its parts.
+    """The best mount with its parts."""
 
-    Attributes:
-        family: its angles, and its J with the parts.
-        bare: its J without parts.
-        shadow: the beams that the parts block.
-        bounded: number of mounts with a bound.
-        built: number of mounts whose solids were made.
-        refused: J without parts and the reason, for each rejected mount.
-        open: families with a bound below the best J that were not built because of `MOST_BUILT`.
-        worse: families with a lower J without parts that are worse with them.
-    """
-
-    family: Family
-    bare: Score
-    shadow: SelfOcclusion
-    bounded: int
-    built: int
-    refused: tuple[tuple[float, str], ...]
-    open: int
-    worse: int = 0
+    family: Family  # its angles, and its J with the parts
+    bare: Score  # its J without parts
+    shadow: SelfOcclusion  # the beams that the parts block
+    bounded: int  # number of mounts with a bound
+    built: int  # number of mounts whose solids were made
+    refused: tuple[tuple[float, str], ...]  # J without parts and the reason, for each rejected mount
+    open: int  # families with a bound below the best J that were not built because of `MOST_BUILT`
+    worse: int = 0  # families with a lower J without parts that are worse with them
 
     def lines(self) -> list[str]:
         """Return the chosen mount, and the rejected ones with reasons."""

@@ -40,19 +40,12 @@ FINER = 1, 3, 9, 27  # times the nodes, until the sum of the weights is correct
 
 @dataclass(frozen=True, slots=True)
 class PolarRule:
-    """Quadrature over the polar angle about an axis.
+    """Quadrature over the polar angle about an axis."""
 
-    Attributes:
-        polar_rad: nodes, shape (n,).
-        fine: contribution of each node to the integral of the weight, shape (n,).
-        coarse: the same for the rule with a third of the nodes, 0 at the others, shape (n,).
-        segment: index of the segment of each node, shape (n,).
-    """
-
-    polar_rad: Float[ndarray, " n"]
-    fine: Float[ndarray, " n"]
-    coarse: Float[ndarray, " n"]
-    segment: Int64[ndarray, " n"]
+    polar_rad: Float[ndarray, " n"]  # nodes, shape (n,)
+    fine: Float[ndarray, " n"]  # contribution of each node to the integral of the weight, shape (n,)
+    coarse: Float[ndarray, " n"]  # the same for the rule with a third of the nodes, 0 at the others, shape (n,)
+    segment: Int64[ndarray, " n"]  # index of the segment of each node, shape (n,)
 
     def own_error(self) -> float:
         """Return an estimate of the error of the sum of weights, from the rule with a third of the nodes."""

@@ -52,19 +52,12 @@ _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """Painted regions as numbers.
+    """Painted regions as numbers."""
 
-    Attributes:
-        rows: kind, twelve parameters and value of each region, in painting order.
-        planes: (m, c) of each edge of a band, a cone or a rectangle.
-        map_planes: the same for map cells.
-        tables: the maps, padded to one shape.
-    """
-
-    rows: Float[ndarray, "regions 14"]
-    planes: Float[ndarray, "edges 4"]
-    map_planes: Float[ndarray, "cell_edges 4"]
-    tables: Float[ndarray, "maps rows columns"]
+    rows: Float[ndarray, "regions 14"]  # kind, twelve parameters and value of each region, in painting order
+    planes: Float[ndarray, "edges 4"]  # (m, c) of each edge of a band, a cone or a rectangle
+    map_planes: Float[ndarray, "cell_edges 4"]  # the same for map cells
+    tables: Float[ndarray, "maps rows columns"]  # the maps, padded to one shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)

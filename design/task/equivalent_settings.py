@@ -79,19 +79,12 @@ _SYMMETRIES = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Equivalent:
-    """A setting within the ranges that sees the same as one outside.
+    """A setting within the ranges that sees the same as one outside."""
 
-    Attributes:
-        setting: range of each angle in degrees.
-        gamma_sign: sign of the servo's angle, relative to the original.
-        gamma_added_deg: added to the servo's angle after that.
-        mirrored: whether the scan is the mirror image: equal J for full turns, another scan in a sweep.
-    """
-
-    setting: dict[str, Span]
-    gamma_sign: int
-    gamma_added_deg: float
-    mirrored: bool
+    setting: dict[str, Span]  # range of each angle in degrees
+    gamma_sign: int  # sign of the servo's angle, relative to the original
+    gamma_added_deg: float  # added to the servo's angle after that
+    mirrored: bool  # whether the scan is the mirror image: equal J for full turns, another scan in a sweep
 
 
 def equivalents_within(setting: Setting) -> list[Equivalent]:

@@ -1,7 +1,7 @@
 """`scanwright assemble`: recording and angle set become point clouds.
 
 Chunks of the recording become blocks of scans, blocks become rows, rows are written. Only the joint log, the times of
-the scans and the poses are in memory. `deskew` describes the position of a beam.
+the scans and the poses are in memory. `deskew_kernel` describes the position of a beam.
 """
 
 from __future__ import annotations

@@ -23,15 +23,7 @@ def cloud_fields(has_intensity: bool, columns: Iterable[str] = COLUMNS) -> np.dt
 def cloud_rows(
     block: Block, placed: PlacedBlock, fields: np.dtype[np.void], start_ns: int, width: int
 ) -> NDArray[np.void]:
-    """Return rows of a cloud, shape (scans, width); those after the last beam are NaN.
-
-    Args:
-        block: scans.
-        placed: their beams in the world.
-        fields: of `cloud_fields`.
-        start_ns: origin of time_s.
-        width: at least the beams of a scan.
-    """
+    """Return rows of a cloud, shape (scans, width); those after the last beam are NaN. `start_ns`: time_s is 0."""
     scans, beams = block.range_m.shape
     rows = np.empty((scans, width), fields)
     point = rows.getfield("V12")  # x y z together, three times faster than three columns

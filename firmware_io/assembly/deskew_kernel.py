@@ -1,4 +1,8 @@
-"""Compiled de-skew of `deskew` for many scans at a time, on all cores.
+"""De-skew: transformation of each beam with the frames at its time, compiled, for many scans on all cores.
+
+A beam of time t, range r and bearing b is at
+
+    p_map = T_map_world(t) @ T_world_laser(joint(t + lag)) @ [r cos b, r sin b, 0, 1]
 
 The chain needs no matrix for each beam: the joint turns about the z of the rotation frame, and the platform, between
 two of its poses, about one axis that a constant rotation turns to z. The rest is a range times a direction (a table,
@@ -48,7 +52,7 @@ def place_block(
     own_body: OwnBody | None = None,
     with_joint: bool = True,
 ) -> PlacedBlock:
-    """Place scans as `deskew.place` does, compiled and on all cores; points differ by the rounding to float32."""
+    """Place scans in the world, or on the map of `poses`; the beam of time t has the angle logged at t + lag_s."""
     scans, beams = block.range_m.shape
     curve = straight(joint) if isinstance(joint, JointLog) else joint
     fan = _fan(block.first, angles, own_body)

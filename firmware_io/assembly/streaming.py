@@ -14,7 +14,6 @@ up to a fifth too small near the end of a spline: `python -m benchmarks.firmware
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections import Counter, deque
 from dataclasses import dataclass
 
@@ -24,7 +23,7 @@ from numpy import ndarray
 
 from scanwright.design.angles import AngleSet
 from scanwright.design.errors import RecordingError
-from scanwright.firmware_io.assembly.axis_window import HISTORY_NS, AxisWindow
+from scanwright.firmware_io.assembly.axis_window import HISTORY_NS, AxisWindow, NewestValues
 from scanwright.firmware_io.assembly.deskew_kernel import place_block
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.poses.trajectory import Trajectory, trajectory_of
@@ -93,7 +92,7 @@ class Assembler:
         self._lag_s, self._lag_ns = lag_s, round(lag_s * 1e9)
         self._behind_ns = self._lag_ns + round(self.latency_s * 1e9)
         self._axis = AxisWindow(self.latency_s)
-        self._poses = _PoseWindow() if with_poses else None
+        self._poses = NewestValues(_MOST_POSES) if with_poses else None
         self._waiting: deque[Scan] = deque()
 
     def push(self, what: Scan | JointSample | PoseSample) -> list[ScanPoints]:
@@ -121,7 +120,7 @@ class Assembler:
         elif sample.time_ns <= self._axis.last_ns:
             self.left_out["angles not later than the one before"] += 1
         else:
-            self._axis.add(sample)
+            self._axis.add(sample.time_ns, sample.position_rad)
 
     def _add_pose(self, sample: PoseSample) -> None:
         if self._poses is None:
@@ -156,12 +155,19 @@ class Assembler:
                 curve,
                 self._angles,
                 self._lag_s,
-                poses=None if self._poses is None else self._poses.trajectory(first_ns, last_ns),
+                poses=self._trajectory(first_ns, last_ns),
                 own_body=self._own_body,
             )
             rows = zip(placed.points_m, placed.joint_rad, placed.verdict, strict=True)
             out += [ScanPoints(next(remaining), *row, error_rad) for row in rows]
         return out
+
+    def _trajectory(self, first_ns: int, last_ns: int) -> Trajectory | None:
+        """Return the poses around these times, `_NO_POSES` of fewer than two; None for a platform at rest."""
+        if self._poses is None:
+            return None
+        time_ns, numbers = self._poses.around(first_ns, last_ns)
+        return trajectory_of(time_ns, numbers) if len(time_ns) > 1 else _NO_POSES
 
     def _forget(self) -> None:
         """Drop the samples and poses before all waiting and future scans."""
@@ -177,31 +183,3 @@ def _end_ns(scan: Scan) -> int:
     if scan.beam_offset_ns is not None:
         return scan.stamp_ns + (int(scan.beam_offset_ns[-1]) if scan.beam_offset_ns.size else 0)
     return scan.stamp_ns + round(max(scan.range_m.size - 1, 0) * (scan.time_increment_s * 1e9))
-
-
-class _PoseWindow:
-    """The newest poses of the platform."""
-
-    def __init__(self) -> None:
-        self._time_ns: list[int] = []
-        self._numbers: list[tuple[float, ...]] = []
-
-    @property
-    def last_ns(self) -> int:
-        return self._time_ns[-1] if self._time_ns else -(2**62)
-
-    def add(self, time_ns: int, numbers: tuple[float, ...]) -> None:
-        self._time_ns.append(time_ns)
-        self._numbers.append(numbers)
-
-    def forget(self, before_ns: int) -> None:
-        first = max(bisect_right(self._time_ns, before_ns) - 1, len(self._time_ns) - _MOST_POSES)
-        if first > 0:
-            del self._time_ns[:first], self._numbers[:first]
-
-    def trajectory(self, first_ns: int, last_ns: int) -> Trajectory:
-        """Return the poses around these times; `_NO_POSES` if there are fewer than two."""
-        near = slice(max(bisect_left(self._time_ns, first_ns) - 1, 0), bisect_right(self._time_ns, last_ns) + 1)
-        if len(self._time_ns[near]) < 2:
-            return _NO_POSES
-        return trajectory_of(self._time_ns[near], self._numbers[near])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Int64
+from jaxtyping import Float64, Int64
 from numpy import ndarray
 
 from scanwright.firmware_io.samples import JointLog
@@ -23,7 +23,7 @@ def turn_starts(log: JointLog, begin_ns: int, turn_rad: float) -> Int64[ndarray,
     later = log.time_ns > begin_ns
     time_ns = np.append(begin_ns, log.time_ns[later])
     position = np.append(log.angle_at(np.array([begin_ns])), log.position_rad[later])
-    back = _turning_points(position.tolist())
+    back = turning_points(position)
     starts = [time_ns[back]]
     for first, last in pairwise([0, *back, position.size - 1]):
         turned = np.maximum.accumulate(np.abs(position[first : last + 1] - position[first]))
@@ -33,17 +33,17 @@ def turn_starts(log: JointLog, begin_ns: int, turn_rad: float) -> Int64[ndarray,
     return np.unique(np.concatenate(starts))
 
 
-def _turning_points(position: list[float]) -> list[int]:
+def turning_points(position_rad: Float64[ndarray, " n"]) -> list[int]:
     """Return the indices of the extremes from which the axis reverses by more than noise."""
-    turning = []
-    sense, extreme = 0, 0
-    for i, here in enumerate(position):
-        ahead = (here - position[extreme]) * (sense or 1)
-        if sense == 0 and abs(ahead) > _NOISE_RAD:
-            sense, extreme = (1 if ahead > 0 else -1), i
-        elif sense and ahead >= 0:
-            extreme = i
-        elif sense and ahead < -_NOISE_RAD:
-            turning.append(extreme)
-            sense, extreme = -sense, i
+    turning: list[int] = []
+    sense, extreme, extreme_rad = 0, 0, float(position_rad[0])
+    for i, here_rad in enumerate(position_rad.tolist()):
+        ahead_rad = (here_rad - extreme_rad) * (sense or 1)
+        if sense and ahead_rad >= 0:
+            extreme, extreme_rad = i, here_rad
+        elif ahead_rad < -_NOISE_RAD or (not sense and ahead_rad > _NOISE_RAD):
+            if sense:
+                turning.append(extreme)
+            sense = -sense or (1 if ahead_rad > 0 else -1)
+            extreme, extreme_rad = i, here_rad
     return turning

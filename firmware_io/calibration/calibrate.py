@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,11 +19,10 @@ from scanwright.firmware_io.assembly.assemble import about_sensor
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.entropy import witness
 from scanwright.firmware_io.calibration.estimate import Estimate, estimate
-from scanwright.firmware_io.calibration.lag import find_lag
 from scanwright.firmware_io.calibration.model import Mount, gather, start_vector
 from scanwright.firmware_io.calibration.report import calibration_report, lines
 from scanwright.firmware_io.calibration.tiles import fan_side
-from scanwright.firmware_io.recording.recording import Recording, open_recording
+from scanwright.firmware_io.recording.recording import open_recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +67,7 @@ def calibrate_recordings(
 ) -> Calibration:
     """Write the calibrated angle set to `out`, unless the result is faulty, and the record to `report_path(out)`.
 
-    Args:
-        recordings: of static scenes, possibly of several places.
-        angles: of their scanner; the search starts at its delta and lever arm.
-        out: the calibrated angle set, `.json`.
-        one_place: the scanner did not move between the recordings.
-        own_body: self-occlusion mask.
-        progress: callback.
+    The arguments are those of `scanwright.calibrate`; the search starts at the delta and lever arm of `angles`.
 
     Raises:
         RecordingError: a recording is unreadable, or they do not show the mounting errors; nothing is written.
@@ -96,10 +88,9 @@ def calibrate_recordings(
     progress(f"calibrating from {beams.range_m.size:,} beams (the first run compiles the numerics)")
     try:
         result = estimate(beams, mount, start)
-    except RecordingError as refusal:
-        progress("estimating the time offset of the angles")
+    except RecordingError as error:
         named = ", ".join(str(path) for path in recordings)
-        raise RecordingError(f"{named}: {'. '.join([str(refusal) + _late(opened), *sensor])}") from refusal
+        raise RecordingError(f"{named}: {'. '.join([str(error), *sensor])}") from error
     progress("comparing with the entropy of the cloud")
     seen = witness(mount, beams, fan_side(beams, mount), start, result.x, result.noise_m)
     record = {
@@ -115,20 +106,6 @@ def calibrate_recordings(
             with atomic_write(out, RecordingError) as angles_part:
                 angles_part.write_text(calibration.angles.to_json(), encoding="utf-8")
     return calibration
-
-
-def _late(opened: Sequence[Recording]) -> str:
-    """Return the time offset of recordings that do not show the mounting errors; "" if they do not show it either."""
-    for recording in opened:
-        with suppress(RecordingError):
-            lag = find_lag(recording)
-            if abs(lag.late_s) < 2 * lag.sd_s:
-                return f". Its angles show no delay, with an uncertainty of {lag.sd_s:.3f} s"
-            return (
-                f". There and back, {recording.path.name} agrees best with angles {lag.late_s:.3f} +- {lag.sd_s:.3f} s "
-                f"late, in which 0.1 deg of backlash would be {math.radians(0.05) / lag.speed_rad_s:.3f} s"
-            )
-    return ""
 
 
 def report_path(out: Path) -> Path:

@@ -144,13 +144,13 @@ def _coarse(
     grouping = group(tiles, mount, x, near_m, *np.radians([turn_deg, _VAGUE_DEG]))
     on = grouping.surface >= 0
     variance = tiles.variance_m2 / tiles.count
-    plane = _planes(grouping)
+    plane = grouping.planes
     slant = np.sum(plane * beam_rays(mount, x, tiles.middle.under(x))[1], axis=1) / np.linalg.norm(plane, axis=1)
     weight = 1 / (variance + (_TRUST * near_m / slant) ** 2)[on]
     own, tile = tiles.middle.select(on), np.flatnonzero(on)
     for _ in range(_STEPS):
         x, grouping, _ = _iterated(mount, x, free, grouping, own, tile, weight, 0.0)
-    normal = sums(mount, x, own.under(x), tile, 1 / variance[on], _planes(grouping))
+    normal = sums(mount, x, own.under(x), tile, 1 / variance[on], grouping.planes)
     return x, grouping, normal
 
 
@@ -165,13 +165,8 @@ def _iterated(
     bulge: float,
 ) -> tuple[Floats, Grouping, Floats]:
     """Do one Gauss-Newton step; return its sums."""
-    normal = sums(mount, x, beams.under(x), tile, weight, _planes(grouping))
+    normal = sums(mount, x, beams.under(x), tile, weight, grouping.planes)
     dx, dq = step(reduced(normal, grouping, free, bulge))
     x = x.copy()
     x[free] += dx
     return x, replace(grouping, q=grouping.q + dq), normal
-
-
-def _planes(grouping: Grouping) -> Floats:
-    """Return the plane of each tile, shape (m, 3); of the first surface if it has none."""
-    return grouping.q[np.maximum(grouping.surface, 0)]

@@ -110,11 +110,8 @@ def gather(
 ) -> tuple[ReturnedBeams, dict[str, int]]:
     """Return all beams with a return and an angle, and the counts of dropped ones by reason.
 
-    Args:
-        recordings: of static scenes.
-        one_place: the scanner did not move between the recordings.
-        own_body: self-occlusion mask; parts of the rotor are walls that agree with any error.
-        gamma_rot_rad: axis angle at joint position 0, for the mask.
+    `one_place`: the scanner did not move between the recordings; `gamma_rot_rad`: axis angle at joint position 0, for
+    the self-occlusion mask. Parts of the rotor would be walls that agree with any error.
     """
     ranges, bearings, numbers, times = [], [], [], []
     verdicts = np.zeros(len(Verdict), np.int64)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
 from numpy import ndarray
 
-from scanwright.design.arrays import Floats
 from scanwright.firmware_io.calibration.entropy import Witness
 from scanwright.firmware_io.calibration.estimate import Estimate
 from scanwright.firmware_io.calibration.model import COUNT, LAG, MOUNT, PARAMETERS, Mount, ReturnedBeams
 from scanwright.firmware_io.calibration.scene_motion.overlapping_views import OverlappingViews, overlapping_views
-from scanwright.firmware_io.calibration.solve import Grouping, heights, planes_alone, rms, sums
+from scanwright.firmware_io.calibration.solve import heights, planes_alone, rms, sums
 
 _WALLS = 3  # largest ones, whose straightness is reported
 _FEW = 3  # ray conflicts caused by a slim object
@@ -24,38 +22,30 @@ _LESS_CRISP = "the cloud has become less crisp (higher entropy)"
 _SURE = 2.0  # standard deviations, from which on a delay is a result
 
 
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """Residuals of beams and planes for one vector of parameters."""
+def _agreement(result: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> tuple[float, tuple[float, ...]]:
+    """Return residuals of the beams of a calibration for any parameters, with refitted planes.
 
-    residual_m: float  # root mean square of the ranges' residuals about their surfaces
-    walls_m: tuple[float, ...]  # rms height, per side of the scan plane and square metre, of the largest surfaces
-
-
-def agreement(result: Estimate, mount: Mount, x: Float64[ndarray, " parameters"]) -> Agreement:
-    """Return the residuals of the beams of a calibration for any parameters, with refitted planes."""
+    Returns:
+        The rms of the ranges about their surfaces [m], and the rms heights, per side of the scan plane and square
+        metre, of the largest surfaces [m].
+    """
     tiles, grouping = result.tiles, result.grouping
     on = result.clear & (grouping.surface[tiles.tile] >= 0)
     beams, tile = tiles.beams.select(on).late_by(x[LAG[0]]), tiles.tile[on]
     weight = np.ones(tile.size)
     grouping = planes_alone(mount, x, beams, tile, weight / result.noise_m**2, grouping)
-    normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)], kink=np.inf)
-    return Agreement(rms(normal, float(tile.size)), _straightness(result, normal, grouping))
-
-
-def _straightness(result: Estimate, normal: Floats, grouping: Grouping) -> tuple[float, ...]:
-    used, tiles = grouping.used, result.tiles
+    normal = sums(mount, x, beams, tile, weight, grouping.planes, kink=np.inf)
+    used = grouping.used
     height_m, weight = heights(normal[used])
     surface = grouping.surface[used]
-    size = np.bincount(surface, tiles.count[used])
     walls = []
-    for wall in np.argsort(size)[::-1][:_WALLS]:
+    for wall in np.argsort(np.bincount(surface, tiles.count[used]))[::-1][:_WALLS]:
         mine = surface == wall
         _, label = np.unique(2 * grouping.spot[used][mine] + tiles.side[used][mine], return_inverse=True)
         total = np.bincount(label, weight[mine])
         mean = np.bincount(label, weight[mine] * height_m[mine]) / total
         walls.append(float(np.sqrt(mean**2 @ total / total.sum())))
-    return tuple(walls)
+    return rms(normal, float(tile.size)), tuple(walls)
 
 
 def calibration_report(
@@ -67,7 +57,9 @@ def calibration_report(
     applied = start.copy()
     applied[[*MOUNT, *LAG]] = result.x[[*MOUNT, *LAG]]
     fits = {"before": start, "after": result.x, "as_assembled": applied}
-    fit = {name: agreement(result, mount, x) for name, x in fits.items()}
+    residual_m, walls_m = {}, {}
+    for name, x in fits.items():
+        residual_m[name], walls_m[name] = _agreement(result, mount, x)
     views = overlapping_views(mount, result.x, beams, result.tiles.noise_m)
     return {
         "schema": "scanwright/calibration/1",
@@ -95,7 +87,7 @@ def calibration_report(
         "held": [{"names": list(fixed.names), "words": fixed.words, "why": fixed.why} for fixed in result.choice.fixed],
         "notes": [
             *result.choice.notes,
-            *_motion_warnings(result, views, beams, fit["after"].residual_m),
+            *_motion_warnings(result, views, beams, residual_m["after"]),
         ],
         "faults": [*_moved(result), *([_LESS_CRISP] if witness.less_crisp else [])],
         "drift": [
@@ -114,8 +106,8 @@ def calibration_report(
         },
         "range_noise_mm": result.noise_m * 1e3,
         "wall_bulge_mm": result.bulge_m * 1e3,
-        "residual_mm": {name: each.residual_m * 1e3 for name, each in fit.items()},
-        "wall_straightness_mm": {name: [wall * 1e3 for wall in each.walls_m] for name, each in fit.items()},
+        "residual_mm": {name: 1e3 * each for name, each in residual_m.items()},
+        "wall_straightness_mm": {name: [1e3 * wall for wall in each] for name, each in walls_m.items()},
         "entropy": {
             "kernel_mm": witness.width_m * 1e3,
             "before": witness.before,

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from numba import njit
 from numpy import ndarray
+from scipy.sparse import csr_array
 
 from scanwright.design.arrays import Array, Floats, Ints
 from scanwright.firmware_io.calibration.model import COUNT, Mount, ReturnedBeams
@@ -44,6 +45,11 @@ class Grouping:
         """Tiles with a surface."""
         return np.flatnonzero(self.surface >= 0)
 
+    @property
+    def planes(self) -> Floats:
+        """Plane of each tile, shape (m, 3); that of the first surface for a tile without one."""
+        return self.q[np.maximum(self.surface, 0)]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reduced:
@@ -65,14 +71,8 @@ def sums(
 ) -> Float64[ndarray, "tiles width width"]:
     """Return the normal equations of each tile, shape (m, WIDTH, WIDTH).
 
-    Args:
-        mount: of the laser.
-        x: parameters, shape (COUNT,).
-        beams: with the lag applied.
-        tile: of each beam, shape (n,).
-        weight: 1 / variance of each beam's range, shape (n,).
-        q: plane of each tile, shape (m, 3).
-        kink: standard deviations beyond which residuals count linearly (Huber).
+    `beams` include the lag; `tile`, `weight` (1 / variance of the range): of each beam, shape (n,); `q`: plane of each
+    tile, shape (m, 3); `kink`: standard deviations beyond which residuals count linearly (Huber).
     """
     return _sums(
         mount.plane(x), mount.along_m, x, beams.joint_rad, beams.speed_rad_s, beams.direction, beams.bearing_rad,
@@ -183,17 +183,9 @@ def _per_spot(grouping: Grouping, values: Floats) -> tuple[Floats, Ints]:
 
 def _summed(values: Floats, label: Ints, labels: int) -> Floats:
     """Return rows summed by label, zero for a label without rows; skips those of label -1."""
-    out = np.zeros((labels, *values.shape[1:]))
-    _add(values.reshape(len(values), -1), label, out.reshape(labels, -1))
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _add(values: Array, label: Ints, out: Array) -> None:
-    for i in range(label.size):
-        if label[i] >= 0:
-            for k in range(out.shape[1]):
-                out[label[i], k] += values[i, k]
+    rows = np.flatnonzero(label >= 0)
+    of_label = csr_array((np.ones(rows.size), (label[rows], rows)), shape=(labels, len(values)))
+    return (of_label @ values.reshape(len(values), -1)).reshape(labels, *values.shape[1:])
 
 
 def step(part: Reduced) -> tuple[Floats, Floats]:
@@ -208,16 +200,11 @@ def covariance(part: Reduced) -> Float64[ndarray, "free free"]:
     """Return the covariance of the free parameters, shape (k, k); infinite if the information is singular."""
     scale = 1 / np.sqrt(np.maximum(np.diag(part.information), 1e-300))
     values, vectors = np.linalg.eigh(part.information * np.outer(scale, scale))
-    with np.errstate(divide="ignore"):
-        spread = np.where(values > 1e-11, 1 / values, np.inf)
-    if np.isinf(spread).any():
-        weak = np.abs(vectors[:, np.isinf(spread)]).max(axis=1) > 1e-3
-        spread = np.where(np.isinf(spread), 0.0, spread)
-        inverse = (vectors * spread) @ vectors.T
-        inverse[weak, :] = inverse[:, weak] = 0.0
-        inverse[weak, weak] = np.inf
-    else:
-        inverse = (vectors * spread) @ vectors.T
+    lost = values <= 1e-11
+    inverse = (vectors / np.where(lost, np.inf, values)) @ vectors.T
+    weak = np.abs(vectors[:, lost]).max(axis=1, initial=0.0) > 1e-3
+    inverse[weak, :] = inverse[:, weak] = 0.0
+    inverse[weak, weak] = np.inf
     return inverse * np.outer(scale, scale)
 
 
@@ -253,7 +240,7 @@ def planes_alone(
     """Fit the planes of the surfaces with fixed parameters."""
     none = np.array([], np.int64)
     for _ in range(_REFITS):
-        normal = sums(mount, x, beams, tile, weight, grouping.q[np.maximum(grouping.surface, 0)])
+        normal = sums(mount, x, beams, tile, weight, grouping.planes)
         grouping = replace(grouping, q=grouping.q + reduced(normal, grouping, none, 0.0).plane_rows[:, :, 0])
     return grouping
 

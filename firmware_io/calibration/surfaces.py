@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float64
-from numba import njit
 from numpy import ndarray
 
-from scanwright.design.arrays import Array, Floats, Ints, Mask
+from scanwright.design.arrays import Floats, Ints, Mask
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.calibration.model import Mount, beam_rays
 from scanwright.firmware_io.calibration.solve import Grouping
@@ -59,12 +58,12 @@ def group(
             continue
         n, c, mine = _grown(seed, left, place, point, normal, direction, weight, limit, near_m)
         left[seed] = False
-        if np.count_nonzero(mine) < _FEWEST:
+        if mine.size < _FEWEST:
             continue
         if abs(c) > _NEAREST_M:
             surface[mine] = len(planes)
             planes.append(n / c)
-        left &= ~mine
+        left[mine] = False
     if not planes:
         raise RecordingError(_NO_PLANE)
     cells = np.floor(point / _SPOT_M).astype(np.int64)
@@ -72,75 +71,40 @@ def group(
     return Grouping(surface, spot.ravel(), np.array(planes))
 
 
-@njit(cache=True, nogil=True)
 def _grown(
     seed: int,
     left: Mask,
     place: Ints,
-    point: Array,
-    normal: Array,
-    direction: Array,
-    weight: Array,
-    limit: Array,
+    point: Floats,
+    normal: Floats,
+    direction: Floats,
+    weight: Floats,
+    limit: Floats,
     near_m: float,
-) -> tuple[Array, float, Mask]:
+) -> tuple[Floats, float, Ints]:
     """Grow the plane n . p = c from a tile to the ends of its wall; return it and the remaining tiles in it."""
-    n, c = normal[seed].copy(), _dot(normal[seed], point[seed])
-    mine = np.zeros(left.size, np.bool_)
+    near = np.flatnonzero(left & (place == place[seed]))
+    points, normals, directions, limits = point[near], normal[near], direction[near], limit[near]
+    n, c, mine = normal[seed], float(normal[seed] @ point[seed]), near[:0]
     for _ in range(_REFITS):
-        count, same = 0, True
-        for i in range(left.size):
-            inside = (
-                left[i]
-                and place[i] == place[seed]
-                and abs(_dot(n, point[i]) - c) < near_m
-                and _dot(n, normal[i]) > limit[i]
-                and abs(_dot(n, direction[i])) > _GRAZING
-            )
-            count += inside
-            same &= inside == mine[i]
-            mine[i] = inside
-        if count < _FEWEST or same:
+        inside = (np.abs(points @ n - c) < near_m) & (normals @ n > limits) & (np.abs(directions @ n) > _GRAZING)
+        before, mine = mine, near[inside]
+        if mine.size < _FEWEST or np.array_equal(mine, before):
             break
-        n, c = _plane(mine, point, normal, weight)
+        n, c = _plane(points[inside], normals[inside], weight[mine])
     return n, c, mine
 
 
-@njit(inline="always")
-def _dot(a: Array, b: Array) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True, nogil=True)
-def _plane(mine: Mask, point: Array, normal: Array, weight: Array) -> tuple[Array, float]:
-    """Fit a plane to the marked points, with their normals if they are in a row.
-
-    In loops, as products and means of arrays would take three seconds to compile.
-    """
-    total, mean, n, spread = 0.0, np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    for i in range(mine.size):
-        if mine[i]:
-            total += weight[i]
-            for k in range(3):
-                mean[k] += weight[i] * point[i, k]
-                n[k] += weight[i] * normal[i, k]
-    for k in range(3):
-        mean[k] /= total
-    for i in range(mine.size):
-        if mine[i]:
-            for k in range(3):
-                for other in range(3):
-                    spread[k, other] += weight[i] * (point[i, k] - mean[k]) * (point[i, other] - mean[other])
-    values, vectors = np.linalg.eigh(spread)
-    length = np.sqrt(_dot(n, n))
+def _plane(points: Floats, normals: Floats, weight: Floats) -> tuple[Floats, float]:
+    """Fit the plane n . p = c to points, with their mean normal if they are in a row."""
+    mean, n = np.average(points, axis=0, weights=weight), weight @ normals
+    off = points - mean
+    values, vectors = np.linalg.eigh((off * weight[:, None]).T @ off)
     if values[1] < 1e-2 * values[2]:  # in a row
-        for k in range(3):
-            n[k] /= length
+        n = n / np.linalg.norm(n)
     else:
-        sign = 1.0 if _dot(vectors[:, 0], n) > 0 else -1.0
-        for k in range(3):
-            n[k] = sign * vectors[k, 0]
-    return n, _dot(n, mean)
+        n = vectors[:, 0] * (1.0 if vectors[:, 0] @ n > 0 else -1.0)
+    return n, float(n @ mean)
 
 
 def without_misfits(grouping: Grouping, misfit: Floats, beams: Ints) -> Grouping:

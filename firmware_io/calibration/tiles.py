@@ -10,19 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
-from numba import njit
+from jaxtyping import Float64, Int64
 from numpy import ndarray
 
-from scanwright.design.arrays import Array, Floats, Ints
+from scanwright.design.arrays import Floats, Ints
 from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.assembly.turns import turning_points
 from scanwright.firmware_io.calibration.model import Mount, ReturnedBeams, axis_angle, beam_rays
-from scanwright.firmware_io.samples import AxisCurve
 
 _WINDOWS_RAD = tuple(np.radians([6.0, 3.0, 1.5]))
 _LEAST = 12  # beams in a tile: three define a plane, the others check it
 _FEWEST = 50  # windows, whose median roughness is the noise
-_FLICKER_RAD = np.radians(1.0)  # above the backlash of any servo
 _ROUGHEST = 1.5  # times the noise; far or dark surfaces are noisier, edges far rougher
 _STEEPEST = np.cos(np.radians(84.0))  # grazing views beyond are dominated by roughness and beam width
 
@@ -58,39 +56,27 @@ class FlatTiles:
         return np.repeat(np.arange(self.count.size), self.count)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Flat:
-    """Candidates of one window size: their planes q (q . p = 1), information and roughness."""
-
-    start: Ints
-    q: Floats
-    information: Floats
-    rms_m: Floats
-    slant: Floats
-
-
 def flat_tiles(beams: ReturnedBeams, mount: Mount, x: Float64[ndarray, " parameters"]) -> FlatTiles:
     """Assign all beams to flat tiles; RecordingError without a flat window."""
     side, turned_back = fan_side(beams, mount), _turned_back(beams)
     noise_m = _noise(beams, side, turned_back, mount, x)
     left = np.arange(beams.range_m.size)
-    results: list[tuple[Ints, _Flat]] = []
+    parts = []
     for window_rad in _WINDOWS_RAD:
         order, start = _windows(beams, side, turned_back, left, window_rad)
-        flat = _fit(beams.select(order), start, mount, x)
-        freedom = np.maximum(np.diff(flat.start) - 3, 1)
-        with np.errstate(invalid="ignore"):
-            smooth = flat.rms_m < noise_m * (_ROUGHEST + 2.5 / np.sqrt(2 * freedom))
-            accepted = smooth & (flat.slant > _STEEPEST)
-        rows = np.repeat(accepted, np.diff(flat.start))
-        results.append((order[rows], _only(flat, accepted)))
+        q, information, rms_m, cosine = _fit(beams.select(order), start, mount, x)
+        count = np.diff(start)
+        roughest = _ROUGHEST + 2.5 / np.sqrt(2 * np.maximum(count - 3, 1))
+        flat = (rms_m < noise_m * roughest) & (cosine > _STEEPEST)
+        rows = np.repeat(flat, count)
+        parts.append((order[rows], count[flat], q[flat], information[flat], rms_m[flat]))
         left = order[~rows]
-    index = np.concatenate([order for order, _ in results])
+        if not left.size:
+            break
+    index, count, q, information, rms_m = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not index.size:
         raise RecordingError("no flat surface is in sight: a calibration needs walls, floors or other planes")
-    count = np.concatenate([np.diff(flat.start) for _, flat in results])
     start = np.append(0, np.cumsum(count))
-    q, information, rms_m = (np.concatenate([getattr(f, k) for _, f in results]) for k in ("q", "information", "rms_m"))
     own = beams.select(index)
     middle = _middle(own, start, mount, x, q)
     length = np.linalg.norm(q, axis=1)
@@ -138,72 +124,33 @@ def _turned_back(beams: ReturnedBeams) -> Int64[ndarray, " beams"]:
     back = np.zeros(beams.time_ns.size, np.int64)
     for k, curve in enumerate(beams.curves):
         mine = beams.recording == k
-        back[mine] = np.searchsorted(_reversals_ns(curve), beams.time_ns[mine])
+        back[mine] = np.searchsorted(curve.knot_ns[turning_points(curve.angle_at(curve.knot_ns))], beams.time_ns[mine])
     return back
 
 
-def _reversals_ns(curve: AxisCurve) -> list[int]:
-    """Return the times of the extremes of the axis before reversals by more than noise."""
-    results: list[int] = []
-    direction, furthest, at_ns = 0, float(curve.coefficient[0, 0]), int(curve.knot_ns[0])
-    for time_ns, angle_rad in zip(curve.knot_ns.tolist(), curve.angle_at(curve.knot_ns).tolist(), strict=True):
-        ahead = angle_rad - furthest
-        if direction * ahead > 0 or (direction == 0 and abs(ahead) > _FLICKER_RAD):
-            direction, furthest, at_ns = direction or (1 if ahead > 0 else -1), angle_rad, time_ns
-        elif direction and abs(ahead) > _FLICKER_RAD:
-            results.append(at_ns)
-            direction, furthest, at_ns = -direction, angle_rad, time_ns
-    return results
+def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Fit the plane q . p = 1 of each window by weighted least squares, as 1/r is linear in q.
 
-
-def _fit(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats) -> _Flat:
-    """Fit the plane q of each window by weighted least squares, as 1/r is linear in it."""
+    Returns:
+        q, its information, the rms of the ranges (infinite without a plane), and the mean cosine to the plane's normal.
+    """
     origin, direction = beam_rays(mount, x, beams)
     range_m = beams.range_m + x[4]
-    count = np.diff(start)
-    information, right = _normal_equations(origin, direction, range_m, start)
+    first, count = start[:-1], np.diff(start)
+    window = np.repeat(np.arange(count.size), count)
+    weight = (np.add.reduceat(range_m, first) / count)[window] ** 2  # converts a difference of 1/r to one of r
+    row = weight[:, None] * (direction + origin / range_m[:, None])
+    information = np.add.reduceat(row[:, :, None] * row[:, None, :], first)
+    right = np.add.reduceat(row * (weight / range_m)[:, None], first)
     enough = (count >= _LEAST) & (np.linalg.cond(information) < 1e12)
     information = np.where(enough[:, None, None], information, np.eye(3))
     q = np.linalg.solve(information, right[..., None])[..., 0]
-    square, slant = _misfits(origin, direction, range_m, start, q)
+    slant = np.sum(q[window] * direction, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        square /= np.maximum(count - 3, 1)
-        cosine = np.abs(slant) / count / np.linalg.norm(q, axis=1)
-    return _Flat(start, q, information, np.where(enough, np.sqrt(square), np.inf), cosine)
-
-
-@njit(cache=True, nogil=True)
-def _normal_equations(origin: Array, direction: Array, range_m: Array, start: Ints) -> tuple[Array, Array]:
-    """Return sums of each window: regressors with each other, shape (m, 3, 3), and with 1/r, shape (m, 3)."""
-    windows = start.size - 1
-    information, right = np.zeros((windows, 3, 3)), np.zeros((windows, 3))
-    row = np.zeros(3)
-    for w in range(windows):
-        weight = range_m[start[w] : start[w + 1]].mean() ** 2  # converts a difference of 1/r to one of r
-        for k in range(start[w], start[w + 1]):
-            for i in range(3):
-                row[i] = weight * (direction[k, i] + origin[k, i] / range_m[k])
-                right[w, i] += row[i] * weight / range_m[k]
-                for j in range(i + 1):
-                    information[w, i, j] += row[i] * row[j]
-        for i in range(3):
-            for j in range(i):
-                information[w, j, i] = information[w, i, j]
-    return information, right
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _misfits(origin: Array, direction: Array, range_m: Array, start: Ints, q: Array) -> tuple[Array, Array]:
-    """Return sums of each window: squared residuals of its ranges, and slants of its beams."""
-    square, slants = np.zeros(len(q)), np.zeros(len(q))
-    for w in range(len(q)):
-        a, b, c = q[w]
-        for k in range(start[w], start[w + 1]):
-            slant = a * direction[k, 0] + b * direction[k, 1] + c * direction[k, 2]
-            off = range_m[k] - (1 - a * origin[k, 0] - b * origin[k, 1] - c * origin[k, 2]) / slant
-            square[w] += off * off
-            slants[w] += slant
-    return square, slants
+        off = range_m - (1 - np.sum(q[window] * origin, axis=1)) / slant
+        rms_m = np.sqrt(np.add.reduceat(off**2, first) / np.maximum(count - 3, 1))
+        cosine = np.abs(np.add.reduceat(slant, first)) / count / np.linalg.norm(q, axis=1)
+    return q, information, np.where(enough, rms_m, np.inf), cosine
 
 
 def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x: Floats) -> float:
@@ -211,7 +158,7 @@ def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x:
     everything = np.arange(beams.range_m.size)
     for window_rad in reversed(_WINDOWS_RAD):
         order, start = _windows(beams, side, turned_back, everything, window_rad)
-        rough = _fit(beams.select(order), start, mount, x).rms_m
+        rough = _fit(beams.select(order), start, mount, x)[2]
         rough = rough[np.isfinite(rough)]
         if rough.size >= _FEWEST:
             return max(float(np.median(rough)), 1e-6)
@@ -220,12 +167,6 @@ def _noise(beams: ReturnedBeams, side: Ints, turned_back: Ints, mount: Mount, x:
         f"fewer than {_FEWEST} windows of {widest:.0f} x {widest:.0f} deg hold {_LEAST} beams: the scan is too coarse, "
         "or too short, to find flat surfaces; turn the axis more slowly or scan longer"
     )
-
-
-def _only(flat: _Flat, which: Bool[ndarray, " windows"]) -> _Flat:
-    count = np.diff(flat.start)[which]
-    start = np.append(0, np.cumsum(count))
-    return _Flat(start, flat.q[which], flat.information[which], flat.rms_m[which], flat.slant[which])
 
 
 def _middle(beams: ReturnedBeams, start: Ints, mount: Mount, x: Floats, q: Floats) -> ReturnedBeams:

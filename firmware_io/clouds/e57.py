@@ -47,9 +47,7 @@ _STRUCTURE = {"cartesianInvalidState", "sphericalInvalidState", "rowIndex", "col
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """Read all scans of a file."""
-    if not path.is_file():
-        raise RecordingError(f"{path}: cannot read: No such file or directory")
-    with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
+    with _opened(path) as e57:
         if not e57.scan_count:
             raise RecordingError(f"{path}: no scan in it")
         clouds = []
@@ -59,18 +57,22 @@ def read(path: Path) -> tuple[list[Cloud], list[str]]:
         return clouds, []
 
 
-def parts(path: Path, rows: int) -> Parts:
-    """Return the clouds of a file in parts of so many points, without their rows and columns."""
+def _opened(path: Path) -> pye57.E57:
     if not path.is_file():
         raise RecordingError(f"{path}: cannot read: No such file or directory")
+    return foreign(f"{path}: not an E57 file", pye57.E57, str(path))
+
+
+def parts(path: Path, rows: int) -> Parts:
+    """Return the clouds of a file in parts of so many points, without their rows and columns."""
 
     def again(number: int) -> Iterator[Cloud]:
-        with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
+        with _opened(path) as e57:
             header = e57.get_header(number)
             for values_of in _chunks(e57, header, rows):
                 yield _flat_cloud(header, values_of)
 
-    with foreign(f"{path}: not an E57 file", pye57.E57, str(path)) as e57:
+    with _opened(path) as e57:
         fields = {name for number in range(e57.scan_count) for name in e57.get_header(number).point_fields}
         notes = ("rows and columns of a file of this size are not kept",) if "rowIndex" in fields else ()
         return Parts(tuple(partial(again, number) for number in range(e57.scan_count)), notes)

@@ -144,11 +144,7 @@ def _format(path: Path) -> CloudFormat:
 
 def cloud_module(path: Path) -> Any:
     """Return the module of the format of a file; InstallError without a package that it needs."""
-    return _module(_format(path), path)
-
-
-def _module(form: CloudFormat, path: Path) -> Any:
-    """Import the module of a format, or raise InstallError without its packages."""
+    form = _format(path)
     need = f"{path}: {form.name} needs {' and '.join(form.packages)}"
     if "pye57" in form.packages and platform.machine() == "aarch64":
         need += ", which has no wheel for Linux on aarch64: choose another format, or use another computer"
@@ -157,8 +153,7 @@ def _module(form: CloudFormat, path: Path) -> Any:
 
 
 def _writer(path: Path) -> Any:
-    form = _format(path)
-    module = _module(form, path)
+    module = cloud_module(path)
     if not hasattr(module, "write"):
-        raise RecordingError(f"{path}: {form.name} is only read: write ply, or another format")
+        raise RecordingError(f"{path}: {_format(path).name} is only read: write ply, or another format")
     return module

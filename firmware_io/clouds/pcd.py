@@ -38,6 +38,7 @@ _LONGEST_HEADER = 1 << 16  # bytes: hundreds of fields
 _DIGITS = 16  # of a count
 _MOST_PACKED = 100  # above the compression ratio of LZF, 264 bytes in 3
 _KINDS = {"<f4", "<f8", *(f"<{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
+_PADDING = "_"  # name of fields without a meaning
 _AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
 
 
@@ -61,7 +62,7 @@ def parts(path: Path, rows: int) -> Parts | None:
 
 
 def _cloud(rows: NDArray[np.void], header: PcdHeader, shape: tuple[int, int]) -> Cloud:
-    fields = [field for field in header.fields if not field.padding]
+    fields = [field for field in header.fields if field.name != _PADDING]
     named = np.empty(rows.size, [(name, kind) for field in fields for name, kind in field.columns()])
     for field in fields:
         for k, (name, _) in enumerate(field.columns()):
@@ -93,11 +94,6 @@ class PcdField:
     key: str
     kind: str
     count: int
-
-    @property
-    def padding(self) -> bool:
-        """Whether it is padding."""
-        return self.name == "_"
 
     def columns(self) -> list[tuple[str, str]]:
         """Return names and types of its columns: `fpfh_0`, `fpfh_1` and so on of several numbers."""
@@ -152,7 +148,7 @@ def _header(path: Path) -> PcdHeader:
                 f"{path}: field {name}: TYPE {entries['TYPE'][k]} of SIZE {entries['SIZE'][k]}: unknown"
             )
         fields.append(PcdField(name, f"{k}", kind, _integer(path, entries, "COUNT", k)))
-    used = [field.name for field in fields if not field.padding]
+    used = [field.name for field in fields if field.name != _PADDING]
     if len(set(used)) != len(used) or not {*"xyz"} <= set(used):
         raise RecordingError(f"{path}: the fields are {' '.join(used)[:200]}; a cloud has x y z, each field once")
     if "WIDTH" in entries:
@@ -188,7 +184,7 @@ def _from_text(path: Path, lines: Sequence[str], place: int, count: int, header:
     rows, begin = np.empty(count, header.layout), 0
     for field in header.fields:
         part = values[:, begin : begin + field.count]
-        if not field.padding:
+        if field.name != _PADDING:
             with of_file(path):
                 rows[field.key] = as_type(part.ravel(), field.kind).reshape(part.shape)
         begin += field.count

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -45,35 +45,42 @@ _COMMA_INSIDE = re.compile(rb"(?<=\d),(?=\d)")
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """How the numbers of a file are separated and named; `first` is the index of their first line."""
+    """How the numbers of a file are separated and named."""
 
-    first: int
+    first: int  # index of the first line of numbers
     separator: str | None
-    count: int
+    count: int  # of the columns
     names: tuple[str, ...]
-    announced: int | None
+    announced: int | None  # number of points by the first line
+    comments: tuple[str, ...] = ()
+    numeric: tuple[int, ...] = ()  # columns that are numbers
+    every: bool = False  # whether all columns are, also for the reader
+
+    @property
+    def used(self) -> tuple[int, ...] | None:
+        """The columns to read; None for all."""
+        return None if self.every else self.numeric
 
 
 def read(path: Path) -> tuple[list[Cloud], list[str]]:
     """Read the cloud of a file of three or more numbers a line."""
     lines = foreign(f"{path}: cannot read", read_text, path).splitlines()
-    layout, comments, numeric, every = _survey_lines(path, lines)
-    rows = islice(lines, layout.first, None)
-    values = read_numbers(path, rows, layout.first + 1, layout.separator, None if every else numeric)
+    layout = _survey_lines(path, lines)
+    values = read_numbers(path, islice(lines, layout.first, None), layout.first + 1, layout.separator, layout.used)
     if layout.announced is not None and layout.announced != len(values):
         raise RecordingError(f"{path}: line 1 announces {layout.announced} points, {len(values)} are there")
-    cloud = _cloud(path, layout, comments, numeric, values)
+    cloud = _cloud(path, layout, values)
     if not cloud.valid.any():
         raise RecordingError(f"{path}: none of the {len(values)} lines is a point")
-    return [cloud], _notes(path, layout, numeric)
+    return [cloud], _notes(path, layout)
 
 
 def parts(path: Path, rows: int) -> Parts | None:
     """Return the cloud of a file in parts of `rows` lines; None if it is organised. The first lines define columns."""
     with foreign(f"{path}: cannot read", path.open, encoding="utf-8-sig") as stream:
         lines = [line.rstrip("\n") for line in islice(stream, _HEAD)]
-    layout, comments, numeric, every = _survey_lines(path, lines)
-    if any(line.split()[:1] == ["height"] for line in comments):
+    layout = _survey_lines(path, lines)
+    if any(line.split()[:1] == ["height"] for line in layout.comments):
         return None
 
     def again() -> Iterator[Cloud]:
@@ -85,15 +92,15 @@ def parts(path: Path, rows: int) -> Parts | None:
                 some = list(islice(body, rows))
                 if not any(line.strip() and not line.startswith(_COMMENTS) for line in some):
                     break
-                values = read_numbers(path, some, begin, layout.separator, None if every else numeric)
+                values = read_numbers(path, some, begin, layout.separator, layout.used)
                 read += len(values)
-                cloud = _cloud(path, layout, comments, numeric, values)
+                cloud = _cloud(path, layout, values)
                 first = first or cloud
                 yield _like(path, cloud, first)
         if layout.announced is not None and layout.announced != read:
             raise RecordingError(f"{path}: line 1 announces {layout.announced} points, {read} are there")
 
-    return Parts((again,), tuple(_notes(path, layout, numeric)))
+    return Parts((again,), tuple(_notes(path, layout)))
 
 
 def _like(path: Path, cloud: Cloud, first: Cloud) -> Cloud:
@@ -103,25 +110,28 @@ def _like(path: Path, cloud: Cloud, first: Cloud) -> Cloud:
     return Cloud(cloud.points_m, columns, cloud.shape, cloud.T_world_cloud, cloud.start_ns)
 
 
-def _survey_lines(path: Path, lines: Sequence[str]) -> tuple[_Layout, list[str], list[int], bool]:
-    """Return layout, comments, the columns that are numbers, and whether all are."""
-    comments = [line.lstrip("#/! ") for line in lines if line.startswith(_COMMENTS)]
+def _survey_lines(path: Path, lines: Sequence[str]) -> _Layout:
+    """Return the layout of a file that begins with these lines."""
+    comments = tuple(line.lstrip("#/! ") for line in lines if line.startswith(_COMMENTS))
     layout = _layout(path, lines, comments)
     words = split(lines[layout.first], layout.separator)
-    numeric = [k for k in range(layout.count) if _is_number(words[k])]
+    numeric = tuple(k for k in range(layout.count) if _is_number(words[k]))
     for axis in _AXES:
         if axis not in layout.names:
             raise RecordingError(f"{path}: the columns are {' '.join(layout.names)[:200]}; a cloud has x y z")
         if (k := layout.names.index(axis)) not in numeric:
             raise RecordingError(f"{path}: line {layout.first + 1}: {words[k][:40]!a} is not a number")
     every = len(numeric) == layout.count == len(lines[layout.first].strip().split(layout.separator))
-    return layout, comments, numeric, every
+    return replace(layout, comments=comments, numeric=numeric, every=every)
 
 
-def _cloud(path: Path, layout: _Layout, comments: Sequence[str], numeric: Sequence[int], values: Floats) -> Cloud:
+def _cloud(path: Path, layout: _Layout, values: Floats) -> Cloud:
+    comments = layout.comments
     typed = [words[1:] for line in comments if len(words := line.split()) == layout.count + 1 and words[0] == "types"]
     types = typed[0] if typed else ["<f8"] * layout.count
-    columns = {layout.names[k]: _typed(path, layout.names[k], values[:, j], types[k]) for j, k in enumerate(numeric)}
+    columns = {
+        layout.names[k]: _typed(path, layout.names[k], values[:, j], types[k]) for j, k in enumerate(layout.numeric)
+    }
     points = [columns.pop(axis) for axis in _AXES]
     if any(column.dtype.kind != "f" for column in points):
         raise RecordingError(f"{path}: types: x y z must be floats")
@@ -129,8 +139,8 @@ def _cloud(path: Path, layout: _Layout, comments: Sequence[str], numeric: Sequen
     return with_header(Cloud(points_m, columns if typed else columns | _colours(columns)), comments)
 
 
-def _notes(path: Path, layout: _Layout, numeric: Sequence[int]) -> list[str]:
-    dropped = [name for k, name in enumerate(layout.names) if k not in numeric]
+def _notes(path: Path, layout: _Layout) -> list[str]:
+    dropped = [name for k, name in enumerate(layout.names) if k not in layout.numeric]
     notes = [f"dropped of {path}, as they are no numbers: {', '.join(dropped)}"] if dropped else []
     if any(name.startswith("column_") for name in layout.names):
         notes.append(f"columns 4 to {layout.count} have no name in {path}")
@@ -230,12 +240,8 @@ def read_numbers(
 ) -> Floats:
     """Read the numbers of lines but comments and empty ones, shape (rows, columns).
 
-    Args:
-        path: of the file, for errors.
-        lines: one row each.
-        place: number of the first of them in the file.
-        separator: of the words; None for spaces.
-        columns: indices of the words to read; None for all, whose number must be constant.
+    `place`: number of the first line in the file, for errors; `columns`: indices of the words to read, None for all,
+    whose number must be constant.
     """
     last = [place - 1, ""]
 

@@ -39,16 +39,10 @@ def load_views(
     poses: Trajectory | None = None,
     lag_s: float = 0.0,
 ) -> list[CameraView]:
-    """Return the images of a camera with their poses.
+    """Return the images of a camera with their poses; those on a moving platform require `poses`.
 
-    Args:
-        camera: `camera.images` is an image, or a CSV file with the columns file and time_ns (since 1970, on the clock
-            of the recording) or joint_deg, required for a moving camera.
-        folder: of the task, for relative names.
-        angles: angle set of the scanner.
-        recording: for the servo's angle at the time of an image.
-        poses: of the platform, if the cloud is on a map.
-        lag_s: delay of the joint log's stamps.
+    `camera.images`, relative to `folder`, is an image, or a CSV file with the columns file and time_ns (since 1970, on
+    the clock of the recording) or joint_deg, required for a moving camera. `lag_s`: delay of the joint log's stamps.
 
     Raises:
         RecordingError: an image does not exist, or its pose is unknown.

@@ -79,15 +79,10 @@ def painter(
 def colour_cloud(
     path: Path, camera: Camera, views: list[CameraView], spacing: Spacing, from_m: Floats, *, organised: bool = False
 ) -> ColourSummary:
-    """Colour a PLY cloud in place, in constant memory except for seven bytes per point and one depth image.
+    """Colour a PLY cloud of `assemble` in place, in constant memory except for seven bytes per point and a depth image.
 
-    Args:
-        path: cloud of `assemble`; slants are known only in organised ones.
-        camera: of all images.
-        views: the images.
-        spacing: of beams and scan lines.
-        from_m: position of the scanner in the cloud, shape (3,), from which points get sparser.
-        organised: keep the rows without a point.
+    Slants are known only in organised clouds. `from_m`: position of the scanner in the cloud, shape (3,), from which
+    points get sparser; `organised`: keep the rows without a point.
 
     Raises:
         RecordingError: an image cannot be read or has another size, or the cloud cannot be written.

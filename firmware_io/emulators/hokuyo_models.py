@@ -24,6 +24,7 @@ class Identity:
     no_return: int  # error code of a beam without return
     too_near: int  # error code of a range below the smallest one
     intensity: bool = True  # whether it measures intensities
+    echoes: bool = False  # whether it sends all echoes of a beam (HD, HE, ND, NE)
 
 
 # Parameters: model, range [mm], steps per turn, first, last and front step, rpm
@@ -87,6 +88,7 @@ _UTM_30LX_EW = replace(
     serial_number="H1200001",
     speed="2400",
     line="Ethernet 100 [Mbps]",
+    echoes=True,
 )
 _UST_20LX = replace(
     _UST_10LX,

@@ -16,7 +16,7 @@ from scanwright.firmware_io.lidar.scip import measurement, protocol
 
 TurnRanging = Callable[[Times], tuple[Floats, Floats]]
 
-_SCAN = re.compile(rb"([GM])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?")
+_SCAN = re.compile(rb"([GHMN])([DSE])(\d{4})(\d{4})(\d\d)(?:(\d)(\d\d))?")
 _BOOT_NS = 1_000_000_000  # [assumed]
 _NEVER_NS = 1 << 62  # 146 years
 
@@ -40,7 +40,7 @@ class LidarMachine:
     """State of one sensor; times are true ones."""
 
     identity: Identity
-    ranging: TurnRanging  # true times of all beams of a turn -> ranges and intensities
+    ranging: TurnRanging  # true times of all beams of a turn -> ranges and intensities, (n,) or (echoes, n)
     quartz: Quartz  # the sensor's clock
     motor_error: float = 0.0  # relative, turns are longer than reported
     stamp_at: StampAt = "step_0"  # step of its timestamps
@@ -116,7 +116,7 @@ class LidarMachine:
             if not scanning.remaining:
                 self.scanning, self.laser = None, False
         echo = scanning.echo + b"%02d" % scanning.remaining + scanning.text
-        return protocol.reply(echo, "99", self._lines(scanning.window, turn))
+        return protocol.reply(echo, "99", self._lines(scanning.window, turn, all_echoes=echo[:1] == b"N"))
 
     def answer(self, request: bytes, now_ns: int) -> bytes:
         """Return the reply to one request without its LF; empty while it starts."""
@@ -178,15 +178,18 @@ class LidarMachine:
 
     def _scan_request(self, request: bytes, match: re.Match[bytes], now_ns: int) -> bytes:
         kind, letter, first, last, cluster, skip, count = match.groups()
-        if (kind == b"M") != (count is not None):
-            return protocol.reply(request, "0C" if kind == b"M" else "0D")
-        if letter == b"E" and not self.identity.intensity:
+        once, all_echoes = kind in b"GH", kind in b"HN"
+        if once != (count is None):
+            return protocol.reply(request, "0D" if once else "0C")
+        if (letter == b"E" and not self.identity.intensity) or (
+            all_echoes and (letter == b"S" or not self.identity.echoes)
+        ):
             return protocol.reply(request, "0E")
         if int(last) > self.identity.parameters.last_step:
             return protocol.reply(request, "04")
         if int(last) < int(first) or int(first) < self.identity.parameters.first_step:
             return protocol.reply(request, "05")
-        if kind == b"G" and not self.laser:
+        if once and not self.laser:
             return protocol.reply(request, "10")
         window = measurement.Window(
             first_step=int(first),
@@ -196,8 +199,9 @@ class LidarMachine:
             intensity=letter == b"E",
         )
         began = (now_ns - self._zero_ns) / self.period_ns
-        if kind == b"G":
-            return protocol.reply(request, "00", self._lines(window, math.floor(began - self.arc_ns / self.period_ns)))
+        if once:
+            turn = math.floor(began - self.arc_ns / self.period_ns)
+            return protocol.reply(request, "00", self._lines(window, turn, all_echoes=all_echoes))
         self.laser = True
         body, semicolon, text = request.partition(b";")
         remaining = int(count)
@@ -206,21 +210,36 @@ class LidarMachine:
         )
         return protocol.reply(request, "00")
 
-    def _lines(self, window: measurement.Window, turn: int) -> list[bytes]:
+    def _lines(self, window: measurement.Window, turn: int, *, all_echoes: bool) -> list[bytes]:
         """Measure a turn and return the lines of its reply."""
         parameters = self.identity.parameters
         steps = np.arange(parameters.first_step, parameters.last_step + 1)
         step_ns = self.period_ns / parameters.steps_per_turn
         range_m, intensity = self.ranging(self.turn_ns(turn) + np.rint(steps * step_ns).astype(np.int64))
         begin, end = window.first_step - parameters.first_step, window.last_step - parameters.first_step + 1
-        value = clustered(self._numbers(range_m[begin:end]), window.cluster, parameters.range_min_mm)
-        if window.characters == 2:
-            value = np.minimum(value, 4095)
-        if window.intensity:
-            shown = np.clip(np.nan_to_num(intensity[begin : end : window.cluster]), 0, (1 << 18) - 1)
-            value = np.stack([value, np.rint(shown).astype(np.int64)], axis=1).ravel()
+        parts = []
+        for echo_m, bright in zip(np.atleast_2d(range_m), np.atleast_2d(intensity), strict=True):
+            value = clustered(self._numbers(echo_m[begin:end]), window.cluster, parameters.range_min_mm)
+            if window.characters == 2:
+                value = np.minimum(value, 4095)
+            if window.intensity:
+                shown = np.clip(np.nan_to_num(bright[begin : end : window.cluster]), 0, (1 << 18) - 1)
+                value = np.stack([value, np.rint(shown).astype(np.int64)], axis=1).ravel()
+            parts.append(protocol.encode(value.tolist(), window.characters))
+        payload = parts[0]
+        if all_echoes:  # each further echo of a beam follows a "&" (urg_library, urg_sensor.c)
+            size = window.characters * (2 if window.intensity else 1)
+            seen = [np.isfinite(echo_m[begin : end : window.cluster]) for echo_m in np.atleast_2d(range_m)]
+            payload = b"".join(
+                b"&".join(
+                    part[size * k : size * (k + 1)]
+                    for part, here in zip(parts, seen, strict=True)
+                    if here[k] or part is parts[0]
+                )
+                for k in range(window.size)
+            )
         stamp_ns = self.turn_ns(turn) - round(parameters.since_stamp_s(0, self.stamp_at) * (1 + self.motor_error) * 1e9)
-        return protocol.data_lines(self.quartz.ms(stamp_ns), protocol.encode(value.tolist(), window.characters))
+        return protocol.data_lines(self.quartz.ms(stamp_ns), payload)
 
     def _numbers(self, range_m: Floats) -> Times:
         """Return integer millimetres, and error codes of invalid ranges."""

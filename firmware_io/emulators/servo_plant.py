@@ -74,7 +74,8 @@ def plant_of(model: str) -> Plant:
         stall_torque_nm=servo.stall_torque_nm,
         no_load_rad_s=no_load_rad_s,
         inertia_kg_m2=time_constant_s * servo.stall_torque_nm / no_load_rad_s,
-        friction_nm=(0.015 if ax else 0.05) * servo.stall_torque_nm,  # assumed
+        # MX-64: 0.090 N m, MX-106: 0.104 (identified, github.com/Rhoban/bam); the others are assumed to be alike
+        friction_nm=0.015 * servo.stall_torque_nm,
         backlash_rad=math.radians(backlash_deg),
         stiffness_nm_rad=100.0 if model in _PLASTIC_TEETH else 300.0,  # assumed
         impact_s_rad=20.0,  # assumed

@@ -78,21 +78,7 @@ def map_files(
     seen_through_m: float | None,
     progress: Progress = no_progress,
 ) -> MapSummary:
-    """Read clouds, find the floor, write the map.
-
-    Args:
-        paths: files of clouds, z up.
-        out: YAML file to write; the image goes into the same folder.
-        scanner: angle set of all clouds, for the position of the scanner.
-        poses: TUM file, a line for each cloud, by the names in its comments or in the order of the clouds; None for
-            the poses in the files.
-        floor_m: height of the floor in the map; None to detect it.
-        from_m: lower bound of obstacles above the floor.
-        to_m: upper bound of obstacles above the floor.
-        resolution_m: edge of a cell.
-        seen_through_m: drop points behind which another cloud was seen, by more than this; None to keep all.
-        progress: callback.
-    """
+    """Read clouds, find the floor, write the map; the arguments are those of `scanwright.make_map`."""
     check_map_place(out)
     check_resolution(resolution_m)
     Heights(0.0 if floor_m is None else floor_m, from_m, to_m)

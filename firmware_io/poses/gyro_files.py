@@ -59,11 +59,8 @@ def imu_mount(
 ) -> Float64[ndarray, "3 3"]:
     """Return the orientation of an IMU on the platform: `R_platform_imu`.
 
-    Args:
-        rpy_deg: roll, pitch and yaw, fixed axes of the platform; None for that of the frames.
-        gyro: with the IMU's frame.
-        platform: frame of the poses.
-        recording: whose /tf_static connects both frames.
+    `rpy_deg`: roll, pitch and yaw about fixed axes of the platform; None for that of the frames, which /tf_static of
+    the recording connects. `platform`: frame of the poses.
     """
     if rpy_deg is not None:
         if not all(map(math.isfinite, rpy_deg)):

@@ -101,9 +101,12 @@ class Trajectory:
         near = slice(begin, max(int(end) + 1, begin + 2))
         position_m, quaternion = self.position_m[near], self.quaternion[near]
         R = Rotation.from_quat(quaternion[:-1]).as_matrix()
-        axis, turn_rad = _turns(quaternion)
+        turn = (Rotation.from_quat(quaternion[:-1]).inv() * Rotation.from_quat(quaternion[1:])).as_rotvec()
+        turn_rad = np.linalg.norm(turn, axis=1)
+        turning = turn_rad > 0
+        axis = np.where(turning[:, None], turn / np.where(turning, turn_rad, 1.0)[:, None], [0.0, 0.0, 1.0])
         shift_m = np.diff(position_m, axis=0)
-        moves = (turn_rad > 0) | np.any(shift_m != 0, axis=1)
+        moves = turning | np.any(shift_m != 0, axis=1)
         R_platform_axis = _with_z(axis)
         still = ~moves[:, None, None]
         R_before = np.where(still, R, np.swapaxes(R_platform_axis, 1, 2))
@@ -167,18 +170,6 @@ def at_rest(T_world_rot: Pose) -> PosePieces:
         t_then=none,
         shift_m=none,
     )
-
-
-def _turns(quaternion: Float64[ndarray, "n 4"]) -> tuple[Float64[ndarray, "k 3"], Float64[ndarray, " k"]]:
-    """Return axis (z without a rotation) and smallest angle [rad] from each orientation to the next."""
-    v0, v1, w0, w1 = quaternion[:-1, :3], quaternion[1:, :3], quaternion[:-1, 3:], quaternion[1:, 3:]
-    after, last = [1, 2, 0], [2, 0, 1]
-    vector = w0 * v1 - w1 * v0 - (v0[:, after] * v1[:, last] - v0[:, last] * v1[:, after])
-    cosine = np.sum(quaternion[:-1] * quaternion[1:], axis=1)
-    sine = np.linalg.norm(vector, axis=1)
-    there = np.where(cosine < 0, -sine, sine)
-    axis = np.where(sine[:, None] > 0, vector / np.where(sine > 0, there, 1.0)[:, None], [0.0, 0.0, 1.0])
-    return axis, 2 * np.arctan2(sine, np.abs(cosine))
 
 
 def _with_z(axis: Floats) -> Floats:

@@ -24,7 +24,6 @@ from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
 from scanwright.firmware_io.tables import csv_rows
 
-TF = "tf2_msgs/msg/TFMessage"
 ANGLES = {"angle", "angle_deg", "angle_rad", "position", "position_rad"}
 ACROSS_RAD = math.radians(0.5)  # largest tilt of the axis
 MOST_ANGLE = 1e9  # years of turns
@@ -65,7 +64,7 @@ def angles_in(body: Any, source: Source | FrameSource, bag: Path) -> list[tuple[
     if isinstance(source, Source):
         numbers, stamp_ns = numbers_at(body, source, bag)
         return [(numbers, stamp_ns)] if numbers else []
-    if getattr(body, "__msgtype__", "") != TF:
+    if getattr(body, "__msgtype__", "") != ros_messages.TRANSFORMS:
         raise RecordingError(f"{bag}: {source}: {source.topic} holds no transforms; write TOPIC or TOPIC:FIELD")
     values: list[tuple[tuple[float, ...], int]] = []
     for entry in body.transforms:

@@ -6,7 +6,6 @@ sensors' clocks differ from the host's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,6 @@ from scanwright.firmware_io.samples import JointLog
 _SAME_CLOCK_NS = 1_000_000_000  # largest delay of a message stamped by the receiver's clock
 _AHEAD_S = 0.05  # stamps later than this after their receipt are worse than receive times
 _RECEIPT = ": both take the time they were received; a scan is received after its last beam, so expect a lag"
-_LONG_GAP = 10.0  # times the median gap between angles, to warn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,11 +96,6 @@ def log_at_rest(
     return JointLog(both_ns[distinct], np.repeat(angle_rad, 2)[distinct]), int(np.sum(end_ns > latest_ns))
 
 
-def times(values: Sequence[int]) -> Int64[ndarray, " n"]:
-    """Return integer nanoseconds as an array."""
-    return np.array(values, dtype=np.int64)
-
-
 def _ahead_s(stamps: Stamps) -> float:
     """Return the time by which stamps exceed their receipt, at the 5 % quantile of the delay; normally negative."""
     return -float(np.quantile(stamps.receive_ns - stamps.stamp_ns, 0.05)) / 1e9
@@ -110,14 +103,3 @@ def _ahead_s(stamps: Stamps) -> float:
 
 def _overlap(a_ns: Times, b_ns: Times) -> bool:
     return bool(max(a_ns.min(), b_ns.min()) <= min(a_ns.max(), b_ns.max()))
-
-
-def gap_warnings(log: JointLog) -> Iterator[tuple[str, float]]:
-    """Yield a warning of a long gap between two angles, and the gap [s]."""
-    gaps_s = np.diff(log.time_ns) / 1e9
-    if gaps_s.size and gaps_s.max() > _LONG_GAP * np.median(gaps_s):
-        usual = f"usually {np.median(gaps_s):.3f} s"
-        yield (
-            f"between two angles lie up to {gaps_s.max():.2f} s ({usual}): the angle goes straight across",
-            float(gaps_s.max()),
-        )

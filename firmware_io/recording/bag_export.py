@@ -20,8 +20,8 @@ from rosbags.typesys.store import Typestore
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.foreign import foreign
-from scanwright.firmware_io.recording.bags import Bag, Message, open_bag
-from scanwright.firmware_io.recording.metadata import NOTE_TOPIC, NOTE_TYPE, note_in
+from scanwright.firmware_io.recording.bags import NOTE_TOPIC, Bag, Message, open_bag
+from scanwright.firmware_io.recording.ros_messages import TEXT
 
 _VERSION: Final = 8  # of the metadata of ROS 2 bags, for Humble and later
 _FOREVER: Final = QosTime(9223372036, 854775807)
@@ -93,7 +93,7 @@ def _copied(
     """Copy all messages of a recording; `latched` are the options of a latched topic."""
     known = {topic: kind for topic, kind in bag.topics.items() if kind in store.types}
     unknown = {topic: kind for topic, kind in bag.topics.items() if topic not in known}
-    note_topic = {NOTE_TOPIC: NOTE_TYPE} if note_in(bag) else {}
+    note_topic = {NOTE_TOPIC: TEXT} if bag.note() else {}
     connections = {
         topic: writer.add_connection(topic, kind, typestore=store, **(latched if topic == NOTE_TOPIC else {}))
         for topic, kind in (note_topic | known).items()
@@ -108,10 +108,10 @@ def _copied(
 
 def _noted(bag: Bag, topics: set[str], store: Typestore) -> Iterator[Message]:
     """Yield the note at the time of the first message, unless it is one of them, and then the messages."""
-    note = {} if NOTE_TOPIC in topics else note_in(bag)
+    note = {} if NOTE_TOPIC in topics else bag.note()
     for k, message in enumerate(bag.messages(topics)):
         if note and k == 0:
-            text: Any = store.types[NOTE_TYPE]
+            text: Any = store.types[TEXT]
             yield Message(NOTE_TOPIC, message.receive_ns, text(data=json.dumps(note, sort_keys=True)))
         yield message
 

@@ -8,6 +8,7 @@ Unusable input raises RecordingError.
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import re
 import sqlite3
@@ -24,8 +25,9 @@ from rosbags.typesys import Stores, get_typestore
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.foreign import foreign, foreign_items
 from scanwright.firmware_io.recording import ros_messages
-from scanwright.firmware_io.recording.mcap_chunks import profile_of, unchunked_messages
+from scanwright.firmware_io.recording.mcap_chunks import profile_of, read_note, unchunked_messages
 
+NOTE_TOPIC = "/scanwright/note"  # latched text, JSON
 _STEP = re.compile(r"(\w+)(?:\[(\d+)\])?")
 _SEQUENCES = (list, tuple, np.ndarray)
 _SUFFIXES = (".bag", ".mcap", ".db3")
@@ -75,6 +77,18 @@ class Bag:
     def topics(self) -> Mapping[str, str]:
         """Message type of each topic."""
         return {connection.topic: connection.msgtype for connection in self._reader.connections}
+
+    def note(self) -> dict[str, str]:
+        """Return the note of a recording, or of a bag exported from one; empty for others."""
+        if self.path.suffix == ".mcap" and self.path.is_file() and (note := read_note(self.path)):
+            return note
+        what = f"{self.path}: {NOTE_TOPIC}: not the note of a recording"
+        for message in self.messages({NOTE_TOPIC}) if self.topics.get(NOTE_TOPIC) == ros_messages.TEXT else ():
+            note = foreign(what, json.loads, message.body.data)
+            if not isinstance(note, dict):
+                raise RecordingError(f"{what}: {message.body.data[:40]}")
+            return note
+        return {}
 
     def check(self, topics: set[str]) -> None:
         """Raise RecordingError if the bag lacks one of these topics or its type."""

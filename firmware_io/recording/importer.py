@@ -26,19 +26,17 @@ from scanwright.firmware_io.recording.angle_sources import (
 from scanwright.firmware_io.recording.bag_clocks import (
     OneClock,
     Stamps,
-    gap_warnings,
     log_at_rest,
     one_clock,
 )
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, open_bag, parse_source, scan_fault
-from scanwright.firmware_io.recording.import_checks.angles import outliers, usual_speed_rad_s
-from scanwright.firmware_io.recording.import_checks.apply import corrected_scan, without_far
+from scanwright.firmware_io.recording.import_checks.angles import angle_findings, outliers, usual_speed_rad_s
+from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, radians_per
-from scanwright.firmware_io.recording.import_checks.headers import AT_M
+from scanwright.firmware_io.recording.import_checks.headers import AT_M, header_findings
 from scanwright.firmware_io.recording.import_checks.imu import imu_findings
-from scanwright.firmware_io.recording.import_checks.stream import sample_findings
 from scanwright.firmware_io.recording.import_checks.survey import BagSurvey, endless, survey_bag
-from scanwright.firmware_io.recording.metadata import note_in, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import rests_in_scans
 from scanwright.firmware_io.recording.recording import (
     BEAMS_TOPIC,
     JOINT_TOPIC,
@@ -51,6 +49,7 @@ from scanwright.firmware_io.samples import JointLog, with_all_echoes
 _AS_IT_IS = Corrections()
 _DELAY = "stamp scans and angles with one clock; scan_offset_s = 0.01 delays scans, calibrate estimates the delay"
 _ZERO_BEYOND = 0.2  # of the sweep
+_LONG_GAP = 10.0  # times the median gap between angles, to warn
 _PER_SCAN = 1.2  # angles per scan; fewer are one for each scan
 
 
@@ -88,16 +87,13 @@ class ImportSummary:
     def lines(self) -> list[str]:
         """Format the summary."""
         low, high = self.angle_deg
-        texts = [
-            line
-            for finding in self.findings
-            for line in (
-                f"{finding.severity}: {finding.message}",
-                *([f"  hint: {finding.hint}"] if finding.hint else []),
-            )
-        ]
+        lines = []
+        for finding in self.findings:
+            lines.append(f"{finding.severity}: {finding.message}")
+            if finding.hint:
+                lines.append(f"  hint: {finding.hint}")
         return [
-            *texts,
+            *lines,
             *([f"scans: {self.geometry}"] if self.geometry else []),
             *(f"left out {count:,}: {reason.replace('_', ' ')}" for reason, count in self.left_out.items() if count),
             f"wrote {self.scans:,} scans ({self.beams:,} beams) and {self.joint_samples:,} angles, {low:z.2f} to "
@@ -116,19 +112,7 @@ def import_bag(
     also: Collection[str] = (),
     corrections: Corrections = _AS_IT_IS,
 ) -> ImportSummary:
-    """Write the scans and angles of a bag as a recording.
-
-    Args:
-        bag: ROS 1 or ROS 2 bag; several are the parts of a split one.
-        out: the recording to write, `.mcap`.
-        scan: TOPIC[:FIELD] of a LaserScan.
-        angle: source of the axis angle: TOPIC[:FIELD] of a number or quaternion, possibly in the same message as the
-            scan, TOPIC:JOINT of a JointState, TOPIC:PARENT:CHILD of transforms, or FILE.csv[:COLUMN].
-        angle_unit: deg, rad, or counts such as 4096/turn; None for transforms and quaternions, which have none.
-        hold: the motor rests during each scan, at the angle of the scan's message or the last one before it. Not needed
-            for a bag exported from such a recording, which has a note of it.
-        also: topics that are copied unchanged, such as poses and an IMU for `assemble`.
-        corrections: of the recording.
+    """Write the scans and angles of a bag as a recording; the arguments are those of `scanwright.import_bag`.
 
     Raises:
         RecordingError: the bag is unreadable, a topic or field is missing or of another type, or scans and angles
@@ -160,7 +144,7 @@ def import_bag(
             spans = f"scans {_span(clock.scan_ns)}, angles {_span(clock.angle_ns)}"
             raise RecordingError(f"{parts[0]}: no scan falls into the time of the angles: {spans}")
         log, left_out = _joint_log(clock, survey, unit_rad, corrections)
-        still = hold or rests_in_scans(note_in(opened))
+        still = hold or rests_in_scans(opened.note())
         speed_rad_s = 0.0 if still else usual_speed_rad_s(log)
         cost = f"; 10 ms of it are {10 * AT_M * speed_rad_s:,.0f} mm at {AT_M:g} m at this speed" if speed_rad_s else ""
         findings = [_remark("clock", clock.note + cost, _DELAY)] if clock.note else []
@@ -168,19 +152,21 @@ def import_bag(
             findings.append(_remark("angle_zero", survey.angle_note, "angle_zero sets the joint position 0"))
         doubts = unit_doubts(clock.angle_ns, survey.angle, log, angle_unit)
         findings += [_remark("angle_unit", doubt, hint) for doubt, hint in doubts]
-        findings += sample_findings(
-            headers.corrected(increment_s, corrections),
-            Stamps(clock.scan_ns, survey.scan_stamps.receive_ns),
-            survey.angle_stamps,
-            clock.angle_ns,
-            survey.angle * unit_rad,
-            speed_rad_s,
-            at_rest=still,
-            dropped=corrections.drop_outliers,
-            stamped=not clock.note and corrections.stamp != "receipt",
-            timed=not clock.note,
-            same_clock=angle_source is not None and angle_source.topic == scan_source.topic,
-        )
+        if not still:
+            order = np.argsort(clock.angle_ns, kind="stable")
+            time_ns, angle_rad, dropped = (
+                clock.angle_ns[order],
+                survey.angle[order] * unit_rad,
+                corrections.drop_outliers,
+            )
+            findings += angle_findings(time_ns, angle_rad, dropped=dropped, timed=not clock.note)
+        checked = headers.corrected(increment_s, corrections)
+        findings += header_findings(checked, speed_rad_s)
+        if not clock.note and corrections.stamp != "receipt":  # the times of the scans are their stamps
+            stamps = Stamps(clock.scan_ns, survey.scan_stamps.receive_ns)
+            same_clock = angle_source is not None and angle_source.topic == scan_source.topic
+            arcs_ns = checked.judged().arc_ns
+            findings += clock_findings(stamps, survey.angle_stamps, arcs_ns, speed_rad_s, same_clock=same_clock)
         findings += _scan_findings(survey)
         findings += imu_findings(opened, survey.angle_stamps.receive_ns, np.unwrap(survey.angle * unit_rad))
         findings += _zero_outside(log, unit_rad, corrections)
@@ -297,18 +283,15 @@ def _zero_outside(log: JointLog, unit_rad: float, corrections: Corrections) -> I
         middle = (low + high) / 2 / corrections.angle_scale
         square = round(middle / (math.pi / 2)) * math.pi / 2
         zero = (square if abs(square - middle) < (high - low) / 4 else middle) / unit_rad
-        yield Finding(
-            "zero_outside",
-            "note",
-            "angle",
-            "the axis never comes near joint position 0, at which the angle set describes the scanner",
-            hint=f"angle_zero = {zero:.6g} if it is level there",
-        )
+        never = "the axis never comes near joint position 0, at which the angle set describes the scanner"
+        yield Finding("zero_outside", "note", "angle", never, hint=f"angle_zero = {zero:.6g} if it is level there")
 
 
 def _between_angles(log: JointLog, scan_ns: Times, speed_rad_s: float) -> Iterator[Finding]:
     """Report sparse angles: with gaps, or only one for each scan."""
-    for gap, gap_s in gap_warnings(log):
+    gaps_s = np.diff(log.time_ns) / 1e9
+    if gaps_s.size and (gap_s := float(gaps_s.max())) > _LONG_GAP * (usual_s := float(np.median(gaps_s))):
+        gap = f"between two angles lie up to {gap_s:.2f} s (usually {usual_s:.3f} s): the angle goes straight across"
         off_mm = 1000 * AT_M * speed_rad_s * gap_s / 2
         cost = f", up to {off_mm:,.0f} mm off at {AT_M:g} m at this speed if it turned back" if off_mm else ""
         yield _remark("angle_gaps", gap + cost, "publish angles at 50 Hz or more; distrust walls seen at these times")
@@ -338,13 +321,18 @@ def _write(
 
     def write_scan(laser_scan: Any, beams: ros_messages.Beams | None) -> None:
         nonlocal written
-        limits_rad = float(laser_scan.angle_min), float(laser_scan.angle_max)
-        raw = ros_messages.scan_from_message(laser_scan, next(scan_times))
-        scan = corrected_scan(raw, corrections, time_increment_s, limits_rad)
+        scan = ros_messages.scan_from_message(laser_scan, next(scan_times))
+        if time_increment_s is not None:
+            scan = replace(scan, time_increment_s=time_increment_s)
+        if corrections.bearings == "limits" and scan.range_m.size > 1:
+            span_rad = float(laser_scan.angle_max) - scan.angle_min_rad
+            scan = replace(scan, angle_increment_rad=span_rad / (scan.range_m.size - 1))
         if hasattr(laser_scan, "echoes"):
             range_m, intensity = laser_scan.echoes
             scan = with_all_echoes(scan, range_m, intensity, echoes)
-        scan = without_far(scan, corrections)
+        if corrections.no_return_from_m is not None:
+            far = scan.range_m >= np.float32(corrections.no_return_from_m)
+            scan = replace(scan, range_m=np.where(far, np.float32(np.inf), scan.range_m))
         if endless(laser_scan):
             scan = replace(scan, range_max_m=math.inf)
         if beams is not None:

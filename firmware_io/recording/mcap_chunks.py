@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, suppress
 from functools import lru_cache
 from itertools import chain
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Final
 
 from mcap.data_stream import ReadDataStream
 from mcap.reader import NonSeekingReader, SeekingReader
@@ -27,6 +27,7 @@ from scanwright.design.concurrency.ahead import ahead
 from scanwright.design.errors import RecordingError, made_by
 from scanwright.firmware_io.foreign import foreign
 
+NOTE: Final = "scanwright"  # name of the metadata record with the origin of a recording
 CHUNK_S = 0.25  # duration of a chunk, the largest loss of one damage
 _RUN_BYTES = 1_000_000  # unpacked; smaller chunks are unpacked together
 _MAGIC = b"\x89MCAP"
@@ -60,11 +61,16 @@ def read_topics(path: Path) -> dict[str, str]:
     return {channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()}
 
 
-def read_note(path: Path, name: str) -> dict[str, str]:
-    """Return the metadata record of a name; empty if the file has none."""
+def read_note(path: Path) -> dict[str, str]:
+    """Return the note of a recording, its metadata record `scanwright`; empty for other files."""
     with _opened(path) as stream:
         records = foreign(f"{path}: damaged", lambda: list(SeekingReader(stream).iter_metadata()))
-    return next((record.metadata for record in records if record.name == name), {})
+    return next((record.metadata for record in records if record.name == NOTE), {})
+
+
+def rests_in_scans(note: Mapping[str, str]) -> bool:
+    """Whether the motor rested during each scan of a recording."""
+    return note.get("hold") == "true"
 
 
 def read_messages(path: Path, topics: Collection[str], *, summed: bool = True) -> Iterator[tuple[str, bytes]]:

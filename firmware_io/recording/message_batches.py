@@ -1,102 +1,80 @@
 """Batches of messages as arrays: those that differ only in time and measurement are one block of bytes.
 
-The layout (byte order, lengths, shared numbers) is read from the first message and compared in the others.
+One message of a block is decoded; the others have the same length, and the same bytes between their numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from itertools import groupby
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
-from scanwright.design.arrays import Bytes, Floats, Ints, Times
-from scanwright.firmware_io.recording.ros_messages import JointPlaces, ScanPlaces, decode_joint, decode_scan
-from scanwright.firmware_io.samples import Block, Scan
+from scanwright.design.arrays import Bytes, Floats, Times
+from scanwright.firmware_io.recording.ros_messages import (
+    LASER_SCAN,
+    decode_joint,
+    decode_message,
+    decode_scan,
+    encode_joint,
+    scan_from_message,
+    stamp_ns,
+)
+from scanwright.firmware_io.samples import Block, blocks
 
-_STAMP = 4  # seconds and nanoseconds, after the encapsulation
-
-
-class ScanOutline(NamedTuple):
-    """A batch of LaserScan messages without their measurements."""
-
-    stamp_ns: Times
-    beams: int  # of each
-    has_intensity: bool
-
-
-def outlines_in(messages: Sequence[bytes]) -> Iterator[ScanOutline]:
-    """As `blocks_in`, without ranges."""
-    for scan, places, rows in _alike_scans(messages):
-        yield ScanOutline(_stamps(rows, places.order), scan.range_m.size, bool(scan.intensity.size))
+_LITTLE_ENDIAN = 1  # second byte of a message
+_STAMP = slice(4, 12)  # of any message with a header
+_TIME = np.dtype([("sec", "<i4"), ("nanosec", "<u4")])
+_POSITION = slice(-16, -8)  # of a message of `encode_joint`, before two empty sequences
 
 
 def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
-    """Yield blocks of LaserScan messages in CDR with one layout; ValueError for other messages."""
-    for scan, places, rows in _alike_scans(messages):
-        yield Block(
-            first=scan,
-            stamp_ns=_stamps(rows, places.order),
-            range_m=_numbers(rows, places.ranges, f"{places.order}f4").astype(np.float32, copy=False),
-            intensity=_numbers(rows, places.intensities, f"{places.order}f4").astype(np.float32, copy=False),
-        )
-
-
-def _alike_scans(messages: Sequence[bytes]) -> Iterator[tuple[Scan, ScanPlaces, Bytes]]:
-    """Yield the first scan, its layout and the bytes of each scan (rows) of batches with one layout."""
-    for same_length in _runs(_lengths(messages)):
-        rows = _rows(messages[same_length])
-        done = 0
-        while done < len(rows):
-            first = messages[same_length.start + done]
-            places = ScanPlaces.of(first)
-            alike = _alike(rows[done:], places.shared)
-            yield decode_scan(first), places, rows[done : done + alike]
-            done += alike
+    """Yield blocks of LaserScan messages in CDR with one layout; an exception for other messages."""
+    for (length, order), run in groupby(messages, lambda data: (len(data), data[1])):
+        listed = list(run)
+        if order != _LITTLE_ENDIAN or length % 4:  # of other recorders; slower
+            yield from blocks(map(decode_scan, listed))
+            continue
+        rows = np.frombuffer(b"".join(listed), np.uint8).reshape(len(listed), length)
+        while len(rows):
+            message = decode_message(listed[-len(rows)], LASER_SCAN)
+            lit = slice(length - 4 * message.intensities.size, length)
+            ranges = slice(lit.start - 4 - 4 * message.ranges.size, lit.start - 4)
+            # before the ranges are seven numbers, whose largest bearing is redundant and whose time between scans may
+            # vary, and the number of ranges
+            begin = ranges.start - 32
+            shared = (
+                slice(_STAMP.stop, begin + 4),
+                slice(begin + 8, begin + 16),
+                slice(begin + 20, ranges.start),
+                slice(ranges.stop, lit.start),
+            )
+            differs = np.any([(rows[:, place] != rows[0, place]).any(axis=1) for place in shared], axis=0)
+            alike, rows = np.split(rows, [int(np.argmax(differs)) or len(rows)])
+            first = scan_from_message(message, stamp_ns(message.header.stamp))
+            intensity = _numbers(alike, lit, "<f4")[:, : first.intensity.size]
+            yield Block(first, _times(alike), _numbers(alike, ranges, "<f4"), intensity)
 
 
 def joints_in(messages: Sequence[bytes]) -> tuple[Times, Floats]:
-    """Return times [ns] and positions [rad] of the spin joint, NaN if absent; ValueError for other messages."""
-    lengths = _lengths(messages)
-    time_ns, position_rad = np.empty(lengths.size, np.int64), np.empty(lengths.size)
-    for length in set(lengths.tolist()):
-        which = np.flatnonzero(lengths == length).tolist()
-        rows, places = _rows([messages[i] for i in which]), JointPlaces.of(messages[which[0]])
-        if places is not None and _alike(rows, places.shared) == len(rows):
-            time_ns[which] = _stamps(rows, places.order)
-            position_rad[which] = _numbers(rows, places.position, f"{places.order}f8")[:, 0]
-        else:  # messages of several publishers with the same length
-            for i in which:
-                time_ns[i], position_rad[i] = decode_joint(messages[i])
-    return time_ns, position_rad
+    """Return times [ns] and positions [rad] of the spin joint, NaN if absent; an exception for other messages."""
+    own = np.frombuffer(encode_joint(0, 0.0), np.uint8)
+    if all(len(data) == own.size for data in messages):
+        rows = np.frombuffer(b"".join(messages), np.uint8).reshape(-1, own.size)
+        fixed = np.ones(own.size, bool)
+        fixed[_STAMP] = fixed[_POSITION] = False
+        if (rows[:, fixed] == own[fixed]).all():
+            return _times(rows), _numbers(rows, _POSITION, "<f8")[:, 0]
+    pairs = [decode_joint(data) for data in messages]
+    return np.array([time_ns for time_ns, _ in pairs], np.int64), np.array([angle for _, angle in pairs])
 
 
-def _rows(messages: Sequence[bytes]) -> Bytes:
-    return np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), -1)
-
-
-def _lengths(messages: Sequence[bytes]) -> Ints:
-    return np.array([len(message) for message in messages], np.int64)
-
-
-def _runs(values: Ints) -> Iterator[slice]:
-    """Yield the slices of equal consecutive values."""
-    ends = [*(np.flatnonzero(np.diff(values)) + 1).tolist(), values.size]
-    yield from (slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True) if a < b)
-
-
-def _alike(rows: Bytes, shared: Sequence[slice]) -> int:
-    """Return the number of first rows with equal bytes in some places."""
-    differs = np.zeros(len(rows), bool)
-    for place in shared:
-        differs |= (rows[:, place] != rows[0, place]).any(axis=1)
-    return int(np.argmax(differs)) or len(rows)
-
-
-def _numbers(rows: Bytes, place: slice, kind: str) -> np.ndarray:
+def _numbers(rows: Bytes, place: slice, kind: DTypeLike) -> np.ndarray[Any, Any]:
     return np.ascontiguousarray(rows[:, place]).view(kind)
 
 
-def _stamps(rows: Bytes, order: str) -> Times:
-    seconds = _numbers(rows, slice(_STAMP, _STAMP + 4), f"{order}i4")[:, 0].astype(np.int64)
-    return seconds * 1_000_000_000 + _numbers(rows, slice(_STAMP + 4, _STAMP + 8), f"{order}u4")[:, 0]
+def _times(rows: Bytes) -> Times:
+    stamp = _numbers(rows, _STAMP, _TIME)[:, 0]
+    return stamp["sec"].astype(np.int64) * 1_000_000_000 + stamp["nanosec"]

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int64
@@ -30,9 +30,15 @@ from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.arrays import RecordingArrays, arrays_of
-from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages, read_note, read_topics
-from scanwright.firmware_io.recording.message_batches import ScanOutline, blocks_in, joints_in, outlines_in
-from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import (
+    NOTE,
+    TimedChunks,
+    read_messages,
+    read_note,
+    read_topics,
+    rests_in_scans,
+)
+from scanwright.firmware_io.recording.message_batches import blocks_in, joints_in
 from scanwright.firmware_io.recording.ros_messages import Beams
 from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
 
@@ -44,16 +50,6 @@ _BLOCK = 128  # scans, at most
 _TYPES = {SCAN_TOPIC: ros_messages.LASER_SCAN, JOINT_TOPIC: ros_messages.JOINT_STATE}
 
 
-class Sink(Protocol):
-    """Target of a recording, such as a file."""
-
-    def write(self, data: bytes, /) -> int: ...  # noqa: D102
-
-    def tell(self) -> int: ...  # noqa: D102
-
-    def flush(self) -> None: ...  # noqa: D102
-
-
 class MessageWriter:
     """Writer of scans and joint samples to an open stream, in the order of their times.
 
@@ -62,15 +58,23 @@ class MessageWriter:
 
     def __init__(
         self,
-        stream: Sink,
+        stream: Any,
         path: Path,
         note: Mapping[str, str],
         attached: Mapping[str, str],
         writer: type[Writer] = TimedChunks,
     ) -> None:
-        """`attached`: files (name -> text); `writer`: `TimedChunks`, or a plain one if only `flush` ends chunks."""
+        """Begin a recording.
+
+        Args:
+            stream: has `write`, `tell` and `flush`.
+            path: for errors.
+            note: origin of the recording.
+            attached: files, name -> text.
+            writer: `TimedChunks`, or a plain one if only `flush` ends chunks.
+        """
         self._path = path
-        self._writer = writer(cast(Any, stream))  # it requires only a Sink
+        self._writer = writer(stream)
         self._writer.start(profile="ros2", library="scanwright")
         self._writer.add_metadata(NOTE, dict(note))
         for name, text in attached.items():
@@ -193,27 +197,32 @@ def open_recording(path: Path) -> Recording:
     has_intensity = False
     messages = read_messages(path, set(_TYPES))
     while some := list(islice(messages, _AT_ONCE)):
-        logs.append(_joints_in(path, [data for topic, data in some if topic == JOINT_TOPIC]))
-        outlines = outlines_in([data for topic, data in some if topic == SCAN_TOPIC])
-        for outline in foreign(f"{path}: a message of {SCAN_TOPIC}", list[ScanOutline], outlines):
-            has_intensity |= outline.has_intensity
-            stamps.append(outline.stamp_ns)
-            beams += [outline.beams] * outline.stamp_ns.size
-    if not any(time_ns.size for time_ns, _ in logs):
+        joints = [data for topic, data in some if topic == JOINT_TOPIC]
+        logs.append(foreign(f"{path}: a message of {JOINT_TOPIC}", joints_in, joints))
+        scans = blocks_in([data for topic, data in some if topic == SCAN_TOPIC])
+        for block in foreign(f"{path}: a message of {SCAN_TOPIC}", list[Block], scans):
+            has_intensity |= block.intensity.size > 0
+            stamps.append(block.stamp_ns)
+            beams += [block.range_m.shape[1]] * block.stamp_ns.size
+    time_ns = np.concatenate([part for part, _ in logs] or [np.empty(0, np.int64)])
+    position_rad = np.concatenate([part for _, part in logs] or [np.empty(0)])
+    if not time_ns.size:
         raise RecordingError(f"{path}: {JOINT_TOPIC} has no message: the servo's angle is not known")
     if not beams:
         raise RecordingError(f"{path}: {SCAN_TOPIC} has no message: there is nothing to assemble")
     return Recording(
         path=path,
-        joint_log=_sorted_log(path, *map(np.concatenate, zip(*logs, strict=True))),
+        joint_log=_sorted_log(path, time_ns, position_rad),
         beams=np.array(beams),
         stamp_ns=np.concatenate(stamps),
         has_intensity=has_intensity,
-        at_rest=rests_in_scans(read_note(path, NOTE)),
+        at_rest=rests_in_scans(read_note(path)),
     )
 
 
 def _sorted_log(path: Path, time_ns: Times, position_rad: Floats) -> JointLog:
+    if np.isnan(position_rad).any():
+        raise RecordingError(f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'")
     order = np.argsort(time_ns, kind="stable")
     try:
         return JointLog(time_ns[order], position_rad[order])
@@ -228,10 +237,3 @@ def _check_topics(path: Path) -> None:
             raise RecordingError(f"{path}: no topic {topic}{suggest(topic, types)} (`scanwright import` converts bags)")
         if types[topic] != message_type:
             raise RecordingError(f"{path}: {topic} is {types[topic]}, not {message_type}")
-
-
-def _joints_in(path: Path, messages: list[bytes]) -> tuple[Times, Floats]:
-    time_ns, position_rad = foreign(f"{path}: a message of {JOINT_TOPIC}", joints_in, messages)
-    if np.isnan(position_rad).any():
-        raise RecordingError(f"{path}: {JOINT_TOPIC}: a message without a position of '{ros_messages.SPIN_JOINT}'")
-    return time_ns, position_rad

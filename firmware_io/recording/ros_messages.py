@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Iterable
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -31,7 +30,6 @@ POINT_FIELD_TYPES = {"<f8": 8, "<f4": 7, "<u4": 6, "<u2": 4}
 """`sensor_msgs/PointField`: FLOAT64, FLOAT32, UINT32, UINT16."""
 LASER_FRAME = "laser"
 SPIN_JOINT = "spin_joint"
-_SPIN_JOINT_BYTES = SPIN_JOINT.encode()
 _BEAM = np.dtype([("bearing", "<f8"), ("offset", "<u4")])
 _BEAM_FIELDS = [("bearing", 0, POINT_FIELD_TYPES["<f8"]), ("offset", 8, POINT_FIELD_TYPES["<u4"])]
 Beams = tuple[Floats, Times]
@@ -67,44 +65,10 @@ def encode_scan(scan: Scan) -> bytes:
     return bytes(_store().serialize_cdr(message, LASER_SCAN))
 
 
-class ScanPlaces(NamedTuple):
-    """Places of the numbers of a LaserScan."""
-
-    order: str  # of the bytes, for `struct`
-    numbers: slice  # the seven of all beams
-    ranges: slice  # float32 each
-    intensities: slice  # the same; empty if their number differs from that of the ranges
-    shared: tuple[slice, ...]  # equal bytes of messages that differ in time and measurement only
-
-    @classmethod
-    def of(cls, data: bytes) -> ScanPlaces:
-        """Find them in a message; ValueError or `struct.error` if it is cut off."""
-        order, _, at = _cdr_header(data)
-        ranges = _floats(data, order, at + 28)
-        intensities = _floats(data, order, ranges.stop)
-        # of the seven, the largest bearing is redundant, and the time between scans may vary
-        shared = slice(1, 2), slice(12, at + 4), slice(at + 8, at + 16), slice(at + 20, ranges.start)
-        lit = slice(intensities.start - 4, intensities.start)
-        if intensities.stop - intensities.start != ranges.stop - ranges.start:
-            intensities = slice(intensities.start, intensities.start)
-        return cls(order, slice(at, at + 28), ranges, intensities, (*shared, lit))
-
-
 def decode_scan(data: bytes) -> Scan:
     """Decode any LaserScan."""
-    places = ScanPlaces.of(data)
-    numbers = struct.unpack_from(f"{places.order}7f", data, places.numbers.start)
-    return Scan(
-        stamp_ns=_cdr_header(data)[1],
-        angle_min_rad=numbers[0],
-        angle_increment_rad=numbers[2],
-        time_increment_s=numbers[3],
-        scan_time_s=numbers[4],
-        range_min_m=numbers[5],
-        range_max_m=numbers[6],
-        range_m=np.frombuffer(data[places.ranges], f"{places.order}f4").astype(np.float32),
-        intensity=np.frombuffer(data[places.intensities], f"{places.order}f4").astype(np.float32),
-    )
+    message = decode_message(data, LASER_SCAN)
+    return scan_from_message(message, stamp_ns(message.header.stamp))
 
 
 def scan_from_message(message: Any, first_beam_ns: int) -> Scan:
@@ -165,7 +129,8 @@ def encode_joint(time_ns: int, position_rad: float) -> bytes:
 
 
 def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
-    """Encode a `sensor_msgs/msg/PointCloud2` of a structured array."""
+    """Encode a `sensor_msgs/msg/PointCloud2` of a structured array, shape (points,) or (height, width)."""
+    height, width = np.atleast_2d(rows).shape
     types = _store().types
     fields = [
         types["sensor_msgs/msg/PointField"](
@@ -175,12 +140,12 @@ def encode_points(rows: NDArray[np.void], frame: str, time_ns: int) -> bytes:
     ]
     message = types[POINT_CLOUD](
         header=_header(time_ns, frame),
-        height=1,
-        width=rows.size,
+        height=height,
+        width=width,
         fields=fields,
         is_bigendian=False,
         point_step=rows.dtype.itemsize,
-        row_step=rows.dtype.itemsize * rows.size,
+        row_step=rows.dtype.itemsize * width,
         data=np.frombuffer(rows.tobytes(), np.uint8),
         is_dense=False,
     )
@@ -230,40 +195,11 @@ def encode_text(text: str) -> bytes:
     return bytes(_store().serialize_cdr(_store().types[TEXT](data=text), TEXT))
 
 
-class JointPlaces(NamedTuple):
-    """Place of the position of the spin joint in a JointState."""
-
-    order: str  # of the bytes, for `struct`
-    position: slice  # float64
-    shared: tuple[slice, ...]  # equal bytes of messages with the same joints
-
-    @classmethod
-    def of(cls, data: bytes) -> JointPlaces | None:
-        """Find it in a message; None without a position of the joint; raises as `ScanPlaces.of`."""
-        order, _, at = _cdr_header(data)
-        (count,) = struct.unpack_from(f"{order}I", data, at)
-        at += 4
-        names = []
-        for _ in range(count):
-            name, at = _cdr_string(data, order, at)
-            names.append(name)
-        at = _aligned(at, 4)
-        (positions,) = struct.unpack_from(f"{order}I", data, at)
-        at = _aligned(at + 4, 8)
-        if _SPIN_JOINT_BYTES not in names or names.index(_SPIN_JOINT_BYTES) >= positions:
-            return None
-        start = at + 8 * names.index(_SPIN_JOINT_BYTES)
-        if start + 8 > len(data):
-            raise ValueError(f"{positions} positions in a message of {len(data)} bytes")
-        return cls(order, slice(start, start + 8), (slice(1, 2), slice(12, at)))
-
-
 def decode_joint(data: bytes) -> tuple[int, float]:
     """Return time [ns] and position [rad] of the spin joint in a JointState; NaN without it."""
-    places, time_ns = JointPlaces.of(data), _cdr_header(data)[1]
-    if places is None:
-        return time_ns, math.nan
-    return time_ns, struct.unpack_from(f"{places.order}d", data, places.position.start)[0]
+    message = decode_message(data, JOINT_STATE)
+    positions = dict(zip(message.name, message.position.tolist(), strict=False))
+    return stamp_ns(message.header.stamp), positions.get(SPIN_JOINT, math.nan)
 
 
 def decode_message(data: bytes, message_type: str) -> Any:
@@ -285,34 +221,3 @@ def _header(time_ns: int, frame_id: str) -> Any:
     seconds, nanoseconds = divmod(time_ns, 1_000_000_000)
     stamp = _store().types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
     return _store().types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
-
-
-def _cdr_header(data: bytes) -> tuple[str, int, int]:
-    """Return the byte order of a message for `struct`, and time [ns] and end of its std_msgs/Header."""
-    # 4 bytes of encapsulation (the second one has the byte order); alignment counts from their end, which is the same
-    # modulo 4, but not modulo 8: see `_aligned`
-    order = "<" if data[1] & 1 else ">"
-    seconds, nanoseconds = struct.unpack_from(f"{order}iI", data, 4)
-    _, at = _cdr_string(data, order, 12)
-    return order, seconds * 1_000_000_000 + nanoseconds, _aligned(at, 4)
-
-
-def _cdr_string(data: bytes, order: str, at: int) -> tuple[bytes, int]:
-    """Return a string without its closing zero, and its end."""
-    at = _aligned(at, 4)
-    (size,) = struct.unpack_from(f"{order}I", data, at)
-    if at + 4 + size > len(data):
-        raise ValueError(f"a string of {size} bytes in a message of {len(data)}")
-    return data[at + 4 : at + 4 + max(size - 1, 0)], at + 4 + size
-
-
-def _floats(data: bytes, order: str, at: int) -> slice:
-    """Return the place of the numbers of a sequence of float32."""
-    (count,) = struct.unpack_from(f"{order}I", data, at)
-    if at + 4 + 4 * count > len(data):
-        raise ValueError(f"{count} numbers in a message of {len(data)} bytes")
-    return slice(at + 4, at + 4 + 4 * count)
-
-
-def _aligned(at: int, size: int) -> int:
-    return at + (4 - at) % size

@@ -17,6 +17,7 @@ from numpy import ndarray
 
 from scanwright.design import frames
 from scanwright.design.arrays import Floats, Pose
+from scanwright.firmware_io.clouds.filters import voxel_sums
 from scanwright.firmware_io.registration.cube_map import cells_of
 from scanwright.firmware_io.registration.sensor_view import THREADS, Level, SensorView, make_level
 from scanwright.firmware_io.registration.surfels.adjust import adjust
@@ -69,7 +70,7 @@ def align(a: SensorView, b: SensorView, T_a_b: Pose) -> Pair:
     pair = judge_pair(a, b, T)
     exact = None if pair.why_not else adjust(a.beams, b.beams, T, a.spacing_m)
     if exact is not None:  # also if small_gicp did not settle: in sparse clouds its neighbours change at every step
-        return replace(pair, T_a_b=exact.T_a_b, covariance=exact.covariance)
+        return replace(pair, T_a_b=exact[0], covariance=exact[1])
     return pair if converged else refused(pair, f"small_gicp had not settled after {_MAX_STEPS} steps")
 
 
@@ -218,7 +219,7 @@ def _sandwich(
     """
     inverse = np.linalg.inv(J.T @ J)
     free = residual_m - J @ (inverse @ (J.T @ residual_m))
-    pulls = np.stack([np.bincount(block, column) for column in (J * free[:, None]).T], axis=1)
+    pulls = voxel_sums(block, J * free[:, None])
     scatter = pulls.T @ pulls * len(pulls) / max(len(pulls) - 6, 1)
     return np.asarray(inverse @ scatter @ inverse, float)
 

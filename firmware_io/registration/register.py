@@ -34,22 +34,15 @@ _START_OFF_M, _START_OFF_SHARE = 2.0, 0.3  # of the distance of two starts: abov
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """Result of the registration of a session.
+    """Result of the registration of a session."""
 
-    Attributes:
-        T_world: pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined.
-        covariance: of a small motion (rotation vector [rad], translation [m]) on its right, shape (n, 6, 6).
-        pairs: all tried pairs, the accepted ones first.
-        conflicts: pairs that overlap although one of the two scanners measured the space of the other's points to be
-            free, if some cloud has more of them than half its accepted pairs; else empty.
-        scale: factor on the stated sigmas of the pairs for them to agree, at least 1.
-    """
-
-    T_world: Float64[ndarray, "n 4 4"]
-    covariance: Float64[ndarray, "n 6 6"]
-    pairs: tuple[Pair, ...]
+    T_world: Float64[ndarray, "n 4 4"]  # pose of every cloud, shape (n, 4, 4); NaN for those that could not be joined
+    covariance: Float64[ndarray, "n 6 6"]  # of a small motion (rotation vector [rad], translation [m]) on its right
+    pairs: tuple[Pair, ...]  # all tried pairs, the accepted ones first
+    # pairs that overlap although one of the two scanners measured the space of the other's points to be free, if some
+    # cloud has more of them than half its accepted pairs; else empty
     conflicts: tuple[Pair, ...]
-    scale: float
+    scale: float  # factor on the stated sigmas of the pairs for them to agree, at least 1
 
     @property
     def complete(self) -> bool:
@@ -58,12 +51,9 @@ class Registration:
 
 
 def register(views: Sequence[SensorView], starts: Sequence[Pose], progress: Progress) -> Registration:
-    """Find all poses.
+    """Find all poses, from start poses in the world, one for each view, or none if they are unknown.
 
-    Args:
-        views: the clouds; the frame of the first one becomes the world, unless its pose is given.
-        starts: start poses in the world, one for each view; empty if unknown.
-        progress: callback.
+    The frame of the first cloud becomes the world, unless its pose is given.
     """
     pairs: dict[tuple[int, int], Pair] = {}
     poses = _chain(views, starts, pairs, progress)
@@ -115,30 +105,20 @@ def _chain(
 ) -> dict[int, Floats]:
     """Return a first pose for every cloud that can be joined to the first; neighbours in the list are tried first."""
     poses = {0: starts[0] if starts else np.eye(4)}
-    while joined := _next_joined(views, starts, poses, pairs, progress):
-        poses.update(joined)
-    return poses
-
-
-def _next_joined(
-    views: Sequence[SensorView],
-    starts: Sequence[Floats],
-    poses: dict[int, Floats],
-    pairs: dict[tuple[int, int], Pair],
-    progress: Progress,
-) -> dict[int, Floats]:
-    """Return the index and pose of one more cloud; empty if all pairs were tried."""
-    missing = [k for k in range(len(views)) if k not in poses]
-    untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
-    for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
-        low, high = min(i, k), max(i, k)
-        progress(f"aligning {views[low].name} and {views[high].name}")
-        pair = _pair(views[low], views[high], [starts[low], starts[high]] if starts else [])
-        pairs[low, high] = pair
-        _LOG.info("%s and %s: %s", pair.a, pair.b, "; ".join(pair.why_not) or f"{pair.overlap:.0%} overlap")
-        if not pair.why_not:
-            return {k: poses[i] @ (pair.T_a_b if i == low else np.linalg.inv(pair.T_a_b))}
-    return {}
+    while True:
+        missing = [k for k in range(len(views)) if k not in poses]
+        untried = [(k, i) for k in missing for i in poses if (min(i, k), max(i, k)) not in pairs]
+        for k, i in sorted(untried, key=lambda pair: (abs(pair[0] - pair[1]), pair)):
+            low, high = min(i, k), max(i, k)
+            progress(f"aligning {views[low].name} and {views[high].name}")
+            pair = _pair(views[low], views[high], [starts[low], starts[high]] if starts else [])
+            pairs[low, high] = pair
+            _LOG.info("%s and %s: %s", pair.a, pair.b, "; ".join(pair.why_not) or f"{pair.overlap:.0%} overlap")
+            if not pair.why_not:
+                poses[k] = poses[i] @ (pair.T_a_b if i == low else np.linalg.inv(pair.T_a_b))
+                break
+        else:
+            return poses
 
 
 def _pair(a: SensorView, b: SensorView, starts: Sequence[Floats]) -> Pair:

@@ -13,12 +13,12 @@ from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import check_place
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.clouds.formats import check_target, read_clouds, write_clouds
-from scanwright.firmware_io.registration.merge import merge
 from scanwright.firmware_io.registration.overlap_picture import overlap_picture
 from scanwright.firmware_io.registration.pairwise import Pair
 from scanwright.firmware_io.registration.poses import cloud_names, read_poses, write_covariances, write_poses
 from scanwright.firmware_io.registration.register import Registration, register
 from scanwright.firmware_io.registration.sensor_view import make_view
+from scanwright.firmware_io.registration.thin import merge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,17 +89,8 @@ def register_files(
 ) -> RegisteredFiles:
     """Register clouds; write map, poses, covariances and picture if the registration is complete.
 
-    Args:
-        paths: files of clouds, at least two clouds in all.
-        out: the map, in any format.
-        poses: TUM file to write; `.cov.csv` goes into the same folder.
-        start: TUM file of start poses, by the names in its comments or in the order of the clouds; without it the poses
-            in the files, if there are any, are the start.
-        spacing_m: between the points that are registered.
-        map_spacing_m: edge of the voxels of the map.
-        scanner: angle set that all clouds were assembled with, whose covariance enters those of the poses. None takes
-            the calibration as exact.
-        progress: callback.
+    The arguments are those of `scanwright.register`; the covariances get the suffix `.cov.csv`, the picture `.png`.
+    Without `start`, the poses in the files, if there are any, are the start.
 
     Raises:
         RecordingError: a file cannot be read or written, there is only one cloud, or the angle set states no

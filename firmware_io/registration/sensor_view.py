@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import small_gicp
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 from numpy import ndarray
 
 from scanwright.design.angles import AngleSet
@@ -55,14 +55,10 @@ def make_view(
     scanner: AngleSet | None = None,
     joint_rad: Float64[ndarray, " n"] | None = None,
 ) -> SensorView:
-    """Prepare a cloud for registration.
+    """Prepare a cloud for registration: points of shape (n, 3), as measured; rows with NaN are left out.
 
-    Args:
-        name: for messages.
-        points_m: shape (n, 3), in the order in which they were measured; rows with NaN are left out.
-        spacing_m: edge of the finest voxels.
-        scanner: angle set that the cloud was assembled with, if its covariance is used.
-        joint_rad: angle of the axis at each point, shape (n,), if `scanner` is given.
+    `scanner`: angle set that the cloud was assembled with, if its covariance is used; it requires the angle of the axis
+    at each point, `joint_rad`, shape (n,).
     """
     points_m = np.ascontiguousarray(points_m, float)
     finite = np.isfinite(points_m).all(axis=1)
@@ -76,7 +72,12 @@ def make_view(
             f"{name}: {len(thinned)} points {spacing_m:g} m apart: register needs at least {_MIN_POINTS}"
         )
     coarse, _ = voxel_means(thinned, thinned, _COARSE * spacing_m)
-    beams = _beams(points_m, voxels_m, counts, joint_rad, scanner)
+    eye_m, frame, covariance = np.zeros(3), np.zeros((3, 2)), None
+    if scanner is not None:
+        T = scanner.T_world_rot(0.0)
+        eye_m, frame, covariance = T[:3, 3].copy(), T[:3, :2].copy(), np.array(scanner.covariance)
+    turned = np.remainder(joint_rad, 2 * np.pi).astype(np.float32)
+    beams = Beams(points_m.astype(np.float32), voxels_m, counts, eye_m, turned, frame, covariance)
     return SensorView(name, spacing_m, make_level(thinned), make_level(coarse), depth_map(thinned, _DEPTH_SIDE), beams)
 
 
@@ -103,18 +104,3 @@ def _joints(
             "assemble the cloud with it, or register without the angle set"
         )
     return joint_rad
-
-
-def _beams(
-    points_m: Float64[ndarray, "n 3"],
-    voxels_m: Float64[ndarray, "k 3"],
-    counts: Int64[ndarray, " k"],
-    joint_rad: Float64[ndarray, " joints"],
-    scanner: AngleSet | None,
-) -> Beams:
-    eye_m, frame, covariance = np.zeros(3), np.zeros((3, 2)), None
-    if scanner is not None:
-        T = scanner.T_world_rot(0.0)
-        eye_m, frame, covariance = T[:3, 3].copy(), T[:3, :2].copy(), np.array(scanner.covariance)
-    turned = np.remainder(joint_rad, 2 * np.pi).astype(np.float32)
-    return Beams(points_m.astype(np.float32), voxels_m, counts, eye_m, turned, frame, covariance)

@@ -43,14 +43,6 @@ Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
-    """A start pose."""
-
-    T_a_b: Pose  # shape (4, 4)
-    score: float  # cosine of the angle between the two plans as vectors: 1 if they are equal
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class _Plan:
     T_level_view: Pose
     points_m: Float64[ndarray, "n 2"]
@@ -58,7 +50,7 @@ class _Plan:
     floors: Floats
 
 
-def starts(a: SensorView, b: SensorView, count: int) -> list[Start]:
+def starts(a: SensorView, b: SensorView, count: int) -> list[Pose]:
     """Return the best distinct guesses of the pose of b in the frame of a, best first; empty without walls."""
     plans = _plan(a), _plan(b)
     if not all(len(plan.points_m) for plan in plans):
@@ -76,28 +68,28 @@ def starts(a: SensorView, b: SensorView, count: int) -> list[Start]:
         match = scipy.fft.ifft2(spectrum * scipy.fft.fft2(moving).conj()).real
         best = np.argpartition(match.ravel(), -_PEAKS)[-_PEAKS:]
         peaks += [(float(match.flat[k]) / norm, float(heading), *divmod(int(k), size)) for k in best]
-    starts: list[Start] = []
-    for score, heading, row, column in sorted(peaks, reverse=True):
+    starts: list[Pose] = []
+    for _, heading, row, column in sorted(peaks, reverse=True):
         shift_m = cell_m * (np.array([row, column]) - size * (np.array([row, column]) > size // 2))
         T = frames.rigid(frames.Rz(heading), [*shift_m, 0.0])
-        if all(_distinct(T, other.T_a_b) for other in starts):
-            starts.append(Start(T, score))
+        if all(_distinct(T, other) for other in starts):
+            starts.append(T)
         if len(starts) == count:
             break
     lift = frames.rigid(np.eye(3), [0.0, 0.0, _height_m(*plans)])
     down = np.linalg.inv(plans[0].T_level_view)
-    return [Start(down @ lift @ start.T_a_b @ plans[1].T_level_view, start.score) for start in starts]
+    return [down @ lift @ T @ plans[1].T_level_view for T in starts]
 
 
 def find_start(a: SensorView, b: SensorView) -> Pair:
     """Register b to a without a start: the best of several guesses, refused if a second one is as good."""
-    guesses = sorted(starts(a, b, _STARTS), key=lambda start: coarse_merit(a, b, start.T_a_b), reverse=True)
+    guesses = sorted(starts(a, b, _STARTS), key=lambda T: coarse_merit(a, b, T), reverse=True)
     if not guesses:
         why = "no walls or other upright surfaces to find a start from: give a start pose"
         return Pair(a.name, b.name, np.full((4, 4), np.nan), np.full((6, 6), np.nan), 0.0, 0.0, (why,))
     settled: list[tuple[float, Floats]] = []
     for guess in guesses[:_SETTLED]:
-        T = align_coarsely(a, b, guess.T_a_b)
+        T = align_coarsely(a, b, guess)
         if all(_distinct(T, other) for _, other in settled):
             settled.append((coarse_merit(a, b, T), T))
     settled.sort(key=lambda starts: starts[0], reverse=True)

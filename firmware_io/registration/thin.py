@@ -1,4 +1,4 @@
-"""Resampling of a cloud to an even density.
+"""Resampling of a cloud to an even density, and the merging of registered clouds by the means of voxels.
 
 A rotating 2D lidar measures some directions a hundred times more densely than others, near surfaces more densely than
 far ones, and along a line more densely than across. Such a cloud would register its own pattern: the twenty nearest
@@ -10,17 +10,22 @@ between neighbouring beams give the gap between the lines there; no voxel is fin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float64, Int64
 from numpy import ndarray
 from numpy.typing import NDArray
 
+from scanwright.design import frames
 from scanwright.design.arrays import Floats
-from scanwright.firmware_io.clouds.voxels import voxel_of, voxel_sums
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.filters import voxel_of, voxel_sums
 from scanwright.firmware_io.registration.cube_map import cells_of, solid_angles_sr
 
 _SIDE = 45  # cells of 2 deg: narrower than the density varies, wider than the lines of a scan of two seconds
 _LEVELS = 3  # voxels grow up to 2**3 times
+_SINGLE_M = 500.0  # beyond it float32 is coarser than 0.03 mm
 
 
 def thin(means: Floats, counts: NDArray[np.int64], spacing_m: float, step_rad: float) -> Float64[ndarray, "kept 3"]:
@@ -71,3 +76,24 @@ def voxel_means(
     weight = np.ones(len(points_m), np.int64) if counts is None else counts
     sums = voxel_sums(voxel_of(points_m, spacing_m, level), np.column_stack([values * weight[:, None], weight]))
     return sums[:, :-1] / sums[:, -1:], sums[:, -1].astype(np.int64)
+
+
+def merge(clouds: Sequence[Cloud], T_world: Float64[ndarray, "n 4 4"], spacing_m: float) -> Cloud:
+    """Return the map in the world frame: one point for each voxel with an edge of `spacing_m`.
+
+    Its columns are `count`, the number of points of the voxel, and the mean `intensity` if every cloud has one.
+    """
+    bright = all("intensity" in cloud.columns for cloud in clouds)
+    means, counts = [], []
+    for cloud, T in zip(clouds, T_world, strict=True):
+        valid = np.isfinite(cloud.points_m).all(axis=1)
+        world = frames.apply(T, cloud.points_m[valid].astype(float))
+        rows = np.column_stack([world, cloud.columns["intensity"][valid]]) if bright else world
+        mean, count = voxel_means(world, rows, spacing_m)
+        means.append(mean)
+        counts.append(count)
+    every, level = np.concatenate(means), np.zeros(sum(map(len, means)), np.uint8)
+    joined, number = voxel_means(every[:, :3], every, spacing_m, level, np.concatenate(counts))
+    real = np.float32 if np.abs(joined[:, :3]).max() < _SINGLE_M else np.float64
+    columns = {"intensity": joined[:, 3].astype(np.float32)} if bright else {}
+    return Cloud(joined[:, :3].astype(real), columns | {"count": number.astype(np.uint32)})

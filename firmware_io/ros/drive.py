@@ -49,11 +49,7 @@ class Steered(Watch, Protocol):
 def drive(plan: ScanPlan, steered: Steered, progress: Progress, viewer: Watch = UNWATCHED) -> None:
     """Scan until Ctrl-C or an exception other than of a device; the devices are stopped on every exit.
 
-    Args:
-        plan: endless.
-        steered: receives the scan, and has the parameters.
-        progress: called with each step.
-        viewer: receives the scan too.
+    `plan` is endless; `steered` receives the scan and has the parameters; `viewer` receives the scan too.
 
     Raises:
         ServoSetupError: permanent settings of the servo must change first.

@@ -9,16 +9,17 @@
     diagnostics        diagnostic_msgs/DiagnosticArray    once a second, if ROS 2 has diagnostic_msgs
     clock              rosgraph_msgs/Clock        of a replayed recording
 
-Publishers are reliable, as RViz requires; this also serves subscribers with best effort. Parameters `running` and
+Messages are published as bytes of CDR, like those of recordings. Publishers are reliable, as RViz requires; this also
+serves subscribers with best effort. Parameters `running` and
 `period_s` start, stop and change the motion. Requires the robot's ROS 2, or the wheels of the extra.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from threading import Event, Thread
 from typing import Any, Literal
@@ -32,15 +33,17 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import String
 
 from scanwright.design import frames
 from scanwright.design.angles import AngleSet
+from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.streaming import Assembler, ScanPoints
-from scanwright.firmware_io.ros import messages
+from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.ros.drive import Interrupted
 from scanwright.firmware_io.ros.point_rows import in_rot, point_rows, turn_rows
 from scanwright.firmware_io.ros.robot_frames import fixed_frames
@@ -55,6 +58,22 @@ _FLUSHED_S = 5.0  # for slow subscribers
 _LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+@dataclass(frozen=True, slots=True)
+class Publishing:
+    """Options of the node."""
+
+    smooth: bool = True  # smooth the steps of the encoder in the points
+    per_turn: bool = False  # one message of points per turn, not per scan
+    frame: PointsFrame = "world"  # of the points
+    publish_tf: bool = True  # publish the frames; False if `robot_state_publisher` does
+
+    def __post_init__(self) -> None:
+        if self.per_turn and self.frame == "rot":
+            raise RecordingError(
+                "frame = rot, per_turn: a frame that rotates cannot hold the points of a turn; publish per scan"
+            )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PublishedScanner:
     """The published scanner."""
@@ -62,10 +81,7 @@ class PublishedScanner:
     angles: AngleSet  # angle set in use
     own_body: OwnBody | None  # self-occlusion mask, if known
     urdf: str | None  # its description with the frames of `angles`
-    smooth: bool = True  # smooth the steps of the encoder in `points`
-    publish_tf: bool = True  # False if another node does
-    per_turn: bool = False  # one message of points per turn, not per scan
-    points_frame: PointsFrame = "world"  # frame of the points; `rot` of single scans only
+    points: Publishing
 
 
 class ScannerNode:
@@ -86,7 +102,7 @@ class ScannerNode:
         self._joint = make(JointState, "joint_states", 100)
         self._points = make(PointCloud2, "points", 10)
         self._clock = make(Clock, "/clock", 10) if replayed else None
-        self._tf = self._tf_publisher() if scanner.publish_tf and find_spec("tf2_msgs") else None
+        self._tf = self._tf_publisher() if scanner.points.publish_tf and find_spec("tf2_msgs") else None
         self._diagnostics = self._diagnostics_publisher() if find_spec("diagnostic_msgs") else None
         if scanner.urdf is not None:
             self._description = make(String, "robot_description", _LATCHED)
@@ -97,7 +113,9 @@ class ScannerNode:
 
     def begin(self) -> None:
         """Reset the assembly before a new run of the devices."""
-        self._assembler = Assembler(self._scanner.angles, own_body=self._scanner.own_body, smooth=self._scanner.smooth)
+        self._assembler = Assembler(
+            self._scanner.angles, own_body=self._scanner.own_body, smooth=self._scanner.points.smooth
+        )
         self._turns = Turns()
         self._changed.clear()
 
@@ -106,8 +124,8 @@ class ScannerNode:
         self._check()
         stamp_ns = time_ns + self._wall_minus_ns
         if self._clock is not None:
-            self._clock.publish(Clock(clock=messages.time_of(stamp_ns)))
-        self._joint.publish(messages.joint_state(position_rad, stamp_ns))
+            self._clock.publish(Clock(clock=Time(nanoseconds=stamp_ns).to_msg()))
+        self._joint.publish(ros_messages.encode_joint(stamp_ns, position_rad))
         if self._tf is not None:
             self._tf(stamp_ns, position_rad)
         self._push(JointSample(time_ns, position_rad))
@@ -117,7 +135,8 @@ class ScannerNode:
     def scan(self, scan: Scan) -> None:
         """See `Watch`."""
         self._check()
-        self._scan.publish(messages.laser_scan(scan, scan.stamp_ns + self._wall_minus_ns))
+        stamped = replace(scan, stamp_ns=scan.stamp_ns + self._wall_minus_ns)
+        self._scan.publish(ros_messages.encode_scan(stamped))
         self.scans += 1
         self._scanned_s = time.monotonic()
         self._push(scan)
@@ -169,8 +188,7 @@ class ScannerNode:
         level = 2 if self._failed else 3 if silent and self.running else 0
         left_out = {f"left out: {reason}": count for reason, count in self._assembler.left_out.items()}
         values = {"scans": self.scans, "beams": self._beams, "running": self.running, **left_out}
-        stamp_ns = time.time_ns()
-        self._diagnostics.publish(messages.diagnostics(level, self._status, values, stamp_ns))
+        self._diagnostics.publish(_diagnostics(level, self._status, values))
 
     def _check(self) -> None:
         if self._changed.is_set():
@@ -182,20 +200,20 @@ class ScannerNode:
 
     def _place(self, line: ScanPoints) -> None:
         self._beams += line.scan.range_m.size
-        if self._scanner.per_turn:
+        if self._scanner.points.per_turn:
             self._publish_turns(self._turns.push(line))
             return
-        if self._scanner.points_frame == "rot":
+        if self._scanner.points.frame == "rot":
             line = in_rot(line, self._scanner.angles)
-        self._publish_points(point_rows(line)[np.newaxis], line.scan.stamp_ns)
+        self._publish_points(point_rows(line), line.scan.stamp_ns)
 
     def _publish_turns(self, turns: list[list[ScanPoints]]) -> None:
         for lines in turns:
             self._publish_points(turn_rows(lines), lines[0].scan.stamp_ns)
 
     def _publish_points(self, rows: NDArray[np.void], stamp_ns: int) -> None:
-        frame = self._scanner.points_frame
-        self._points.publish(messages.point_cloud(rows, frame, stamp_ns + self._wall_minus_ns))
+        frame = self._scanner.points.frame
+        self._points.publish(ros_messages.encode_points(rows, frame, stamp_ns + self._wall_minus_ns))
 
     def _set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         for parameter in parameters:
@@ -212,15 +230,13 @@ class ScannerNode:
         from tf2_msgs.msg import TFMessage
 
         self._tf_static = self.node.create_publisher(TFMessage, "/tf_static", _LATCHED)
-        stamp_ns = time.time_ns()
-        fixed = fixed_frames(self._scanner.angles)
-        transforms = [messages.transform(f.parent, f.child, f.T_parent_child, stamp_ns) for f in fixed]
-        self._tf_static.publish(TFMessage(transforms=transforms))
+        fixed = [(f.parent, f.child, f.T_parent_child) for f in fixed_frames(self._scanner.angles)]
+        self._tf_static.publish(ros_messages.encode_transforms(fixed, time.time_ns()))
         turning = self.node.create_publisher(TFMessage, "/tf", 100)
 
         def publish(stamp_ns: int, position_rad: float) -> None:
-            T_servo_rot = frames.rigid(frames.Rz(position_rad), np.zeros(3))
-            turning.publish(TFMessage(transforms=[messages.transform("servo", "rot", T_servo_rot, stamp_ns)]))
+            turned = ("servo", "rot", frames.rigid(frames.Rz(position_rad), np.zeros(3)))
+            turning.publish(ros_messages.encode_transforms([turned], stamp_ns))
 
         return publish
 
@@ -228,6 +244,17 @@ class ScannerNode:
         from diagnostic_msgs.msg import DiagnosticArray
 
         return self.node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+
+
+def _diagnostics(level: int, message: str, values: Mapping[str, object]) -> Any:
+    """Return a `diagnostic_msgs/DiagnosticArray`; level 0 is good, 1 a warning, 2 an error, 3 stale."""
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    status = DiagnosticStatus(level=bytes([level]), name="scanwright: scanner", message=message, values=pairs)
+    array = DiagnosticArray(status=[status])
+    array.header.stamp = Time(nanoseconds=time.time_ns()).to_msg()
+    return array
 
 
 @contextmanager

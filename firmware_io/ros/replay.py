@@ -14,8 +14,7 @@ from scanwright.design.findings import sentence
 from scanwright.firmware_io.recording.import_checks.stream import StreamChecks
 from scanwright.firmware_io.recording.recording import Recording, open_recording
 from scanwright.firmware_io.samples import JointSample, Scan
-from scanwright.firmware_io.scan.live_feed import Watch
-from scanwright.firmware_io.scan.reporter import Reporter
+from scanwright.firmware_io.scan.live_feed import Reporter, Watch
 
 
 def replay(
@@ -23,11 +22,8 @@ def replay(
 ) -> tuple[int, int]:
     """Replay a recording as `acquire` publishes a scan, after the angle after its last beam, with its checks.
 
-    Args:
-        path: the recording.
-        watch: receives scans, angles, and warnings of the checks; its `close` is not called.
-        rate: speed relative to the recording.
-        wait_until: waits until so many seconds after the start; None for the clock of this computer.
+    `watch` receives scans, angles, and warnings of the checks; its `close` is not called. `wait_until` waits until so
+    many seconds after the start; None for the clock of this computer.
 
     Returns:
         Number of scans and number of angles published.

@@ -70,8 +70,10 @@ def fixed_frames(angles: AngleSet) -> tuple[FixedFrame, FixedFrame]:
 
 def what_changed(before: AngleSet, after: AngleSet) -> list[str]:
     """Describe the changes of the frames by a calibration."""
+    from scipy.spatial.transform import Rotation
+
     T_before, T_after = before.T_rot_laser(), after.T_rot_laser()
-    leans_rad = _rotation_vector(T_after[:3, :3] @ T_before[:3, :3].T)
+    leans_rad = Rotation.from_matrix(T_after[:3, :3] @ T_before[:3, :3].T).as_rotvec()
     shift_m = T_after[:3, 3] - T_before[:3, 3]
     angle_rad, moved_m = float(np.linalg.norm(leans_rad)), float(np.linalg.norm(shift_m))
     sd = None if after.covariance is None else np.sqrt(np.diag(after.covariance))
@@ -141,13 +143,6 @@ def read_urdf(path: Path) -> str:
 def calibrated_urdf_place(out: Path) -> Path:
     """Return the path of the URDF of an angle set: scanner.calibrated.urdf of angles.calibrated.json."""
     return out.with_name(out.stem.replace("angles", "scanner", 1) + ".urdf")
-
-
-def _rotation_vector(R: Array) -> Array:
-    """Return axis times angle [rad] of a rotation by less than half a turn, shape (3,)."""
-    vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    sine = float(np.linalg.norm(vector))
-    return vector * (math.atan2(sine, (float(np.trace(R)) - 1) / 2) / sine if sine else 1.0)
 
 
 def _row(values: Array | tuple[float, ...]) -> str:

@@ -3,37 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 from scanwright.design.angles import angles_in_use
-from scanwright.design.errors import RecordingError
 from scanwright.design.progress import Progress
 from scanwright.firmware_io.assembly.own_body import own_body_of
-from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import read_note, rests_in_scans
 from scanwright.firmware_io.ros.drive import drive
-from scanwright.firmware_io.ros.node import PointsFrame, PublishedScanner, running_node
+from scanwright.firmware_io.ros.node import PublishedScanner, Publishing, running_node
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
 from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
-
-
-@dataclass(frozen=True, slots=True)
-class Publishing:
-    """Options of the node."""
-
-    smooth: bool = True  # smooth the steps of the encoder in the points
-    per_turn: bool = False  # one message of points per turn, not per scan
-    frame: PointsFrame = "world"  # of the points
-    publish_tf: bool = True  # publish the frames; False if `robot_state_publisher` does
-
-    def __post_init__(self) -> None:
-        if self.per_turn and self.frame == "rot":
-            raise RecordingError(
-                "frame = rot, per_turn: a frame that rotates cannot hold the points of a turn; publish per scan"
-            )
 
 
 def serve_devices(
@@ -46,13 +28,8 @@ def serve_devices(
 ) -> None:
     """Publish a scan until Ctrl-C; the devices are stopped on every exit.
 
-    Args:
-        out: build folder.
-        plan: endless.
-        ros_args: of ROS 2, such as `--ros-args -r scan:=front/scan`.
-        progress: callback.
-        points: options.
-        viewer: receives the scan too.
+    `plan` is endless; `ros_args` are those of ROS 2, such as `--ros-args -r scan:=front/scan`; `viewer` receives the
+    scan too.
 
     Raises:
         TaskError: the folder has no angle set.
@@ -67,7 +44,7 @@ def serve_recording(
     out: Path, recording: Path, ros_args: Sequence[str], progress: Progress, points: Publishing, *, rate: float = 1.0
 ) -> None:
     """Publish a recording in real time, with its clock on /clock; arguments and errors as for `serve_devices`."""
-    at_rest = rests_in_scans(read_note(recording, NOTE))
+    at_rest = rests_in_scans(read_note(recording))
     with running_node(_scanner(out, points, at_rest), ros_args, replayed=True) as node:
         progress("waiting for a subscriber to scan, joint_states or points")
         node.await_subscriber()
@@ -83,8 +60,5 @@ def _scanner(out: Path, points: Publishing, at_rest: bool) -> PublishedScanner:
         angles=in_use.angles,
         own_body=own_body_of(in_use.path),
         urdf=description(out, in_use.angles),
-        smooth=points.smooth and not at_rest,
-        publish_tf=points.publish_tf,
-        per_turn=points.per_turn,
-        points_frame=points.frame,
+        points=replace(points, smooth=points.smooth and not at_rest),
     )

@@ -11,10 +11,9 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
-from threading import Event
 
 import numpy as np
 
@@ -29,11 +28,10 @@ from scanwright.firmware_io.recording.import_checks.stream import StreamChecks
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread, turning_servo
 from scanwright.firmware_io.scan.lidar_scans import LidarScans, settle_clock
-from scanwright.firmware_io.scan.live_feed import UNWATCHED, Watch
+from scanwright.firmware_io.scan.live_feed import UNWATCHED, Reporter, Watch
 from scanwright.firmware_io.scan.plan import ScanPlan
 from scanwright.firmware_io.scan.recorder import Recorder, recorder_of
-from scanwright.firmware_io.scan.reporter import Reporter
-from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
+from scanwright.firmware_io.scan.scan_end import BETWEEN_STOPS, ScanSummary
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo
 
@@ -58,13 +56,15 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
     """
     reporter = Reporter(progress, watch)
     ros_messages.definition(ros_messages.LASER_SCAN)  # loads the message types for half a second, not while recording
-    with _unturned_until_opened() as opened, ExitStack() as stack:
-        lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
-        lidar.set_filters(plan.echo, mean_filter_off=plan.mean_filter_off)
-        servo = stack.enter_context(
-            open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id, spins=isinstance(plan.motion, Spin))
-        )
-        opened.set()
+    with ExitStack() as stack:
+        try:
+            lidar = stack.enter_context(open_lidar(plan.ports.lidar, plan.angles.sensor, plan.stamp_at))
+            lidar.set_filters(plan.echo, mean_filter_off=plan.mean_filter_off)
+            spins = isinstance(plan.motion, Spin)
+            servo = stack.enter_context(open_servo(plan.ports.servo, plan.angles.servo, plan.servo_id, spins=spins))
+        except KeyboardInterrupt as stop:
+            stop.add_note("the servo was not started")
+            raise
         check_model(plan.angles, lidar)
         reporter.step(f"{lidar.model} {lidar.serial_number} and {servo.model}, {servo.read().voltage_V:.1f} V")
         for warning in servo.warnings():
@@ -79,18 +79,6 @@ def acquire(plan: ScanPlan, progress: Progress = no_progress, watch: Watch = UNW
         axis.longest_gap_ns = 0
         summary = _record(plan, scans, axis, reporter)
         return replace(summary, lost_replies=servo.lost_replies - before, longest_gap_s=axis.longest_gap_ns / 1e9)
-
-
-@contextmanager
-def _unturned_until_opened() -> Iterator[Event]:
-    """Add a note to a Ctrl-C before the servo is opened (the event is set): it was not turned."""
-    opened = Event()
-    try:
-        yield opened
-    except KeyboardInterrupt as stop:
-        if not opened.is_set():
-            stop.add_note("the servo was not started")
-        raise
 
 
 def check_model(angles: AngleSet, lidar: LidarDriver) -> None:

@@ -43,11 +43,7 @@ _READS_HZ = 1.2 * SERVO_HZ  # with a reserve
 def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: int | None) -> Iterator[Finding]:
     """Examine the given ports, the emulated scanner of the build folder, or the ports with USB ids of the catalogue.
 
-    Args:
-        out: build folder; its angle set names the expected devices.
-        lidar: address.
-        servo: port.
-        servo_id: None if it is the only servo.
+    The angle set of the build folder `out` names the expected devices; `servo_id` is None for the only servo.
     """
     yield _ok("system", "", f"python {platform.python_version()} on {platform.system()} {platform.machine()}")
     angles = None if out is None else load_angles(out / "angles.json")
@@ -77,13 +73,8 @@ def examine(out: Path | None, lidar: str | None, servo: str | None, servo_id: in
 def fix(out: Path | None, servo: str | None, servo_id: int | None) -> tuple[str, Iterator[str | Path]]:
     """Correct servo settings of a given port or an emulated scanner; DeviceError without either.
 
-    Args:
-        out: build folder, which gets the undo file; None for the working folder.
-        servo: port.
-        servo_id: None if it is the only servo.
-
-    Returns:
-        The port, and the steps of `settings.set_up`.
+    The build folder `out`, or the working folder, gets the undo file. Returns the port, and the steps of
+    `settings.set_up`.
     """
     emulators = None if out is None else emulated(out)
     port = servo or (emulators.servo if emulators else None)

@@ -13,7 +13,7 @@ from scanwright.design.errors import DeviceError, DeviceFaultError
 from scanwright.firmware_io.lidar.lidar import LidarDriver, TimedScan
 from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.scan.axis_thread import AxisThread
-from scanwright.firmware_io.scan.reporter import Reporter
+from scanwright.firmware_io.scan.live_feed import Reporter
 
 CLOCK_GOOD_NS = 500_000  # 0.03 deg at 60 deg/s, a third of an encoder's step
 _CLOCK_LEAST_S = 3.0  # three one-second buckets give a rate

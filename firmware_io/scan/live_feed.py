@@ -6,6 +6,7 @@ that computes points. A slow viewer loses its oldest scans, which are counted; t
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from jaxtyping import Float32, Float64, Int64
 from numpy import ndarray
 
 from scanwright.design.angles import AngleSet
+from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.streaming import Assembler
@@ -27,6 +29,7 @@ from scanwright.firmware_io.scan.scan_end import ScanEnd
 MOST_SCANS = 400  # ten seconds at 40 Hz, the start of the page on a busy computer
 MOST_ANGLES = 2000  # 20 s at 100 Hz
 EVERY_S = 0.2  # five times a second looks continuous
+_log = logging.getLogger(__name__)
 
 
 class Watch(Protocol):
@@ -57,6 +60,24 @@ class Unwatched(Viewer):
 
 
 UNWATCHED = Unwatched()  # type: ignore[abstract]  # the empty bodies of `Viewer` are its implementation
+
+
+@dataclass(frozen=True, slots=True)
+class Reporter:
+    """Messages of a scan: progress for the caller, warnings for the log, both for live viewers."""
+
+    progress: Progress = no_progress
+    watch: Watch = UNWATCHED
+
+    def step(self, text: str, fraction: float | None = None) -> None:
+        """Report a step, and its completed fraction."""
+        self.progress(text, fraction)
+        self.watch.message(text if fraction is None else f"{fraction:.0%}: {text}")
+
+    def warn(self, text: str) -> None:
+        """Report a warning."""
+        _log.warning("%s", text)
+        self.watch.message(f"warning: {text}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,21 +78,8 @@ def plan_scan(
 ) -> ScanPlan:
     """Plan a scan with the scanner of a build folder, without opening a device or writing a file.
 
-    Args:
-        out: build folder with an `angles.json`.
-        turns: full scans.
-        period_s: of one full scan; None for that of the angle set. `calibrate` needs two to find the backlash.
-        lidar: address; None for the emulated or the connected one, as for `servo`.
-        servo: port.
-        servo_id: None if it is the only servo.
-        recording: None for one in `out`, named by date and time.
-        intensity: record intensities.
-        cluster: steps that share one range, the smallest of them.
-        every: record only each n-th scan.
-        stamp_at: beam of the sensor's timestamps; None for the default of its family.
-        echo: echo that a beam of a SICK reports; None leaves it unchanged.
-        mean_filter_off: switch a SICK's mean filter off.
-        endless: record nothing and run until stopped; `turns` and `recording` have no effect.
+    The arguments are those of `scanwright.scan`. An `endless` scan records nothing and runs until it is stopped;
+    `turns` and `recording` have no effect.
 
     Raises:
         ScanwrightError: no angle set, no motion, a servo that cannot measure it, no port, or an invalid file name.

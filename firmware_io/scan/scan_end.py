@@ -1,14 +1,15 @@
-"""End of a scan, with the lines of the terminal, for live views."""
+"""Summary and end of a scan, with the lines of the terminal, for live views."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from scanwright.design.errors import ScanwrightError, UnsafeError, UnsafeNote, notes_of
-from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
+BETWEEN_STOPS = "scans between two stops"  # dropped by design
 Outcome = Literal["done", "lossy", "stopped", "failed", "unsafe"]
 
 _SERVO_UNKNOWN = "state of the servo unknown: check it, and cut its power if it turns"
@@ -19,6 +20,49 @@ _HEADINGS: dict[Outcome, str] = {
     "failed": "The scan failed.",
     "unsafe": "The scan failed. A device may still be on.",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class ScanSummary:
+    """Data of a scan."""
+
+    recording: Path
+    scans: int
+    joint_samples: int
+    duration_s: float  # from the first to the last scan
+    speed_deg_s: float  # mean speed of the servo; 0 for a sweep
+    ripple_deg: float  # rms deviation from uniform rotation over half a second
+    clock_ns: int  # standard uncertainty of the beam times at the end
+    reconnects: int  # of the lidar
+    left_out: dict[str, int]  # dropped data, reason -> count
+    lost_replies: int = 0  # missing or damaged ones of the servo
+    longest_gap_s: float = 0.0  # between two servo angles
+
+    @property
+    def lost_data(self) -> bool:
+        """Whether data are missing other than those dropped by design."""
+        return bool(self.reconnects or set(self.left_out) - {BETWEEN_STOPS})
+
+    def lines(self) -> list[str]:
+        """Format the summary."""
+        lines = [f"dropped {count:,}: {reason}" for reason, count in self.left_out.items()]
+        if self.reconnects:
+            lines.append(f"lidar reconnects: {self.reconnects}")
+        if self.lost_replies:
+            share = self.lost_replies / (self.joint_samples + self.lost_replies)
+            turned_deg = abs(self.speed_deg_s) * self.longest_gap_s
+            lines.append(
+                f"lost servo replies: {self.lost_replies:,} ({share:.1%}); longest gap between angles: "
+                f"{self.longest_gap_s:.3f} s" + (f", {turned_deg:.1f} deg" if turned_deg else "")
+            )
+        if self.speed_deg_s:
+            lines.append(f"servo speed: {self.speed_deg_s:.2f} deg/s, rms deviation {self.ripple_deg:.3f} deg")
+        return [
+            *lines,
+            f"timestamp uncertainty: {self.clock_ns / 1e6:.2f} ms per beam",
+            f"recorded {self.scans:,} scans and {self.joint_samples:,} angles, {self.duration_s:.1f} s, "
+            f"to {self.recording}",
+        ]
 
 
 @dataclass(frozen=True, slots=True)

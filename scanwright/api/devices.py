@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from scanwright.firmware_io.assembly.assemble import AssembleSummary
     from scanwright.firmware_io.lidar.lidar import LidarDriver
     from scanwright.firmware_io.recording.arrays import RecordingArrays
-    from scanwright.firmware_io.scan.scan_summary import ScanSummary
+    from scanwright.firmware_io.scan.scan_end import ScanSummary
     from scanwright.firmware_io.servo.servo import ServoDriver
 
 

@@ -58,11 +58,6 @@ def scanwright(
         print(context.get_help())
 
 
-def _named(error: Any) -> str:
-    """Return the name of the command that was called wrongly."""
-    return "scanwright" if error.ctx is None else str(error.ctx.command_path)
-
-
 def run() -> None:
     """Entry point: print one line for each fault of the input, or a traceback for a bug."""
     try:
@@ -74,7 +69,8 @@ def run() -> None:
         number = re.fullmatch(r"-[\d.]+", getattr(error, "option_name", ""))
         advice = "; a value that begins with - goes behind =: --angles=0,90,0,-90" if number else ""
         message = error.format_message().replace(": Value error, ", ": ").removesuffix(".")  # added by pydantic
-        print_error(f"{message}{advice} (see `{_named(error)} --help`)")
+        command = "scanwright" if error.ctx is None else error.ctx.command_path
+        print_error(f"{message}{advice} (see `{command} --help`)")
         sys.exit(2)
     except ScanwrightError as error:
         for line in (*str(error).splitlines(), *notes_of(error)):

@@ -10,9 +10,10 @@ import typer
 from typer import Argument, Option
 
 from scanwright.cli.arguments import Angles, AsJson
-from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, show, show_result, verbosity
+from scanwright.cli.console import ConsoleProgress, Verbosity, as_typed, hint, show, show_result, verbosity
 from scanwright.cli.help import Commands
 from scanwright.cli.record_options import record_options
+from scanwright.cli.results.of_commands import Mapped, Registered
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.options import COLUMNS, AssembleOptions
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections, read_time_increment
@@ -65,6 +66,10 @@ def import_(
         bag, out, scan=scan, angle=angle, angle_unit=angle_unit, hold=hold, also=also or (), corrections=options
     )
     show_result(summary.lines, summary, as_json)
+    hint(
+        f"next: `scanwright assemble {out} --angles ANGLES.json -o cloud.ply`; a build folder has this file, and for "
+        "another scanner 'Bring your own recording' in the documentation shows its five lines"
+    )
 
 
 @app.command(example="repair rec.mcap")
@@ -153,7 +158,6 @@ def register(
     Works without initial poses.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Registered
 
     result = api.register(
         clouds,
@@ -194,7 +198,6 @@ def map_(
     otherwise no cell is free.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Mapped
 
     summary = api.make_map(
         clouds,

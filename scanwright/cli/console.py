@@ -208,18 +208,12 @@ class ConsoleProgress:
 
     On a terminal the steps with a known fraction are one bar, which the next line replaces. In a file such a step is
     one line every `_APART_S` seconds.
-
-    Attributes:
-        clock: monotonic time [s], the same one in all processes.
-        began: time [s] and fraction of the first step with a fraction; None before it.
-        printed_s: when a step with a fraction was last printed.
-        printed: that step, without numbers.
     """
 
-    clock: Callable[[], float] = time.monotonic
-    began: tuple[float, float] | None = None
-    printed_s: float = -math.inf
-    printed: str = ""
+    clock: Callable[[], float] = time.monotonic  # monotonic time [s], the same one in all processes
+    began: tuple[float, float] | None = None  # time [s] and fraction of the first step with a fraction; None before it
+    printed_s: float = -math.inf  # when a step with a fraction was last printed
+    printed: str = ""  # that step, without numbers
     _fraction: float = 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
@@ -12,6 +13,7 @@ from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AsJson, TaskFile, TaskOrBuild
 from scanwright.cli.console import ConsoleProgress, Verbosity, hint, show, show_json, show_result, verbosity
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import Products, WrittenFiles
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 from scanwright.design.files.atomic_file import atomic_write
 
@@ -34,7 +36,7 @@ def optimise(task: TaskFile, as_json: AsJson = False) -> None:
     if as_json:
         from scanwright.cli.results.angles import Optimised
 
-        show_json(Optimised(**optimum.facts(), **cloud.facts(), warnings=optimum.requested.warnings()))
+        show_json(Optimised(**optimum.facts(), **asdict(cloud), warnings=optimum.requested.warnings()))
     else:
         show(
             [
@@ -97,46 +99,24 @@ def evaluate(
         raise typer.Exit(1)
 
 
-@app.command(example="accuracy ground_ahead", no="a stress case fails")
+@app.command(example="accuracy ground_ahead")
 def accuracy(
     task: TaskFile,
-    stress: Annotated[bool, Option("--stress", help="Stiff and extreme cases instead.")] = False,
-    choices: Annotated[bool, Option("--choices", help="Meshes and integrators instead.")] = False,
-    search: Annotated[bool, Option("--search", help="Effort of the search instead.")] = False,
     out: Annotated[Path, Option(metavar="DIR", help="Parent of the folder of reports.")] = Path("out/accuracy"),
     as_json: AsJson = False,
 ) -> None:
     """Measure the error and run time of the optimiser.
 
-    Without an option: every method to compute the objective, at the optimum of the task.
+    Tries every method to compute the objective, at the optimum of the task.
     """
     from scanwright import api
+    from scanwright.design.accuracy.work_precision import report_precision
 
-    if choices:
-        require_kernel("accuracy --choices")
     loaded = api.load_task(task)
     folder = out / loaded.task.name
-    from scanwright.cli.results.of_commands import WrittenFiles
-
-    if choices:
-        from scanwright.trials.report import report_choices
-
-        lines = report_choices(loaded, folder, ConsoleProgress())
-        report = WrittenFiles(folder, ["choices.csv", "choices.png"], lines)
-    elif stress:
-        from scanwright.design.accuracy.report import report_stress
-        from scanwright.firmware_io.emulators.servo_plant import plant_of
-        from scanwright.trials.stress import range_rows, servo_rows
-
-        more = (rows for make in (servo_rows(plant_of(loaded.task.servo)), range_rows()) for rows in make)
-        report = WrittenFiles(folder, ["stress.csv"], *report_stress(loaded, folder, ConsoleProgress(), more))
-    else:
-        from scanwright.design.accuracy.report import report_precision, report_search
-
-        measure, name = (report_search, "search") if search else (report_precision, "work_precision")
-        report = WrittenFiles(folder, [f"{name}.csv", f"{name}.png"], measure(loaded, folder, ConsoleProgress()))
+    lines = report_precision(loaded, folder, ConsoleProgress())
+    report = WrittenFiles(folder, ["work_precision.csv", "work_precision.png"], lines)
     show_result(lambda: report.lines, report, as_json)
-    raise typer.Exit(1 if report.passed is False else 0)
 
 
 @app.command(example="compare ground_ahead", no="J differs from a count of simulated beams")
@@ -181,7 +161,6 @@ def catalogue(
     """List lidars, servos, slip rings and other products."""
     if sketch is not None and name is None:
         raise typer.BadParameter("draws one product, with its NAME before the option", param_hint="--sketch")
-    from scanwright.cli.results.of_commands import Products
     from scanwright.design.catalogue.catalogue import file_of, load_catalogue
     from scanwright.design.catalogue.table import chosen, table_lines
 
@@ -233,7 +212,7 @@ def schema(
 
         show_json(Task.model_json_schema())
         return
-    from scanwright.cli.results.of_commands import RESULTS, result_schema
+    from scanwright.cli.results.schemas import RESULTS, result_schema
 
     if command not in RESULTS:
         raise ScanwrightError(f"{command}: no command with --json{suggest(command, RESULTS)}")

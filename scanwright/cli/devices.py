@@ -25,6 +25,7 @@ from scanwright.cli.console import (
     show_result,
 )
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import Devices, Diagnosis, Published, Settings
 from scanwright.cli.servo_setup import asking_first, print_steps, set_up_command
 from scanwright.design.errors import ScanwrightError, notes_of, require
 from scanwright.design.findings import errors_in
@@ -33,10 +34,9 @@ from scanwright.firmware_io.posix import require_posix
 from scanwright.firmware_io.scan.scan_end import ScanEnd, failed, finished, stopped
 
 if TYPE_CHECKING:
-    from scanwright.cli.results.of_commands import Devices
     from scanwright.firmware_io.scan.live_feed import Viewer
     from scanwright.firmware_io.scan.plan import ScanPlan
-    from scanwright.firmware_io.scan.scan_summary import ScanSummary
+    from scanwright.firmware_io.scan.scan_end import ScanSummary
 
 app = Commands("Devices", first=require_posix)
 
@@ -87,7 +87,6 @@ def emulate(
         return
     assert out is not None
     ConsoleProgress()("starting the emulated devices (the first run compiles the numerics)")
-    from scanwright.cli.results.of_commands import Devices
     from scanwright.design.angles import load_angles
     from scanwright.firmware_io.device_ports import announced
     from scanwright.firmware_io.emulators.head import read_load
@@ -156,7 +155,7 @@ def scan(
         raise ScanwrightError("--live, --foxglove, --json: choose one of them")
     viewer = _viewer(out, live=live, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright import api
-    from scanwright.cli.results.of_commands import ScanResult
+    from scanwright.cli.results.scans import ScanResult
     from scanwright.design.angles import CALIBRATED
     from scanwright.firmware_io.scan.plan import plan_scan
 
@@ -202,8 +201,6 @@ def scan(
 
 
 def _devices_of(plan: ScanPlan) -> Devices:
-    from scanwright.cli.results.of_commands import Devices
-
     return Devices(plan.angles.sensor, plan.angles.servo, [plan.ports.lidar], plan.ports.servo)
 
 
@@ -268,8 +265,8 @@ def ros2(
             "--foxglove, --recording: choose one of them (`scanwright view` serves a recording to Foxglove)"
         )
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
-    from scanwright.cli.results.of_commands import Published
-    from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
+    from scanwright.firmware_io.ros.node import Publishing
+    from scanwright.firmware_io.ros.serve import serve_devices, serve_recording
     from scanwright.firmware_io.scan.plan import plan_scan
 
     node_arguments = ros_args or []
@@ -309,7 +306,6 @@ def doctor(
 
     Reads only, unless --fix or --restore is given.
     """
-    from scanwright.cli.results.of_commands import Diagnosis
     from scanwright.firmware_io.scan import doctor as diagnosis
     from scanwright.firmware_io.scan import host
     from scanwright.firmware_io.servo import settings
@@ -358,7 +354,6 @@ def servo_setup(
 
     Writes the settings that a scan needs, verifies them, and saves the old ones for --undo.
     """
-    from scanwright.cli.results.of_commands import Settings
     from scanwright.design.angles import load_angles
     from scanwright.design.motion import Spin
     from scanwright.firmware_io.servo import settings

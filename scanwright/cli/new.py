@@ -14,10 +14,12 @@ from typer import Argument, Option
 from scanwright.cli.arguments import AsJson
 from scanwright.cli.console import hint, show, show_result, warn
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import Created
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 
 app = Commands("Design")
 T = TypeVar("T")
+REQUIRED = ("lidar", "servo", "height_m", "see")
 DEFAULTS: dict[str, Any] = {"name": "new", "height_m": 0.5, "see": ("all",), "scan_s": 10.0}
 """Values of questions that are not yet answered, to check the others."""
 
@@ -58,36 +60,26 @@ def new(
     On a terminal, `new` asks for what the options do not give. Otherwise --lidar, --servo, --height-m and --see are
     required.
     """
-    from scanwright.cli.results.of_commands import Created
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.servo import Servo
-    from scanwright.pipeline.new_task import Answers, task_text, usual_scan_s, write_task_file
 
     products = load_catalogue()
     if lidar is not None:
         products.get(lidar, Lidar)
     if servo is not None:
         products.get(servo, Servo)
-    interactive = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
-    if interactive:
-        lidar, servo, height_m, robot, ahead_m, see, scan_s = _prompted(
-            products, lidar, servo, height_m, robot, ahead_m, see, scan_s
-        )
-    elif lidar is None or servo is None or height_m is None or not see:
-        flags = {"--lidar": lidar, "--servo": servo, "--height-m": height_m, "--see": see}
-        needed = ", ".join(flag for flag, value in flags.items() if not value)
-        raise TaskError(f"missing options {needed} (not running in a terminal)")
-    answers = Answers(
-        name=name or (out.stem if out else "my_scanner"),
-        lidar=str(lidar),
-        servo=str(servo),
-        height_m=float(height_m or 0.0),
-        see=tuple(see or ()),
-        scan_s=usual_scan_s(products.get(str(lidar), Lidar)) if scan_s is None else scan_s,
-        robot=robot or "none",
-        ahead_m=ahead_m or 0.0,
-    )
+    options = {"lidar": lidar, "servo": servo, "height_m": height_m, "see": tuple(see or ())}
+    options |= {"robot": robot, "ahead_m": ahead_m, "scan_s": scan_s}
+    known: dict[str, Any] = {key: value for key, value in options.items() if value not in (None, "", ())}
+    if sys.stdin.isatty() and sys.stdout.isatty() and not as_json:
+        _ask(products, known)
+    elif missing := [f"--{key.replace('_', '-')}" for key in REQUIRED if key not in known]:
+        raise TaskError(f"missing options {', '.join(missing)} (not running in a terminal)")
+    from scanwright.pipeline.new_task import Answers, task_text, usual_scan_s, write_task_file
+
+    usual = {"scan_s": usual_scan_s(products.get(known["lidar"], Lidar))}
+    answers = Answers(name=name or (out.stem if out else "my_scanner"), **(usual | known))
     path = out or Path(f"{answers.name}.toml")
     warnings = write_task_file(path, task_text(answers, products, _command(answers, path), path))
     warn(warnings)
@@ -95,17 +87,8 @@ def new(
     hint(f"next: `scanwright build {path}` (or `scanwright optimise {path}` for the angles only)")
 
 
-def _prompted(
-    products: Any,
-    lidar: str | None,
-    servo: str | None,
-    height_m: float | None,
-    robot: str | None,
-    ahead_m: float | None,
-    see: list[str] | None,
-    scan_s: float | None,
-) -> tuple[str, str, float, str, float, list[str], float]:
-    """Ask the questions without an option, each until the answer is valid."""
+def _ask(products: Any, known: dict[str, Any]) -> None:
+    """Ask the questions whose answers are not `known`, each until the answer is valid, and add the answers."""
     from scanwright.design.catalogue.lidar import Lidar
     from scanwright.design.catalogue.table import MARK, chosen, table_lines
     from scanwright.pipeline.new_task import Answers, check_answers, usual_scan_s
@@ -116,38 +99,34 @@ def _prompted(
         print(f"{MARK}: unverified number; -: unknown")
         return _until(question, usual, lambda answer: _named(answer, [p.name for p in of_kind]), fits)
 
-    def checked(**answers: Any) -> None:
-        known = {"lidar": lidar, "servo": servo, "height_m": height_m, "robot": robot, "see": see, "scan_s": scan_s}
-        known["ahead_m"] = ahead_m
-        values = {name: value for name, value in known.items() if value is not None} | answers
-        check_answers(Answers(**(DEFAULTS | values) | {"see": tuple(values.get("see") or DEFAULTS["see"])}), products)
+    def checked(**answer: Any) -> None:
+        check_answers(Answers(**(DEFAULTS | known | answer)), products)
 
-    if lidar is None:
-        lidar = product("lidar", "1. Which lidar?", "UST-10LX", lambda _: None)
-    if servo is None:
-        servo = product("servo", "2. Which servo turns it?", "XM430-W350", lambda name: checked(servo=name))
-    if height_m is None:
+    if "lidar" not in known:
+        known["lidar"] = product("lidar", "1. Which lidar?", "UST-10LX", lambda _: None)
+    if "servo" not in known:
+        known["servo"] = product("servo", "2. Which servo turns it?", "XM430-W350", lambda name: checked(servo=name))
+    if "height_m" not in known:
         question = "3. How many metres over the ground is the lidar, usually 0.1 to 0.2 m above the robot's deck?"
-        height_m = _until(question, None, _number, lambda height: checked(height_m=height))
-    if robot is None:
+        known["height_m"] = _until(question, None, _number, lambda height: checked(height_m=height))
+    if "robot" not in known:
         print("4. Which part of the robot blocks the view? box:0.6:0.3:0.3 is its length, width and height in metres;")
         print("   or a file with its mesh (STL, OBJ, PLY), or none")
-        robot = _until("  ", "none", str, lambda what: checked(robot=what))
-    if ahead_m is None and robot != "none":
+        known["robot"] = _until("  ", "none", str, lambda what: checked(robot=what))
+    if "ahead_m" not in known and known["robot"] != "none":
         print("   How many metres ahead of the middle of the box, or of the origin of the mesh, is the scanner?")
-        ahead_m = _until("  ", "0", _number, lambda ahead: checked(ahead_m=ahead))
-    if not see:
+        known["ahead_m"] = _until("  ", "0", _number, lambda ahead: checked(ahead_m=ahead))
+    if "see" not in known:
         print("5. What must it see? One or more, separated by spaces. Numbers are optional:")
         print("   ground:0.5:5:4   from 0.5 to 5 m ahead, 4 m wide    ceiling:2.5   2.5 m over the ground")
         print("   wall:3:4:90:2.5  3 m to the left, 4 wide, 2.5 high  around:30:30  all around, 30 deg up and down")
         print("   wall:1:2:0:0.5   obstacles 0.5 m high, 1 m ahead, 2 m wide")
         print("   thing:0.1:3      miss nothing 0.1 m wide, 3 m away  all           every direction")
-        see = _until("  ", "ground ceiling", str.split, lambda regions: checked(see=regions))
-    if scan_s is None:
+        known["see"] = _until("  ", "ground ceiling", lambda text: tuple(text.split()), lambda see: checked(see=see))
+    if "scan_s" not in known:
         question = "6. How many seconds may one full scan take? Longer is denser"
-        usual = f"{usual_scan_s(products.get(lidar, Lidar)):g}"
-        scan_s = _until(question, usual, _number, lambda seconds: checked(scan_s=seconds))
-    return lidar, servo, height_m, robot, ahead_m or 0.0, see, scan_s
+        usual = f"{usual_scan_s(products.get(known['lidar'], Lidar)):g}"
+        known["scan_s"] = _until(question, usual, _number, lambda seconds: checked(scan_s=seconds))
 
 
 def _until(question: str, usual: str | None, read: Callable[[str], T], fits: Callable[[T], object]) -> T:

@@ -13,6 +13,7 @@ from scanwright.cad.kernel import require_kernel
 from scanwright.cli.arguments import AllowOrigin, Angles, AsJson, Out, Rate
 from scanwright.cli.console import ConsoleProgress, require_pages, show_result
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import OpenedPage
 from scanwright.design.errors import require
 
 app = Commands("Pages")
@@ -22,8 +23,6 @@ def _announce(as_json: bool) -> Callable[[str], None]:
     """Return a function that prints the address of a page."""
 
     def announce(address: str) -> None:
-        from scanwright.cli.results.of_commands import OpenedPage
-
         show_result(lambda: [f"open {address}"], OpenedPage(address=address), as_json)
 
     return announce
@@ -62,7 +61,6 @@ def view(
 ) -> None:
     """Show a recording in Foxglove."""
     require("foxglove", "view needs a websocket server", "websockets")
-    from scanwright.cli.results.of_commands import OpenedPage
     from scanwright.live.foxglove_view import view_recording, write_for_foxglove
     from scanwright.serving.handshake import as_origins
 

@@ -25,6 +25,16 @@ from scanwright.cli.console import (
     verbosity,
 )
 from scanwright.cli.help import Commands
+from scanwright.cli.results.of_commands import (
+    Built,
+    Checked,
+    CheckEntry,
+    MeasuredModel,
+    Rebuilt,
+    Studied,
+    WrittenFiles,
+    read_rows,
+)
 from scanwright.design.errors import notes_of, require
 from scanwright.design.findings import Finding, Severity, errors_in, sentence
 
@@ -42,8 +52,6 @@ def build(
 
     Writes everything into DIR/<task>/; does nothing if the build is current.
     """
-    from scanwright.cli.results.of_commands import Built, CheckEntry, Rebuilt
-
     if check:
         from scanwright.pipeline.build import difference_when_rebuilt
         from scanwright.pipeline.manifest import listed_files
@@ -78,7 +86,6 @@ def build(
 def report(out: BuildFolder, as_json: AsJson = False) -> None:
     """Regenerate report.html of a build."""
     require("cad", "report needs jinja2", "jinja2")
-    from scanwright.cli.results.of_commands import WrittenFiles
     from scanwright.pipeline.records import write_report
 
     file = write_report(out)
@@ -93,7 +100,6 @@ def check(out: BuildFolder, as_json: AsJson = False) -> None:
     Prints the failed checks and the warnings; with -v, all checks.
     """
     from scanwright import api
-    from scanwright.cli.results.of_commands import Checked, CheckEntry
     from scanwright.pipeline.build import finding_lines
 
     checks = api.check(out, progress=ConsoleProgress())
@@ -130,7 +136,6 @@ def measure(
     """
     require_kernel("measure")
     from scanwright.cad.measure.files import measure_files
-    from scanwright.cli.results.of_commands import MeasuredModel
 
     out = out or Path(model.with_suffix(".toml").name)
     measured = measure_files(model, out, kind, up=up, front=front, unit=unit, progress=ConsoleProgress())
@@ -155,7 +160,6 @@ def study(
     Combines tasks with products, evaluates every candidate with its parts, and builds the winners. The same command
     resumes an interrupted study.
     """
-    from scanwright.cli.results.of_commands import Studied, read_rows
     from scanwright.study.study import load_study
 
     folder = out or Path("out") / load_study(study).study.name

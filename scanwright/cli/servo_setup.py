@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 import typer
 
 from scanwright.cli.console import print_error, show_json
+from scanwright.cli.results.of_commands import Settings
 
 if TYPE_CHECKING:
     from scanwright.firmware_io.servo.fitness import ServoSetupError
@@ -28,8 +29,6 @@ def set_up_command(port: str, out: Path | None = None, servo_id: int | None = No
 def print_steps(port: str, steps: Iterable[str | Path], as_json: bool = False) -> None:
     """Print each change as it is made, and first how to undo all; or one JSON object at the end."""
     if as_json:
-        from scanwright.cli.results.of_commands import Settings
-
         made = list(steps)
         undo = next((step for step in made if isinstance(step, Path)), None)
         show_json(Settings([step for step in made if isinstance(step, str)], undo))

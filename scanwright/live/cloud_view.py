@@ -117,7 +117,7 @@ class CloudView:
         left += f"; the view dropped {growth.lost:,} scans, the recording none" if growth.lost else ""
         self.facts.content = note_html(f"{self.points:,} points{self._progress()}{left}")
         for line in growth.lines:
-            self.tell(line)
+            self.show_message(line)
         if growth.end is not None and growth.end != self.end:
             self.show_end(growth.end)
 
@@ -126,7 +126,7 @@ class CloudView:
         self.end = end
         self.banner.content = banner_html(end.outcome, (end.heading, *end.lines))
 
-    def tell(self, line: str) -> None:
+    def show_message(self, line: str) -> None:
         """Show a message of the scan: speed, rates, dropped packets."""
         self._line.content = note_html(line)
 

@@ -18,8 +18,7 @@ from scanwright.design.errors import RecordingError, TaskError
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.design.progress import Progress
 from scanwright.firmware_io.assembly.own_body import own_body_of
-from scanwright.firmware_io.recording.mcap_chunks import read_note
-from scanwright.firmware_io.recording.metadata import NOTE, rests_in_scans
+from scanwright.firmware_io.recording.mcap_chunks import read_note, rests_in_scans
 from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.ros.replay import replay
 from scanwright.firmware_io.ros.robot_frames import description
@@ -101,7 +100,7 @@ def mcap_log(path: Path) -> Iterator[Log]:
 
 def _shown(recording: Path, angles: Path, log: Log) -> FoxgloveChannels:
     angle_set = load_angles(angles)
-    smooth = not rests_in_scans(read_note(recording, NOTE))
+    smooth = not rests_in_scans(read_note(recording))
     urdf = description(angles.parent, angle_set)
     return FoxgloveChannels(angle_set, own_body_of(angles), urdf, log, smooth=smooth)
 
@@ -129,7 +128,7 @@ def _serve(receiving: Connection, folder: Path, allow_origins: tuple[str, ...]) 
         with foxglove_server(f"scan of {folder.name}", channels(), PORT, _print, allow_origins) as server:
             shown = FoxgloveChannels(in_use.angles, own_body, urdf, server.log, wall_minus_ns=wall_minus_ns)
             for batch in batches(receiving):
-                tell(batch, shown)
+                pass_on(batch, shown)
             shown.close()
     except TaskError as error:  # the port is taken: the scan goes on
         _LOG.warning("no viewer can connect: %s", error)
@@ -139,7 +138,7 @@ def _print(step: str, _fraction: float | None = None, /) -> None:
     print(step, flush=True)
 
 
-def tell(batch: Batch, watch: Watch) -> None:
+def pass_on(batch: Batch, watch: Watch) -> None:
     """Pass on the data of a batch in the order in which they were measured."""
     angles = [JointSample(*pair) for pair in zip(batch.time_ns.tolist(), batch.position_rad.tolist(), strict=True)]
     ended = [(one.time_ns, one) for one in angles] + [(int(scan.time_ns[-1]), scan) for scan in batch.scans]

@@ -56,15 +56,15 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
         return
     spawn = get_context("spawn")
     receiving, sending = spawn.Pipe(duplex=False)
-    hearing, telling = spawn.Pipe(duplex=False)
-    page = spawn.Process(target=_show, args=(receiving, telling, folder), daemon=True)
+    from_page, to_scan = spawn.Pipe(duplex=False)
+    page = spawn.Process(target=_show, args=(receiving, to_scan, folder), daemon=True)
     page.start()
     receiving.close()
-    telling.close()
+    to_scan.close()
     try:
-        if not hearing.poll(SERVED_S):
+        if not from_page.poll(SERVED_S):
             raise EOFError
-        address = hearing.recv()
+        address = from_page.recv()
     except EOFError:
         page.terminate()
         raise ScanwrightError("live: the page could not be served; scan without it") from None
@@ -72,7 +72,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
     if browse is None and sys.stdout.isatty():
         browse = webbrowser.open
     if browse is not None and browse(address):
-        hearing.poll(OPENED_S)
+        from_page.poll(OPENED_S)
     feed = Feed(sending)
     try:
         yield feed
@@ -85,7 +85,7 @@ def live_page(folder: Path, *, wanted: bool, browse: Callable[[str], object] | N
                 page.join()
 
 
-def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
+def _show(receiving: Connection, to_scan: Connection, folder: Path) -> None:
     """Show the growing cloud in the page's process, and wait until its last visitor leaves."""
     from scanwright.live.cloud_view import CloudView
     from scanwright.serving.page_server import guarded_server, wait_until_alone
@@ -97,21 +97,21 @@ def _show(receiving: Connection, telling: Connection, folder: Path) -> None:
         motion = in_use.angles.motion
         full_scan_s = None if motion is None else motion.duration_s
         view = CloudView(server, folder.name, in_use.angles.T_world_rot(0.0)[:3, 3], full_scan_s)
-        telling.send(gate.address)
+        to_scan.send(gate.address)
 
-        def tell_of_visitor() -> None:
+        def report_visitor() -> None:
             while not gate.visitors:
                 time.sleep(0.05)
-            telling.send("seen")
+            to_scan.send("seen")
 
-        Thread(target=tell_of_visitor, name="visitor", daemon=True).start()
+        Thread(target=report_visitor, name="visitor", daemon=True).start()
         if (folder / "task.toml").is_file():
             Thread(target=_expect, args=(view, folder, in_use.angles), name="expected", daemon=True).start()
         for growth in growing(receiving, placing):
             view.add(growth)
         if view.end is None:  # the scan program went away
             view.show_end(LOST)
-        view.tell("this page ends when you close it")
+        view.show_message("this page ends when you close it")
         if gate.visitors:
             wait_until_alone(gate, ALONE_S)
 

@@ -81,23 +81,14 @@ vary, so the remaining time is estimated only from a share of a tenth on, when t
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """The results of one build.
+    """The results of one build."""
 
-    Attributes:
-        optimum: result of the search.
-        chosen: the best mount with its parts, which was built.
-        as_built: its view without the beams that its parts block.
-        findings: to read before the parts are made.
-        cloud: expected error, gaps and points.
-        to_make: numbers of parts to print and to machine, and the time to print.
-    """
-
-    optimum: Optimum
-    chosen: Chosen
-    as_built: AsBuilt
-    findings: tuple[Finding, ...]
-    cloud: ExpectedCloud
-    to_make: str
+    optimum: Optimum  # result of the search
+    chosen: Chosen  # the best mount with its parts, which was built
+    as_built: AsBuilt  # its view without the beams that its parts block
+    findings: tuple[Finding, ...]  # to read before the parts are made
+    cloud: ExpectedCloud  # expected error, gaps and points
+    to_make: str  # numbers of parts to print and to machine, and the time to print
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +162,11 @@ def build_task(loaded: LoadedTask, target: Path, progress: Progress) -> Build:
     """
     require_kernel("build")
     try:
-        made = None if is_current(target, loaded) else _make_and_log(loaded, target, progress)
+        made = None
+        if not is_current(target, loaded):
+            if edits := changes(target):
+                _LOG.warning("%s: %s: built again", target, edits)
+            made = _make(loaded, target, progress)
     except KeyboardInterrupt as stop:
         stop.add_note(f"{target} is {'finished' if is_current(target, loaded) else 'as it was'}")
         raise
@@ -313,14 +308,6 @@ def measured(progress: Progress, step: str, fraction: float | None = None, /) ->
     progress(step, begins)
 
 
-def _make_and_log(loaded: LoadedTask, target: Path, progress: Progress) -> Made:
-    """Build a folder that is not up to date, and log the edits that are lost."""
-    edits = changes(target)
-    if edits:
-        _LOG.warning("%s: %s: built again", target, edits.words())
-    return _make(loaded, target, progress)
-
-
 def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     """Run all stages in order."""
     from scanwright.design.evaluation.as_built import as_built
@@ -332,7 +319,8 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         optimum = find_optimum(requested, progress)
         # with `period_s = "shortest"` the search has changed the motion, but `requested` is written for a rebuild
         loaded, problem, result = optimum.loaded, optimum.problem, optimum.search
-        from scanwright.design.evaluation.density_picture import density_picture  # while the kernel still loads
+        from scanwright.design.evaluation.density_picture import density_figure  # while the kernel still loads
+        from scanwright.design.files.picture_files import save_picture
         from scanwright.pipeline import records
         from scanwright.report.parts_list import read_parts
 
@@ -355,7 +343,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
             f"{gain.mount.name}, without parts: J = {gain.mount.score.J:.3f}": gain.mount.angles_rad
             for gain in optimum.gains[:DRAWN]
         }
-        density_picture(work / "density.png", problem, settings, optimum.title, chosen.shadow)
+        save_picture(density_figure(problem, settings, optimum.title, chosen.shadow), work / "density.png")
         findings, left_out = exported()
         write_files(work, drawn())
         records.write_left_out(work, [*optimum.left_out, *chosen.left_out(), *parts.left_out, *left_out])

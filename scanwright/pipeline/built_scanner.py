@@ -17,19 +17,12 @@ from scanwright.report.answer import mounting_rad, task_as_built
 
 @dataclass(frozen=True, slots=True)
 class BuiltScanner:
-    """The scanner of a build folder.
+    """The scanner of a build folder."""
 
-    Attributes:
-        loaded: the task, with the motion that was built.
-        angles: the angle set.
-        shadow: the beams that the parts block; None if the folder has no `own_body.npz`.
-        checks: of its parts; none if the folder has no `checks.json`.
-    """
-
-    loaded: LoadedTask
-    angles: AngleSet
-    shadow: SelfOcclusion | None
-    checks: tuple[Finding, ...] = ()
+    loaded: LoadedTask  # the task, with the motion that was built
+    angles: AngleSet  # the angle set
+    shadow: SelfOcclusion | None  # the beams that the parts block; None if the folder has no `own_body.npz`
+    checks: tuple[Finding, ...] = ()  # of its parts; none if the folder has no `checks.json`
 
     @property
     def setting_rad(self) -> Setting:

@@ -22,19 +22,12 @@ VIBRATION = "natural_frequency"
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A comparison.
+    """A comparison."""
 
-    Attributes:
-        optimum: of the task.
-        rows: of the table.
-        folder: of the written files.
-        vibration: check of a build's natural frequency; None without a build.
-    """
-
-    optimum: Optimum
-    rows: list[ComparisonRow]
-    folder: Path
-    vibration: Finding | None = None
+    optimum: Optimum  # of the task
+    rows: list[ComparisonRow]  # of the table
+    folder: Path  # of the written files
+    vibration: Finding | None = None  # check of a build's natural frequency; None without a build
 
     def lines(self, in_full: bool = False) -> list[str]:
         """Return the comparison as lines; all columns and their meaning only `in_full`."""

@@ -18,13 +18,13 @@ def deck_height(loaded: LoadedTask, angles: AngleSet) -> Finding:
     `value` is the height as built [mm], `limit` the one of the task; None if no mask is below or above the scanner.
     """
     x_mm, _, z_mm = angles.t_world_rot_mm
-    robot = robot_around(loaded.task.mask, loaded.source.parent)
+    below_m, above_m = robot_around(loaded.task.mask, loaded.source.parent)
     side = "above the deck" if z_mm > 0 else "below the deck that the scanner hangs from"
     along = f", {abs(x_mm):.0f} mm {'ahead of' if x_mm > 0 else 'behind'} its holes" if abs(x_mm) >= 0.5 else ""
     message = f"the optical centre is {abs(z_mm):.0f} mm {side}{along}"
-    task_mm = 1000 * (robot.below_m if z_mm > 0 else robot.above_m)
+    task_mm = 1000 * (below_m if z_mm > 0 else above_m)
     if not math.isfinite(task_mm):
-        hangs = z_mm < 0 and math.isfinite(robot.below_m)
+        hangs = z_mm < 0 and math.isfinite(below_m)
         hint = "the task has no deck above it: limit angles.alpha_rot_deg to [-90, 90]" if hangs else ""
         return Finding("deck_height", "warning" if hangs else "note", "deck", message, abs(z_mm), None, "mm", hint)
     off_mm = abs(z_mm) - task_mm

@@ -63,14 +63,14 @@ def fresh_folder(target: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _disk_errors(target: Path) -> Iterator[None]:
+def _disk_errors(target: Path, what: str = "the build folder") -> Iterator[None]:
     """Raise errors of the system as errors of the folder."""
     try:
         yield
     except ScanwrightError:
         raise
     except OSError as error:
-        raise BuildError(f"{target}: cannot write the build folder: {error.strerror or error}") from error
+        raise BuildError(f"{target}: cannot write {what}: {error.strerror or error}") from error
 
 
 @contextmanager
@@ -82,17 +82,13 @@ def report_folder(target: Path) -> Iterator[Path]:
     """
     if read_manifest(target):
         raise BuildError(f"{target}: is a build folder, which must not contain other files; choose another folder")
-    try:
+    with _disk_errors(target, "the comparison"):
         target.mkdir(parents=True, exist_ok=True)
         try:
             yield target
         finally:
             if not any(target.iterdir()):
                 target.rmdir()
-    except ScanwrightError:
-        raise
-    except OSError as error:
-        raise BuildError(f"{target}: cannot write the comparison: {error.strerror}") from error
 
 
 @contextmanager

@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
@@ -24,28 +23,6 @@ _CODE = (".py", ".csv", ".j2", ".js", ".css")  # products and tasks are in the d
 _PACKAGES = ("scanwright.design", "scanwright.cad", "scanwright")
 _NESTED = {"design", "cad", "firmware_io"}  # links in a checkout, folders of an installed package
 _NAMED = 3  # files of a kind that a message names
-
-
-@dataclass(frozen=True, slots=True)
-class Changes:
-    """Files of a build folder that changed since its manifest was written.
-
-    Attributes:
-        missing: missing files.
-        edited: files with other contents.
-    """
-
-    missing: tuple[str, ...]
-    edited: tuple[str, ...]
-
-    def __bool__(self) -> bool:
-        """Return whether any file changed."""
-        return bool(self.missing or self.edited)
-
-    def words(self) -> str:
-        """Return a text such as "a.stl is missing, b.csv was edited"."""
-        kinds = (self.missing, "is missing", "are missing"), (self.edited, "was edited", "were edited")
-        return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in kinds if names)
 
 
 @cache
@@ -92,15 +69,20 @@ def inside(name: str) -> bool:
     return bool(path.parts) and not path.is_absolute() and ".." not in path.parts and "\0" not in name
 
 
-def changes(folder: Path, but: str | None = None) -> Changes:
-    """Return the missing and edited files of a build folder except `but`; none without a manifest."""
+def changes(folder: Path, but: str | None = None) -> str:
+    """Return the files of a build folder except `but` that changed, as "a.stl is missing, b.csv was edited".
+
+    The text is empty if none changed, or without a manifest.
+    """
     manifest = read_manifest(folder)
     if not manifest and (folder / MANIFEST).exists():
-        return Changes((), (MANIFEST,))
+        return f"{MANIFEST} was edited"
     files = {name: facts for name, facts in manifest.get("files", {}).items() if name != but}
     here = {name: facts for name, facts in files.items() if inside(name) and (folder / name).is_file()}
-    missing = tuple(name for name in files if name not in here)
-    return Changes(missing, tuple(name for name, facts in here.items() if not _is_as_written(folder / name, facts)))
+    missing = [name for name in files if name not in here]
+    edited = [name for name, facts in here.items() if not _is_as_written(folder / name, facts)]
+    kinds = (missing, "is missing", "are missing"), (edited, "was edited", "were edited")
+    return ", ".join(f"{_some(names)} {one if len(names) == 1 else all_}" for names, one, all_ in kinds if names)
 
 
 def require_as_built(folder: Path, but: str | None = None) -> None:
@@ -111,7 +93,7 @@ def require_as_built(folder: Path, but: str | None = None) -> None:
     """
     if edits := changes(folder, but):
         raise BuildError(
-            f"{folder}: {edits.words()} since it was built: build the folder again, or copy angles.json, task.toml and "
+            f"{folder}: {edits} since it was built: build the folder again, or copy angles.json, task.toml and "
             "the files that it names to another folder"
         )
 
@@ -193,7 +175,7 @@ def _is_as_written(path: Path, facts: Any) -> bool:
     return isinstance(facts, dict) and _sha256(path) == facts.get("sha256")
 
 
-def _some(names: tuple[str, ...]) -> str:
+def _some(names: list[str]) -> str:
     """Return a few names and the number of the others."""
     if len(names) > _NAMED:
         return f"{', '.join(names[:_NAMED])} and {len(names) - _NAMED} more"

@@ -57,27 +57,17 @@ DECK = (
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The answers of `scanwright new`.
+    """The answers of `scanwright new`."""
 
-    Attributes:
-        name: of the task and its build folder.
-        lidar: by its name in the catalogue.
-        servo: the same.
-        height_m: of the scanner's optical centre over the ground.
-        see: regions to see, in the form of `scanwright.pipeline.seen_regions.SEEN`.
-        scan_s: time of one full scan.
-        robot: parts of the robot that block the view: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh.
-        ahead_m: position of the scanner ahead of the middle of the box, or of the origin of the mesh.
-    """
-
-    name: str
-    lidar: str
-    servo: str
-    height_m: float
-    see: tuple[str, ...]
-    scan_s: float
+    name: str  # of the task and its build folder
+    lidar: str  # by its name in the catalogue
+    servo: str  # the same
+    height_m: float  # of the scanner's optical centre over the ground
+    see: tuple[str, ...]  # regions to see, in the form of `scanwright.pipeline.seen_regions.SEEN`
+    scan_s: float  # time of one full scan
+    # parts of the robot that block the view: "none", "box:LENGTH:WIDTH:HEIGHT" or the file of a mesh
     robot: str = "none"
-    ahead_m: float = 0.0
+    ahead_m: float = 0.0  # position of the scanner ahead of the middle of the box, or of the origin of the mesh
 
 
 def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -> str:
@@ -134,7 +124,7 @@ def _alpha_rot(answers: Answers, folder: Path) -> str:
     hangs = answers.robot == "none"
     if not hangs and answers.robot.split(":")[0] != "box":
         (table,) = tomllib.loads("\n".join(_mask(answers, folder)))["mask"]
-        hangs = math.isfinite(robot_around([MeshRegion(**table)], folder).above_m)
+        hangs = math.isfinite(robot_around([MeshRegion(**table)], folder)[1])
     if hangs:
         return "alpha_rot_deg = [-180, 180]"
     return "alpha_rot_deg = [-90, 90]  # the axis points up: the robot has nothing above the scanner to hang it from"
@@ -143,11 +133,6 @@ def _alpha_rot(answers: Answers, folder: Path) -> str:
 def usual_scan_s(lidar: Lidar) -> float:
     """Return a time of a full scan, a multiple of 5 s, with lines at most `LINE_GAP_DEG` apart."""
     return 5.0 * math.ceil(360 / (lidar.scan_rate_hz * LINE_GAP_DEG) / 5)
-
-
-def _line_gap_deg(lidar: Lidar, scan_s: float) -> float:
-    """Return the angle between lines, in a turn of 360 deg or in 180 deg out and back."""
-    return 360 / (lidar.scan_rate_hz * scan_s)
 
 
 def _require_strength(lidar: Lidar, servo: Servo) -> None:
@@ -176,10 +161,11 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
     """Return the slip ring for continuous rotation; None for a servo that must sweep.
 
     Rings that are rated for the lidar's data are preferred, then those with a bore, which need no belt, then those with
-    a known speed. A servo must sweep if it does not read its angle all around, or no ring has a layout with it.
+    a known speed. A servo sweeps if it does not read its angle all around, or no ring has a layout with it. One whose
+    case has no holes for the parts of a ring sweeps too, with fewer parts, if it can.
 
     Raises:
-        TaskError: lidar and servo have no layout without a ring either.
+        TaskError: lidar and servo have no layout.
     """
 
     def order(ring: SlipRing) -> tuple[bool, bool, bool, str]:
@@ -187,21 +173,26 @@ def slip_ring_for(lidar: Lidar, servo: Servo, products: Catalogue) -> SlipRing |
 
     rings = sorted((product for product in products if isinstance(product, SlipRing)), key=order)
     strong = [ring for ring in rings if torque_nm(lidar, ring) <= servo.continuous_torque_nm]
-    why = ""
+    why, found = "", list[SlipRing]()
     for ring in (*(strong if servo.position_feedback_deg == 360 else ()), None):
         name = None if ring is None else ring.name
         angles = AngleSet(task="new", angles_deg=UPRIGHT, sensor=lidar.name, servo=servo.name, slip_ring=name)
         try:
-            placement_of(scanner_of(angles, "fdm-0.4", products))
+            drive = placement_of(scanner_of(angles, "fdm-0.4", products)).drive
         except BuildError as error:
             why = str(error)
-        else:
+            continue
+        if ring is None or drive.plain:
             return ring
+        found.append(ring)
+    if found:
+        return found[0]
     raise TaskError(f"{lidar.name} on {servo.name}: these cannot work together: {why}")
 
 
 def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None) -> list[str]:
-    lines = f"its lines are {_line_gap_deg(lidar, answers.scan_s):.2g} deg apart; longer is denser"
+    gap_deg = 360 / (lidar.scan_rate_hz * answers.scan_s)  # in a turn, or in 180 deg out and back
+    lines = f"its lines are {gap_deg:.2g} deg apart; longer is denser"
     if ring is not None:
         how = "the shaft goes through it" if ring.bore_mm > 0 else "a belt turns the shaft next to it"
         return [
@@ -213,7 +204,7 @@ def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None)
         ]
     why = f"{servo.name} does not read its angle all around"
     if servo.position_feedback_deg == 360:
-        why = f"no slip ring of the catalogue fits {servo.name}"
+        why = f"the case of {servo.name} has no holes for the parts of a slip ring"
     return [
         "",
         f"[motion]  # {why}: it sweeps back and forth, and its cable hangs in a loop",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +12,10 @@ from scanwright.design.scene.ray_caster import build_scene, cast, load_triangles
 from scanwright.design.task.shapes import GroundRegion, MaskRegion, MeshRegion
 
 
-@dataclass(frozen=True, slots=True)
-class RobotAround:
-    """Distances from the optical centre straight down and straight up to the robot; infinite if it is not there."""
+def robot_around(masks: Iterable[MaskRegion], folder: Path) -> tuple[float, float]:
+    """Return the distances [m] from the optical centre straight down and up to the robot; infinite if it is not there.
 
-    below_m: float
-    above_m: float
-
-
-def robot_around(masks: Iterable[MaskRegion], folder: Path) -> RobotAround:
-    """Return the distances to the robot that masks of a task describe: its meshes, and its top as a `ground`.
+    Masks of a task describe the robot: its meshes, and its top as a `ground`.
 
     Raises:
         SceneError: a mesh cannot be read.
@@ -38,4 +31,4 @@ def robot_around(masks: Iterable[MaskRegion], folder: Path) -> RobotAround:
             up = region.R_mesh_world()[:, 2]
             down_m, up_m = cast(scene, region.sensor_m, np.stack([-up, up])).range_m
             below_m, above_m = min(below_m, float(down_m)), min(above_m, float(up_m))
-    return RobotAround(below_m, above_m)
+    return below_m, above_m

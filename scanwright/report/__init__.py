@@ -1,1 +1,1 @@
-"""`report.html`: one page that holds everything a person wants to know of a build, made from its files alone."""
+"""`report.html`: one page with the results of a build, made from its files."""

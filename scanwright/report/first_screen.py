@@ -111,18 +111,18 @@ def _sees(answer: BuildAnswer) -> Card:
     lines = f"Scan lines at most {own.line_gap_deg:.2f} deg apart, {rounded(gap_mm)} mm at {GAP_M:g} m."
     unseen = own.blind_weight > NO_BLIND_WEIGHT
     headline = f"{percent(own.blind_weight)} of what you asked for is never seen" if unseen else "All you asked for"
-    lost = [each.message for each in cloud.hidden if each.severity == "warning"]
+    lost = [each.message for each in cloud.hidden_regions if each.severity == "warning"]
     if lost:
         headline = _capital(lost[0])
-    elif cloud.hidden:
+    elif cloud.hidden_regions:
         headline += ", except behind the robot"
-    warned = [each.message for each in cloud.hidden if each.message not in lost[:1]]
-    if cloud.missed is not None:
+    warned = [each.message for each in cloud.hidden_regions if each.message not in lost[:1]]
+    if cloud.missed_object is not None:
         headline += ", but small objects can be missed" if not lost else ""
-        warned, lines = [cloud.missed.message.partition(":")[0], *warned], ""
-    elif cloud.gap is not None:
+        warned, lines = [cloud.missed_object.message.partition(":")[0], *warned], ""
+    elif cloud.wide_gap is not None:
         headline += ", but with a gap" if not lost else ""
-        warned, lines = [cloud.gap.message.partition(";")[0], *warned], ""
+        warned, lines = [cloud.wide_gap.message.partition(";")[0], *warned], ""
     text = [f"{_capital(words)}." for words in (*warned, *(plane.words() for plane in cloud.planes))]
     if own.blind:
         text.append(f"{_capital(', '.join(words.partition(':')[0] for words in own.blind))}.")
@@ -150,7 +150,7 @@ def _scan(angles: AngleSet, answer: BuildAnswer) -> Card:
     hidden = f" Parts block {percent(blocked)}." if blocked else ""
     words = _capital(motion_in_words(motion))
     headline = beams if motion is None else f"{motion.duration_s:g} s, {beams}"
-    error = _capital(answer.cloud.error.words().partition(" (")[0])  # its parts are among the details
+    error = _capital(answer.cloud.expected_error.words().partition(" (")[0])  # its parts are among the details
     return Card("One scan", headline, f"{error}. {words}: {answer.lines:,} lines of {answer.beams:,}.{hidden}")
 
 

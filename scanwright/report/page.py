@@ -134,7 +134,7 @@ def _task_scene(
     """Return the room with its maps, and the cloud of one scan of the furnished room, for the stage."""
     centre_m = angles.T_world_rot(0.0)[:3, 3]
     room = room_about(loaded.task)
-    joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+    joint_rad = problem.joint_rad()
     scanner = loaded.scanner(angles.model_copy(update={"t_world_rot_mm": (0.0, 0.0, 0.0)}))
     points = one_scan(scanner, joint_rad, None, loaded.source.parent, shadow, RAYS)
     points = points[points[:, 2] < CEILING_M]

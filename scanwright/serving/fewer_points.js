@@ -31,8 +31,8 @@
     } else if (moves && took < goal) share = Math.min(1.2 * share, 1);
   };
 
-  const look = (now) => {
-    requestAnimationFrame(look);
+  const update = (now) => {
+    requestAnimationFrame(update);
     const view = window.__viserMutable;
     const drawn = window.__viserTestpoints?.rendererInfo.render;
     if (!view?.camera || !drawn) return;
@@ -56,5 +56,5 @@
     const seen = share < 1 && !moves ? `1 of ${Math.round(1 / share)} points shown: this computer cannot draw more at once` : "";
     if (line.textContent !== seen) line.textContent = seen;
   };
-  requestAnimationFrame(look);
+  requestAnimationFrame(update);
 })();

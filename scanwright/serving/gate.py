@@ -35,7 +35,7 @@ from websockets.http11 import Request, Response
 
 from scanwright.design.errors import TaskError
 from scanwright.serving.handshake import MOST_VISITORS, bound, foreign, local_hosts, refusal
-from scanwright.serving.remembered import recalled, remember
+from scanwright.serving.last_address import save_address, saved_address
 
 MOST_BYTES = 1 << 18  # of one message
 MOST_TEXT = 200  # characters of a text, entries of a list
@@ -58,8 +58,8 @@ ICON = (
 )
 
 ADDED_TO_PAGE = (
-    "mended_page.css",
-    "mended_page.js",
+    "viser_page.css",
+    "viser_page.js",
     "fewer_points.js",
     "wall_pictures.js",
     "state_banner.js",
@@ -80,7 +80,7 @@ class Gate:
         self.socket, self.token = _opened(port, recall)
         self.port: int = self.socket.getsockname()[1]
         if recall:
-            remember(self.port, self.token)
+            save_address(self.port, self.token)
         self._cookie = f"scanwright-{self.port}"
         self._hosts = local_hosts(self.port)
 
@@ -170,7 +170,7 @@ class Gate:
 
 def _opened(port: int, recall: bool) -> tuple[socket, str]:
     """Return a socket and a token; with `recall` those of the last run if the port is free."""
-    last = recalled() if recall else None
+    last = saved_address() if recall else None
     if last is not None and port in (0, last[0]):
         with suppress(TaskError):
             return bound(last[0]), last[1]

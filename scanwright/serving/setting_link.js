@@ -40,7 +40,7 @@
     move(held, [((2 * (clientX - left)) / width - 1) * held.dataset.x, (1 - (2 * (clientY - top)) / height) * held.dataset.y]);
   };
 
-  const look = () => {
+  const update = () => {
     const setting = document.querySelector(".sw-setting");
     if (!setting) return;
     if (wanted) {
@@ -57,7 +57,7 @@
     const hash = `#angles=${setting.dataset.angles}`;
     if (location.hash !== hash) history.replaceState(null, "", location.pathname + location.search + hash);
   };
-  new MutationObserver(look).observe(document, { childList: true, subtree: true, attributeFilter: ["data-angles"] });
+  new MutationObserver(update).observe(document, { childList: true, subtree: true, attributeFilter: ["data-angles"] });
 
   const on = (name, act) => addEventListener(name, (event) => event.target instanceof Element && act(event, event.target), true);
   on("pointerdown", (event, target) => {

@@ -14,14 +14,14 @@
 
   let connected = true;
   let lost = "";
-  const look = () => {
+  const update = () => {
     const state = document.querySelector(".sw-state");
     if (!state || !connected) return;
     lost = state.dataset.lost;
     show(state.dataset.kind, state.textContent);
   };
   const watched = { childList: true, subtree: true, characterData: true, attributeFilter: ["data-kind", "data-lost"] };
-  new MutationObserver(look).observe(document, watched);
+  new MutationObserver(update).observe(document, watched);
 
   // viser's websocket lives in a worker, which reports when it opens and closes
   window.Worker = class extends window.Worker {

@@ -1,8 +1,8 @@
 // Pictures on walls (nodes below /room): seen from inside only, drawn before all that is in the room, without viser's plate
 // over the wall under the pointer. The drawing library shows a new picture only after `needsUpdate`.
 (() => {
-  const look = () => {
-    requestAnimationFrame(look);
+  const update = () => {
+    requestAnimationFrame(update);
     const view = window.__viserMutable;
     for (const [name, node] of Object.entries(view?.nodeRefFromName ?? {}))
       if (name.startsWith("/room/"))
@@ -16,5 +16,5 @@
           view.requestRender();
         });
   };
-  requestAnimationFrame(look);
+  requestAnimationFrame(update);
 })();

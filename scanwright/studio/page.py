@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from scanwright.design.angles import STANDARD_DEG, standard_settings
+from scanwright.design.angles import STANDARD_DEG
 from scanwright.design.errors import ScanwrightError, TaskError
 from scanwright.design.progress import Progress
 from scanwright.design.search.optimum import Optimum
@@ -209,17 +209,17 @@ class Studio:
 
     def _follow(self, setting: Setting) -> None:
         judge = self.judge
-        self._tell(judge.quick(setting))
+        self._show_facts(judge.quick(setting))
         self.view.colour(judge.problem, setting, self._bands)
         self._server.flush()  # at once, not at the next interval
 
     def _rest(self, setting: Setting) -> None:
         self._order()
         exact = self.judge.exact(setting)
-        self._tell(exact)
-        self._tell(self.judge.settled(exact))
+        self._show_facts(exact)
+        self._show_facts(self.judge.settled(exact))
 
-    def _tell(self, facts: Facts) -> None:
+    def _show_facts(self, facts: Facts) -> None:
         self.facts = facts
         self.controls.facts.content = panel_html.facts_html(facts, self.controls.typed._impl.uuid)
         self._server.flush()
@@ -252,7 +252,7 @@ class Studio:
         self._task_changed()
 
     def _task_changed(self) -> None:
-        settings = [*standard_settings().values(), self.setting.angles_rad]
+        settings = [*np.radians([*STANDARD_DEG.values()]), self.setting.angles_rad]
         self._bands = bands_to(max(highest_density(self.judge.problem, angles) for angles in settings))
         self.controls.scale.content = key_html(
             self._bands,

@@ -14,6 +14,7 @@ from scanwright.cad.kernel import require_kernel
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError, TaskError
 from scanwright.design.evaluation.as_built import seen_of
+from scanwright.design.evaluation.comparison import per_ball, price_usd
 from scanwright.design.objective.named_objectives import beams_per_ball
 from scanwright.design.objective.problem import Problem, problem_of
 from scanwright.design.objective.score import Score
@@ -26,7 +27,7 @@ from scanwright.design.search.shortest_period import shortest_period_s
 from scanwright.design.search.with_parts import Refused, choose_with_parts
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.task import LoadedTask
-from scanwright.study.candidate import density_gain, of_lidar, per_ball, price_usd, why, with_motion
+from scanwright.study.candidate import density_gain, of_lidar, why, with_motion
 from scanwright.study.front import six_digits
 from scanwright.study.results import Result
 
@@ -40,17 +41,11 @@ BENDS = "deflection"  # of linkage and shaft, by finite elements
 
 @dataclass(frozen=True, slots=True)
 class BuiltSetting:
-    """Figures of the parts of a mount.
+    """Figures of the parts of a mount."""
 
-    Attributes:
-        shadow: the beams that they block.
-        values: columns that depend on them.
-        weakest: the load nearest to its rating.
-    """
-
-    shadow: SelfOcclusion
-    values: dict[str, float | None]
-    weakest: str
+    shadow: SelfOcclusion  # the beams that they block
+    values: dict[str, float | None]  # columns that depend on them
+    weakest: str  # the load nearest to its rating
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ A search does not depend on servo, slip ring and printer, so candidates that dif
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
 from dataclasses import asdict, replace
 from math import exp
 
@@ -15,10 +14,8 @@ import numpy as np
 from scanwright.design.catalogue.catalogue import Catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
-from scanwright.design.catalogue.products import Bearing, Belt
-from scanwright.design.catalogue.servo import Servo
-from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import ScanwrightError, TaskError
+from scanwright.design.evaluation.comparison import bought, per_ball, price_usd
 from scanwright.design.evaluation.coverage import coverage
 from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.named_objectives import beams_per_ball
@@ -32,8 +29,6 @@ from scanwright.study.results import Result, address
 ANYBODY = "candidate"  # replaces the name of a task, which has no effect on results
 BOUNDED = ("log", "required", "worst")  # objectives that never improve with fewer beams
 PARTS_DECIDE = {"load_margin": np.inf, "hidden_fraction": 0.0, "deflection_deg": 0.0}
-
-Bought = Lidar | Servo | SlipRing | Bearing | Belt
 
 
 def search_record(loaded: LoadedTask) -> LoadedTask:
@@ -91,15 +86,11 @@ def _bounds(optimum: Optimum, reference_J: float) -> dict[str, float | None]:
 
 def bounds_of(loaded: LoadedTask, searched: Result) -> dict[str, float | None]:
     """Return the bounds of a candidate's columns before its parts are made."""
-    bought: list[Lidar | Servo | SlipRing] = [loaded.lidar, loaded.servo]
-    if loaded.task.slip_ring is not None:
-        bought.append(loaded.products.get(loaded.task.slip_ring, SlipRing))
-    price = price_usd(bought)
+    products = bought(loaded)
     known = {
-        "mass_g": sum(product.mass_g for product in bought),
-        "cost_usd": price,
+        "mass_g": sum(product.mass_g for product in products),
         **of_lidar(loaded.lidar),
-        **per_ball(searched["bounds"]["beams_per_ball"], price),
+        **per_ball(searched["bounds"]["beams_per_ball"], price_usd(products)),
     }
     return {name: six_digits(value) for name, value in {**PARTS_DECIDE, **searched["bounds"], **known}.items()}
 
@@ -109,22 +100,9 @@ def of_lidar(lidar: Lidar) -> dict[str, float | None]:
     return {"range_m": lidar.stated_range_m, "range_sigma_mm": lidar.range_sigma_mm}
 
 
-def per_ball(beams: float | None, cost_usd: float | None) -> dict[str, float | None]:
-    """Return beams per ball, and per dollar; None if the objective is not `log` or a price is unknown."""
-    each = None if beams is None or cost_usd is None else beams / cost_usd
-    return {"beams_per_ball": beams, "beams_per_ball_per_usd": each}
-
-
 def density_gain(problem: Problem, reference_J: float, J: float) -> float | None:
     """Return the ratio of beams per ball to the best reference mount, from the difference of logarithms."""
     return exp(reference_J - J) if problem.objective.name == "log" else None
-
-
-def price_usd(products: Iterable[Bought]) -> float | None:
-    """Return the sum of the prices; None if one is unknown."""
-    prices = [product.price_usd for product in products]
-    known = [price for price in prices if price is not None]
-    return sum(known) if len(known) == len(prices) else None
 
 
 def with_motion(loaded: LoadedTask, searched: Result) -> LoadedTask:

@@ -25,23 +25,14 @@ AXES = ("task", "mounting", "sensor", "servo", "slip_ring", "printer", "period")
 
 @dataclass(frozen=True, slots=True)
 class Combination:
-    """One candidate before any work.
+    """One candidate before any work."""
 
-    Attributes:
-        number: its index in the study.
-        name: of the task record, and of its build folder.
-        group: index of its task: only candidates of one task compete.
-        choice: the value on each axis; empty for that of the task.
-        loaded: the task; None if it is rejected.
-        refused: why these products cannot do this task.
-    """
-
-    number: int
-    name: str
-    group: int
-    choice: dict[str, str]
-    loaded: LoadedTask | None
-    refused: str = ""
+    number: int  # its index in the study
+    name: str  # of the task record, and of its build folder
+    group: int  # index of its task: only candidates of one task compete
+    choice: dict[str, str]  # the value on each axis; empty for that of the task
+    loaded: LoadedTask | None  # the task; None if it is rejected
+    refused: str = ""  # why these products cannot do this task
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +74,9 @@ class Crossing:
         refused = ""
         try:
             task = _merged(base.task, chosen, name, self._own_files())
-            products = Catalogue(base.products.products | self._own_products())
+            products = Catalogue(
+                base.products.products | (self.loaded.products.products if self.loaded.study.catalogue else {})
+            )
             faults = [str(fault) for fault in motion_faults(task.product_names(), task.motion, products)]
             faults = faults or replace(base, task=task, products=products).unread_angles()
             refused = faults[0] if faults else ""
@@ -93,9 +86,6 @@ class Crossing:
             refused = str(error)
         loaded = None if refused or task is None else _trimmed(replace(base, task=task, products=products))
         return Combination(number, name, int(places[0]), words, loaded, refused)
-
-    def _own_products(self) -> dict[str, Any]:
-        return self.loaded.products.products if self.loaded.study.catalogue else {}
 
     def _own_files(self) -> tuple[str, ...]:
         """Return the absolute paths of the catalogue files of the study."""

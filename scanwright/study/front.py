@@ -61,16 +61,11 @@ def _cost(value: float | None, name: str) -> float:
 
 @dataclass(slots=True)
 class Front:
-    """Rows that no other row beats, independent of their order.
-
-    Attributes:
-        costs: lower is better, shape (rows, columns).
-        numbers: identifier of each row, shape (rows,).
-    """
+    """Rows that no other row beats, independent of their order."""
 
     columns: int
-    costs: Array = field(init=False)
-    numbers: Array = field(init=False)
+    costs: Array = field(init=False)  # lower is better, shape (rows, columns)
+    numbers: Array = field(init=False)  # identifier of each row, shape (rows,)
 
     def __post_init__(self) -> None:
         self.costs, self.numbers = np.empty((0, self.columns)), np.empty(0, np.intp)

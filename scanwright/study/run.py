@@ -97,23 +97,14 @@ class Tally:
 
 @dataclass(slots=True)
 class StudyRun:
-    """A running study.
+    """A running study."""
 
-    Attributes:
-        crossing: its candidates.
-        results: results folder.
-        judge: makes and evaluates a candidate.
-        search: searches the angles of a candidate.
-        tally: work of this run.
-        fronts: front of each task.
-    """
-
-    crossing: Crossing
-    results: Results
-    judge: Callable[[LoadedTask, Result], Result] = judge_candidate
-    search: Callable[[LoadedTask], Result] = search_candidate
-    tally: Tally = field(default_factory=Tally)
-    fronts: list[Front] = field(init=False)
+    crossing: Crossing  # its candidates
+    results: Results  # results folder
+    judge: Callable[[LoadedTask, Result], Result] = judge_candidate  # makes and evaluates a candidate
+    search: Callable[[LoadedTask], Result] = search_candidate  # searches the angles of a candidate
+    tally: Tally = field(default_factory=Tally)  # work of this run
+    fronts: list[Front] = field(init=False)  # front of each task
     _bounds: Array = field(init=False)
     _failures: dict[str, str] = field(default_factory=dict)
     _at_work: dict[str, list[int]] = field(default_factory=dict)  # address -> its candidates

@@ -40,19 +40,12 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The result of a worker.
+    """The result of a worker."""
 
-    Attributes:
-        result: of the unit.
-        seconds: computing time; None if the result existed.
-        memory_mb: peak memory of the worker; 0 if unknown.
-        stored: whether the result is in the results folder.
-    """
-
-    result: Result
-    seconds: float | None
-    memory_mb: float
-    stored: bool
+    result: Result  # of the unit
+    seconds: float | None  # computing time; None if the result existed
+    memory_mb: float  # peak memory of the worker; 0 if unknown
+    stored: bool  # whether the result is in the results folder
 
 
 @dataclass(frozen=True, slots=True)

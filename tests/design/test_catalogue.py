@@ -42,7 +42,7 @@ def write(tmp_path, text, name="mine.toml"):
 def test_all_products_of_the_issue_are_there(shipped):
     by_kind = {kind: {p.name for p in shipped if isinstance(p, kind)} for kind in (Lidar, Servo, SlipRing, Printer)}
     hokuyo = {"UTM-30LX", "UTM-30LX-EW", "URG-04LX", "URG-04LX-UG01", "UST-10LX", "UST-20LX"}
-    sick = {"LMS 200", "LMS 291", "LMS111", "LMS151", "TiM551", "TiM561", "TiM571", "TiM781"}
+    sick = {"LMS 200", "LMS 291", "LMS111", "LMS151", "LMS511", "TiM551", "TiM561", "TiM571", "TiM781"}
     cheap = {
         "LD06",
         "LD19",

@@ -15,10 +15,6 @@ NEEDS = {  # a file that is not there would be named first, if anything were loo
     ("build", "--check", "no_such"): ("manifold3d", "build needs the CAD kernel: pip install 'scanwright[cad]'"),
     ("check", "no_such"): ("shapely", "check needs the CAD kernel: pip install 'scanwright[cad]'"),
     ("report", "no_such"): ("jinja2", "report needs jinja2: pip install 'scanwright[cad]'"),
-    ("accuracy", "no_such_task", "--choices"): (
-        "OCP",
-        "accuracy --choices needs the CAD kernel: pip install 'scanwright[cad]'",
-    ),
     ("studio", "no_such_task"): ("viser", "studio needs a page server: pip install 'scanwright[pages]'"),
     ("scan", "no_such", "--live"): ("websockets", "scan --live needs a page server: pip install 'scanwright[pages]'"),
     ("convert", "no_such.ply", "b.las"): ("laspy", "b.las: las needs laspy: pip install 'scanwright[clouds]'"),

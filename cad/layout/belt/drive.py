@@ -8,7 +8,7 @@ import numpy as np
 
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_shaft_bend
-from scanwright.cad.layout.belt.plate import plate_of
+from scanwright.cad.layout.belt.plate import THIN_GAP, plate_of, pulley_foot_radius
 from scanwright.cad.layout.belt.sizing import belt_stack
 from scanwright.cad.layout.belt.stack import (
     BOSS,
@@ -92,6 +92,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         bears=_bears,
         built=BUILT,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
+        plain=plate.opening > pulley_foot_radius(scanner.servo) + THIN_GAP,
         borne=((names.SHAFT_RING, names.BEARING_TOWER),),
     )
 

@@ -1,6 +1,7 @@
 """Numbers of the slip-ring adapter's fork on the servo's ears. No kernel."""
 
 from scanwright.cad.layout.direct.cage import FOOT_RADIUS
+from scanwright.cad.layout.direct.frame import frame_ears, needs_frame
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears, ears_on
 from scanwright.cad.layout.names import SLIP_RING_ADAPTER
@@ -19,11 +20,13 @@ def adapter_of(scanner: Scanner, stack: DirectStack) -> Ears | None:
     """Return the holes for the fork of one scanner; None without a ring, or if the base of a cage carries the arms.
 
     Raises:
-        BuildError: the case has no four holes behind the turning flange.
+        BuildError: the case has no four holes behind the turning flange, and no frame.
     """
     if scanner.slip_ring is None or stack.bearing is not None:
         return None
     servo = scanner.servo
+    if needs_frame(servo):
+        return frame_ears(scanner, _opening(stack), fork=True)
     holes = fork_holes(servo, stack)
     if not holes:
         caution = servo.caution("holes")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanwright.cad.layout.direct.frame import frame_ears, needs_frame
 from scanwright.cad.layout.direct.loads import Supported, hanging, shaft_modulus_pa, supported
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears, ears_on
@@ -61,10 +62,10 @@ class BearingCage:
 
 
 def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
-    """Return the holes for the base of a cage.
+    """Return the holes for the base of a cage: of the case, or of a frame if the case has none.
 
     Raises:
-        BuildError: the case has no four holes next to the turning flange.
+        BuildError: the case has neither four holes next to the turning flange nor two for a frame.
     """
     servo, printer = scanner.servo, scanner.printer
     opening = stack.flange_radius + 1.0
@@ -72,13 +73,16 @@ def ears_of(scanner: Scanner, stack: DirectStack) -> Ears:
     free = [(x, y) for x, y in servo.front.places if math.hypot(x, y) >= least]
     widest = max((x for x, _ in free), default=0.0)
     holes = tuple(sorted((x, y) for x, y in free if abs(x) == widest))
-    if len(holes) < 4:
+    if len(holes) >= 4 and not needs_frame(servo):
+        return ears_on(scanner, opening, holes)
+    if len(servo.front.places) < 2:
         caution = servo.caution("holes")
         raise BuildError(
             f"{CAGE_BASE}: ears: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
-            f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange"
+            f"pairs of front holes at least {least:.2f} mm from the axis, outside the turning flange, or two for a "
+            "frame"
         )
-    return ears_on(scanner, opening, holes)
+    return frame_ears(scanner, opening, fork=False)
 
 
 def cage_of(scanner: Scanner, stack: DirectStack, ears: Ears) -> BearingCage | None:

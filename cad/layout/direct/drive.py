@@ -60,15 +60,11 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         BuildError: it cannot be laid out.
     """
     stack, ears = direct_stack(scanner, envelope)
-    frame = frame_of(scanner, stack) if needs_frame(scanner.servo) else None
-    mounted = _mounted(scanner.servo, stack, frame)
     adapter = adapter_of(scanner, stack)
     cage = None if ears is None else cage_of(scanner, stack, ears)
-    if frame is not None and (scanner.slip_ring is not None or stack.bearing is not None):
-        raise BuildError(
-            f"{names.SERVO_FRAME}: holes: {scanner.servo.name} has usable holes in its front only, which its frame "
-            "uses: use no slip ring, or another servo"
-        )
+    framed = next((each for each in (ears, adapter) if each is not None and each.onto == names.SERVO_FRAME), None)
+    frame = frame_of(scanner, stack, framed) if framed is not None or needs_frame(scanner.servo) else None
+    mounted = _mounted(scanner.servo, stack, frame)
     leads_leave = "by the channel of the hub" if cage is not None else "under the hub"
     cage_n_per_m = 0.0 if cage is None else stiffness_n_per_m(stack, cage.ears)
     bend = partial(shaft_bend, stack, shaft_modulus_pa(scanner, stack), cage_n_per_m)
@@ -92,7 +88,8 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         stator_exit=None if scanner.slip_ring is None else stator_exit(scanner, stack, cage),
         bears=partial(_bears, scanner, stack),
         built=BUILT,
-        left_out=tuple(_left_out(scanner, stack)),
+        left_out=tuple(_left_out(scanner, stack, frame)),
+        plain=framed is None,
         borne=() if cage is None else ((names.JOURNAL_SLEEVE, names.SERVO_SHAFT),),
     )
 
@@ -202,10 +199,10 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
     )
 
 
-def _left_out(scanner: Scanner, stack: DirectStack) -> Iterator[LeftOut]:
+def _left_out(scanner: Scanner, stack: DirectStack, frame: ServoFrame | None) -> Iterator[LeftOut]:
     if scanner.slip_ring is None:
         yield LeftOut(names.SLIP_RING_ADAPTER, "this scanner has no slip ring", 1, "parts")
-    if not needs_frame(scanner.servo):
+    if frame is None:
         yield LeftOut(names.SERVO_FRAME, f"{scanner.servo.name} is held by the holes in its rear", 1, "parts")
     if stack.bearing is None:
         servo = scanner.servo

@@ -6,6 +6,7 @@ from dataclasses import replace
 from scanwright.cad.layout.direct.adapter import fork_holes
 from scanwright.cad.layout.direct.cage import ears_of
 from scanwright.cad.layout.direct.cup import cup_stack
+from scanwright.cad.layout.direct.frame import needs_frame
 from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
 from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
@@ -75,8 +76,9 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         sub_plate=None,
     )
     bearing = None
+    forked = needs_frame(scanner.servo) or bool(fork_holes(scanner.servo, alone))
     # the horn is not rated for the rotor, or only the base of a cage has holes for the adapter of a ring
-    if not horn_bears(scanner, alone) or (ring is not None and not fork_holes(scanner.servo, alone)):
+    if not horn_bears(scanner, alone) or (ring is not None and not forked):
         try:
             bearing = bearing_for(scanner, alone)
         except BuildError:

@@ -31,19 +31,18 @@ from scanwright.cad.layout.direct.cage import (
     BearingCage,
 )
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
-from scanwright.cad.layout.drive import Ears, plate_half_x
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import (
     ALL_SCREWS,
     Joint,
     fixing_in,
-    front_joint,
     inward_axes,
     round_wall_mm,
     screws,
     upright_axes,
 )
-from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SERVO_CASE, SLIP_RING_ADAPTER
+from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
 from scanwright.cad.parts.tolerances import OnSheet, printed_seat
@@ -100,25 +99,33 @@ def base_spec(place: Placement) -> PartSpec | None:
         make=partial(cage_base, p),
         step=Step(
             "Base of the cage on the servo",
-            f"Lower the base over the shaft. {screws(SERVO_CASE)}",
+            f"Lower the base over the shaft. {screws(p.ears.onto)}",
             "the shaft turns a full turn without touching the base",
         ),
         shaped_by=ON_CASE,
-        joints=(on_ears(place.scanner.servo, p.stack, p.ears, CAGE_BASE),),
+        joints=(on_ears(p.stack, p.ears, CAGE_BASE),),
         avoid=(around_base(place.scanner.servo, p),),
     )
 
 
-def on_ears(servo: Servo, stack: DirectStack, ears: Ears, part: str) -> Joint:
-    """Return the joint of a plate on the front of the servo's case."""
+def on_ears(stack: DirectStack, ears: Ears, part: str) -> Joint:
+    """Return the joint of a plate on the front of the servo's case, or on its frame."""
     heads = stack.horn + ears.front + SEAT_GAP + UNDER_HEAD
-    grip = heads - (stack.horn + ears.seats)
-    return front_joint(servo, part, SERVO_CASE, upright_axes(ears.holes, heads, -1.0), grip)
+    return Joint(
+        part,
+        ears.onto,
+        ears.fixing,
+        ears.screw,
+        upright_axes(ears.holes, heads, -1.0),
+        grip_mm=heads - (stack.horn + ears.seats),
+        thread_mm=ears.thread_mm,
+        thread=ears.thread,
+    )
 
 
 def around_base(servo: Servo, p: BearingCage) -> Shape:
     """Return the shape of the base next to the bell."""
-    wide, back = plate_half_x(servo), servo.case_min_mm[1]
+    wide, back = p.ears.half_x, servo.case_min_mm[1]
     return shape_of(box_corners(((-wide, back, p.low), (wide, 0.0, p.stack.ring_bottom))))
 
 
@@ -173,7 +180,7 @@ def cage_base(p: BearingCage) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.upright(ears.opening, stack.horn + ears.front, p.high + 1.0)]
         for x, y in ears.holes:
             cuts.append(solids.upright(ears.hole / 2, seats - 1.0, p.high + 1.0, x, y))
-            cuts.append(_head_recess(p, x, y))
+            cuts.append(head_recess(ears, x, y, p.low + UNDER_HEAD, p.high + 1.0))
         for azimuth in p.legs:
             middle, start = (p.foot + p.high) / 2, stack.cage_inner - SCREW_DEPTH
             cuts.append(solids.radial(p.thread.hole / 2, azimuth, middle, start, SCREW_DEPTH + 1.0))
@@ -190,12 +197,12 @@ def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
     return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
 
 
-def _head_recess(p: BearingCage, x: float, y: float) -> cq.Shape:
+def head_recess(ears: Ears, x: float, y: float, low: float, high: float) -> cq.Shape:
     """Return the recess of one screw's head; next to the opening it is open, else a sliver would remain."""
-    radius, low, high = p.ears.screw.driver_radius, p.low + UNDER_HEAD, p.high + 1.0
+    radius = ears.screw.driver_radius
     recess: cq.Shape = solids.upright(radius, low, high, x, y)
     reach = math.hypot(x, y)
-    if reach - radius > p.ears.opening + 1.0:
+    if reach - radius > ears.opening + 1.0:
         return recess
     channel = solids.box((0.0, -radius, low), (reach, radius, high))
     return recess.fuse(channel.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(math.atan2(y, x))))

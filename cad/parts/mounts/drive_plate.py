@@ -1,9 +1,10 @@
 """Drive plate of the belt layout: holds the servo by its front ears and slides on the tower's arms to tighten the belt.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/belt/stack.py`), mm. A flat plate with an opening for horn and pulley,
-feet down to the ears, and four slots along the line of centres.
+feet down to the ears, or a pad on the entire front of a servo with two holes, and four slots along the line of centres.
 """
 
+import math
 from functools import partial
 
 import cadquery as cq
@@ -18,6 +19,7 @@ from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_axes, screws, triple, upright_axes
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO_CASE
 from scanwright.cad.layout.placement import Placement
+from scanwright.cad.parts.mounts.bearing_cage import head_recess
 from scanwright.cad.parts.part_spec import PartSpec, Step, to_centre
 from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.cad.screws import passing_hole, thread_in_part
@@ -45,7 +47,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
         shaped_by=("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm"),
         shapes={"belt.teeth": "the place of the servo"},
         joints=(
-            front_joint(place.scanner.servo, DRIVE_PLATE, SERVO_CASE, axes, heads - stack.horn - p.seats),
+            front_joint(place.scanner.servo, DRIVE_PLATE, SERVO_CASE, axes, heads - stack.horn - p.seats, p.heel_mm),
             Joint(
                 DRIVE_PLATE,
                 BEARING_TOWER,
@@ -78,12 +80,20 @@ def drive_plate(stack: BeltStack, p: Ears, slot: float) -> cq.Solid:
     with building(DRIVE_PLATE, "plate and feet", "holes", p.holes) as checked:
         plate = solids.prism(outlines.octagon(stack.plate_x, (y1 - y0) / 2, 3.0, (y0 + y1) / 2), low, high)
         feet = [solids.upright(FOOT_RADIUS, seats, low + 1.0, x, y) for x, y in p.holes]
+        if p.heel_mm is not None:
+            (x0, y0, _), (x1, y1, _) = stack.servo.case_min_mm, stack.servo.case_max_mm
+            feet = [solids.box((x0, y0, seats), (x1, y1, low + 1.0))]
         body = checked(plate.fuse(*feet))
     with building(DRIVE_PLATE, "opening, holes and slots", "holes", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, seats - 1.0, high + 1.0)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, high + 1.0, x, y))
-            cuts.append(solids.upright(p.screw.driver_radius, low + UNDER_HEAD, high + 1.0, x, y))
+            radius, ends = p.screw.driver_radius, (low + UNDER_HEAD, high + 1.0)
+            cuts.append(
+                head_recess(p, x, y, *ends)
+                if math.hypot(x, y) - radius > p.opening
+                else solids.upright(radius, *ends, x, y)
+            )
         for x in (-stack.slot_x, stack.slot_x):
             for _, y in stack.arms_y:
                 cuts.append(solids.slot(slot / 2, (x - TRAVEL, y), (x + TRAVEL, y), low - 1.0, high + 1.0))

@@ -4,13 +4,15 @@ Frame: rotation frame at gamma = 0 (`cad/layout/direct/frame.py`), mm. A plate w
 along the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
 """
 
+import math
 from functools import partial
 
 import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import shape_of
-from scanwright.cad.layout.direct.frame import FOOT, GRIP, HEADER, LEAST_BRIDGE, LEG, ServoFrame
+from scanwright.cad.layout.direct.frame import EAR_DEPTH, EAR_NUT, FOOT, GRIP, HEADER, LEAST_BRIDGE, ServoFrame
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import front_joint, screws, upright_axes
 from scanwright.cad.layout.names import SERVO, SERVO_CASE, SERVO_FRAME
@@ -42,7 +44,7 @@ def frame_spec(place: Placement) -> PartSpec | None:
 
 def servo_frame(p: ServoFrame) -> cq.Solid:
     """Make the frame."""
-    (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + LEG
+    (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + p.leg
     with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
         body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))
         feet = [solids.box((-p.reach_x, a, p.low), (p.reach_x, b, p.low + FOOT)) for a, b in ((y0, w0), (w1, y1))]
@@ -55,4 +57,20 @@ def servo_frame(p: ServoFrame) -> cq.Solid:
             cuts.append(solids.box((-p.opening, 0.0, p.plate - 1.0), (p.opening, y1 + 1.0, p.high + 1.0)))
         cuts += [solids.upright(p.hole / 2, p.plate - 1.0, p.high + 1.0, x, y) for x, y in p.holes]
         cuts += [solids.upright(p.foot_hole / 2, p.low - 1.0, p.low + FOOT + 1.0, x, y) for x, y in p.feet]
+        if p.ears is not None:
+            cuts += _ear_holes(p, p.ears)
         return checked(body.cut(*cuts).clean())
+
+
+def _ear_holes(p: ServoFrame, ears: Ears) -> list[cq.Solid]:
+    """Return the holes in the upper ends of the sides, with slots for nuts, inserted from outside."""
+    assert ears.thread is not None  # printed
+    hole, trap = ears.thread.hole / 2, ears.thread.trap
+    cuts = [solids.upright(hole, p.high - EAR_DEPTH, p.high + 1.0, x, y) for x, y in ears.holes]
+    if trap is not None:
+        low, high = p.high - EAR_NUT - trap.depth, p.high - EAR_NUT
+        for x, y in ears.holes:
+            ends = sorted((math.copysign(abs(x) - trap.corner, x), math.copysign(p.half_x + p.leg + 1.0, x)))
+            half = trap.across / 2
+            cuts.append(solids.box((ends[0], y - half, low), (ends[1], y + half, high)))
+    return cuts

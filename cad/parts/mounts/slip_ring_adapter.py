@@ -19,10 +19,10 @@ from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.direct.adapter import ARM, ARM_GAP, ARM_HALF_WIDTH, PLATE, UNDER_ROOF
 from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.drive import Ears, plate_half_x
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import screws
-from scanwright.cad.layout.names import RING, SERVO_CASE, SLIP_RING_ADAPTER
+from scanwright.cad.layout.names import RING, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.mounts.bearing_cage import around_base, cage_base, on_ears
 from scanwright.cad.parts.part_spec import CRIMPS, ON_CASE, PartSpec, Row, Step
@@ -51,41 +51,45 @@ def adapter_spec(place: Placement) -> PartSpec | None:
     return PartSpec(
         name=SLIP_RING_ADAPTER,
         turns=False,
-        make=partial(slip_ring_adapter, stack, fork, cage),
-        step=Step(
-            "Adapter on the servo", f"{how} {screws(SERVO_CASE)}", "the shaft turns a full turn without touching"
-        ),
+        make=partial(slip_ring_adapter, stack, ears, cage),
+        step=Step("Adapter on the servo", f"{how} {screws(ears.onto)}", "the shaft turns a full turn without touching"),
         shaped_by=(*ON_CASE, *OF_RING),
-        joints=(on_ears(servo, stack, ears, SLIP_RING_ADAPTER),),
-        avoid=tuple(_around(servo, stack)) if cage is None else (around_base(servo, cage),),
+        joints=(on_ears(stack, ears, SLIP_RING_ADAPTER),),
+        avoid=tuple(_around(servo, stack, ears)) if cage is None else (around_base(servo, cage),),
         rows=(Row("wiring", "cable tie", "cable tie around the ring's stator", "groove of the adapter"), CRIMPS),
         steps={RING: RING_STEP},
     )
 
 
-def _around(servo: Servo, stack: DirectStack) -> Iterator[Shape]:
+def _around(servo: Servo, stack: DirectStack, fork: Ears) -> Iterator[Shape]:
     """Yield arms and fork."""
-    front = stack.horn + servo.case_max_mm[2] + SEAT_GAP
-    outer = max(stack.ring_radius + ARM_GAP + ARM, plate_half_x(servo))
+    front = stack.horn + fork.front + SEAT_GAP
+    outer = max(stack.ring_radius + ARM_GAP + ARM, fork.half_x)
     yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
     yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + PLATE))))
 
 
-def slip_ring_adapter(stack: DirectStack, fork: Ears | None, cage: BearingCage | None) -> cq.Solid:
+def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) -> cq.Solid:
     """Make the adapter: the fork, or the base of a cage, and the arms."""
     inner = stack.ring_radius + ARM_GAP
-    outer = inner + ARM
-    if fork is not None:
-        body, top = _fork(stack, fork, outer), stack.horn + fork.front + SEAT_GAP + PLATE
+    outer, root = inner + ARM, inner - 4.0
+    if cage is None:
+        body, top = _fork(stack, ears, outer), stack.horn + ears.front + SEAT_GAP + PLATE
     else:
-        assert cage is not None
         body, top = cage_base(cage), cage.foot
-    high_end = stack.ring_bottom + min(30.0, stack.ring_length - (UNDER_ROOF if fork is None else 5.0))
+    high_end = stack.ring_bottom + min(30.0, stack.ring_length - (5.0 if cage is None else UNDER_ROOF))
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
-        arms = [
+        arms: list[cq.Shape] = [
             solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end))
-            for low, high in ((inner - 4.0, outer), (-outer, 4.0 - inner))
+            for low, high in ((root, outer), (-outer, -root))
         ]
+        drivers = [  # pass the roots of the arms
+            solids.upright(ears.screw.driver_radius, top - 2.0, stack.ring_bottom, x, y)
+            for x, y in ears.holes
+            if abs(x) + ears.screw.driver_radius > root and abs(y) - ears.screw.driver_radius < ARM_HALF_WIDTH
+        ]
+        if drivers:
+            arms = [arm.cut(*drivers) for arm in arms]
         body = body.fuse(*arms).cut(solids.upright(inner, stack.ring_bottom - 1.0, high_end + 9.0))
         body = checked(body)
     with building(SLIP_RING_ADAPTER, "tie groove", "outer_diameter_mm", 2 * stack.ring_radius) as checked:

@@ -20,6 +20,7 @@ from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
 from scanwright.cad.layout.belt.plate import pulley_foot_radius
 from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import (
     Joint,
     horn_centres,
@@ -88,8 +89,10 @@ def _grub_thread(printer: Printer) -> Thread:
 def drive_pulley_spec(place: Placement) -> PartSpec | None:
     """Return the pulley on the horn of one scanner; None without a belt."""
     scanner, stack = place.scanner, place.drive.of(BeltStack)
-    if stack is None:
+    plate = place.drive.of(Ears)
+    if stack is None or plate is None:
         return None
+    foot = pulley_foot_radius(scanner.servo, plate.opening)
     seat, grip = stack.pulley_seat, stack.pulley_seat - stack.horn
     horn = horn_joint(scanner.servo, names.DRIVE_PULLEY, names.SERVO_OUTPUT, seat, grip)
     push = press_newton(stack, PRELOAD_N, GIVE_MM)
@@ -105,11 +108,11 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
     return PartSpec(
         name=names.DRIVE_PULLEY,
         turns=False,
-        make=partial(drive_pulley, stack, scanner.printer),
+        make=partial(drive_pulley, stack, scanner.printer, foot),
         step=Step("Drive pulley and servo", words, "the belt runs a turn in its rims"),
         sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
-        sweep=partial(drive_envelope, stack),
+        sweep=partial(drive_envelope, stack, foot),
         joints=(replace(horn, axes=placed_axes(horn.axes, stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0])),),
     )
 
@@ -127,12 +130,12 @@ def shaft_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
         return checked(body.cut(*cuts).clean())
 
 
-def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
+def drive_pulley(stack: BeltStack, printer: Printer, foot_radius: float) -> cq.Solid:
     """Make the pulley on the horn."""
     servo, horn, top = stack.servo, stack.horn, stack.teeth_top + 1.0
     screw, boss = SCREWS[servo.horn_screw], servo.horn_boss_diameter_mm / 2
     with building(names.DRIVE_PULLEY, "teeth and foot", "teeth", stack.teeth) as checked:
-        foot = solids.upright(pulley_foot_radius(servo), horn, stack.teeth_low + 0.5)
+        foot = solids.upright(foot_radius, horn, stack.teeth_low + 0.5)
         body = checked(_toothed(stack, foot, None))
     with building(names.DRIVE_PULLEY, "pocket and screws", "horn_circle_mm", servo.horn_circle_mm) as checked:
         cuts = []
@@ -146,11 +149,11 @@ def drive_pulley(stack: BeltStack, printer: Printer) -> cq.Solid:
     return made.moved(solids.location(stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0]))
 
 
-def drive_envelope(stack: BeltStack) -> cq.Solid:
+def drive_envelope(stack: BeltStack, foot_radius: float) -> cq.Solid:
     """Return the space that the pulley on the horn fills while it turns about its own axis."""
     rim, tip = stack.rim_radius, stack.tip_radius
     low, high = stack.teeth_low, stack.teeth_top
-    foot = solids.upright(pulley_foot_radius(stack.servo), stack.horn, low + 0.5)
+    foot = solids.upright(foot_radius, stack.horn, low + 0.5)
     with building(names.DRIVE_PULLEY, "sweep", "teeth", stack.teeth) as checked:
         envelope = foot.fuse(
             solids.upright(rim, low, low + RIM), solids.upright(tip, low, high), solids.upright(rim, high - RIM, high)

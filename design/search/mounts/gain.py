@@ -19,21 +19,14 @@ AS_GOOD = 1.02  # factors up to this do not justify a mount that is harder to bu
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Gain over one reference mount without parts.
+    """Gain over one reference mount without parts."""
 
-    Attributes:
-        mount: the reference mount.
-        factor: ratio of the beams per direction (geometric mean) to those of the mount; None for objectives but `log`.
-        J_less: J of the mount minus J of the result.
-        same: whether the result is this mount.
-        simpler: whether the mount has fewer angles other than 0 than the result.
-    """
-
-    mount: TunedMount
+    mount: TunedMount  # the reference mount
+    # ratio of the beams per direction (geometric mean) to those of the mount; None for objectives but `log`
     factor: float | None
-    J_less: float
-    same: bool
-    simpler: bool
+    J_less: float  # J of the mount minus J of the result
+    same: bool  # whether the result is this mount
+    simpler: bool  # whether the mount has fewer angles other than 0 than the result
 
     @property
     def value(self) -> str:
@@ -106,7 +99,7 @@ def verdict(result: tuple[Gain, ...]) -> list[str]:
     if not better:
         rest = f", but {against}" if against else EASIER if best.simpler else ""
         return [f"{mount} is as good within {AS_GOOD - 1:.0%}{rest}"]
-    rest = f", but {against}" if against else ": fix its angles in the task to try it"
+    rest = f", but {against}" if against else ": fix its angles in the task and build, to see if its parts pass"
     return [f"{mount} has {1 / best.factor:.2f} times the beams if its parts block none{rest}"]
 
 

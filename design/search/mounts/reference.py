@@ -40,19 +40,12 @@ Four = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class OneFreeAngle:
-    """Mounts with one free angle.
+    """Mounts with one free angle."""
 
-    Attributes:
-        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        free: index of the free angle.
-        low_deg: its lower limit.
-        high_deg: its upper limit.
-    """
-
-    angles_deg: Four
-    free: int
-    low_deg: float
-    high_deg: float
+    angles_deg: Four  # (alpha_rot, beta_rot, alpha_laser, beta_laser)
+    free: int  # index of the free angle
+    low_deg: float  # its lower limit
+    high_deg: float  # its upper limit
 
     def at(self, angle_deg: float) -> Four:
         """Return the angles with the free angle at a value."""
@@ -69,21 +62,13 @@ TUNED = {"upright, one tilt": (PITCHED, ROLLED), "Bonn, 45 deg": (TWISTED,)}
 
 @dataclass(frozen=True, slots=True)
 class TunedMount:
-    """A reference mount, tuned to a task.
+    """A reference mount, tuned to a task."""
 
-    Attributes:
-        name: of the mount.
-        angles_deg: (alpha_rot, beta_rot, alpha_laser, beta_laser).
-        score: its exact score.
-        keeps_limits: whether it meets the limits of the task; blind spots do not matter.
-        in_ranges: whether `angles_deg`, chosen among mounts of the same J, are in the ranges of the task.
-    """
-
-    name: str
-    angles_deg: Four
-    score: Score
-    keeps_limits: bool
-    in_ranges: bool
+    name: str  # of the mount
+    angles_deg: Four  # (alpha_rot, beta_rot, alpha_laser, beta_laser)
+    score: Score  # its exact score
+    keeps_limits: bool  # whether it meets the limits of the task; blind spots do not matter
+    in_ranges: bool  # whether `angles_deg`, chosen among mounts of the same J, are in the ranges of the task
 
     @property
     def angles_rad(self) -> Setting:
@@ -131,8 +116,10 @@ def _tuned(space: SearchSpace, lines: tuple[OneFreeAngle, ...]) -> tuple[Four, S
                 places.append((line, angle_deg))
 
     first: list[tuple[OneFreeAngle, Setting]] = []
+    # a lidar rolled to the left can have the same view as one rolled to the right
+    rolls_alike = problem.sweep is None and len(mirrors_of(problem.bearings_rad)) > 1
     for line in lines:
-        low_deg = 0.0 if line is ROLLED and _rolls_alike(problem) else line.low_deg
+        low_deg = 0.0 if line is ROLLED and rolls_alike else line.low_deg
         first.append((line, np.arange(low_deg, line.high_deg + STEPS_DEG[0] / 2, STEPS_DEG[0])))
     if problem.sweep is not None:
         bounds = [
@@ -157,8 +144,3 @@ def _same(problem: Problem, angles_deg: Four) -> list[Four]:
     """Return mounts of the same J, itself first, with alpha_rot = -180 also as 180."""
     result = equivalents(problem, angles_deg, AngleRanges())
     return [*result, *((180.0, b, c, d) for a, b, c, d in result if a == -180)]
-
-
-def _rolls_alike(problem: Problem) -> bool:
-    """Return whether a lidar rolled to the left has the same view as one rolled to the right."""
-    return problem.sweep is None and len(mirrors_of(problem.bearings_rad)) > 1

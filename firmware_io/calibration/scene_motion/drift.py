@@ -56,8 +56,7 @@ def drifts(
     middle = tiles.middle.late_by(x[LAG[0]])
     origin, direction = beam_rays(mount, x, middle)
     point = origin + (middle.range_m + x[4])[:, None] * direction
-    plane = grouping.q[np.maximum(grouping.surface, 0)]
-    plane = plane / np.linalg.norm(plane, axis=1)[:, None]
+    plane = grouping.planes / np.linalg.norm(grouping.planes, axis=1)[:, None]
     results = []
     for k in np.unique(middle.recording).tolist():
         mine = (middle.recording == k) & (grouping.surface >= 0)

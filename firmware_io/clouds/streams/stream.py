@@ -16,11 +16,7 @@ ROWS = 500_000  # in memory
 def stream(source: Path, target: Path, *, least_bytes: int = STREAM_BYTES, rows: int = ROWS) -> Written | None:
     """Convert a large cloud in bounded memory; None if it is small, organised, or of a format that is not streamed.
 
-    Args:
-        source: PLY, PCD, LAS, LAZ, E57 or text.
-        target: the same.
-        least_bytes: size from which files are streamed.
-        rows: points in memory.
+    Files from `least_bytes` on are streamed, `rows` points at a time.
     """
     reader, writer = cloud_module(source), cloud_module(target)
     if not (hasattr(reader, "parts") and hasattr(writer, "write_parts")) or not source.is_file():

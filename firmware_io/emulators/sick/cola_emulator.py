@@ -136,9 +136,10 @@ class SickMachine:
         first_ns = self._first_beam_ns(turn)
         range_m, shown = self.ranging(first_ns + np.rint(steps * self.beam_ns).astype(np.int64), lidar.bearings_rad())
         seen = np.isfinite(range_m)
-        raw = np.rint(np.where(seen, range_m, 0.0) * 1e3).clip(0, 65535).astype(np.uint16)
+        scale = 1.0 if lidar.range_max_mm < 65_536 else 2.0  # 16 bits reach 80 m in steps of 2 mm
+        raw = np.rint(np.where(seen, range_m, 0.0) * 1e3 / scale).clip(0, 65535).astype(np.uint16)
         start, step = self._angles()
-        channels = [Channel("DIST1", 1.0, 0.0, start, step, raw)]
+        channels = [Channel("DIST1", scale, 0.0, start, step, raw)]
         if self.intensity:
             bright = np.where(seen, shown, 0.0).clip(0, 65535).astype(np.uint16)
             channels.append(Channel("RSSI1", 1.0, 0.0, start, step, bright))
@@ -165,9 +166,9 @@ class SickMachine:
         return (self.lidar.last_step - self.lidar.first_step) * 3_600_000 // self.lidar.steps_per_turn
 
     def _angles(self) -> tuple[int, int]:
-        """Return first angle and step, 1e-4 deg, the step rounded down."""
+        """Return first angle and step, rounded to 1e-4 deg."""
         per_step = 3_600_000 / self.lidar.steps_per_turn
-        return 900_000 + round((self.lidar.first_step - self.lidar.front_step) * per_step), int(per_step)
+        return 900_000 + round((self.lidar.first_step - self.lidar.front_step) * per_step), round(per_step)
 
     def _answer(self, request: Telegram, now_ns: int) -> Telegram:
         if self.refusals:

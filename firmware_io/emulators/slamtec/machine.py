@@ -18,7 +18,15 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, suggest
 from scanwright.firmware_io.emulators.lidar_line import LidarLine, Ranging
 from scanwright.firmware_io.emulators.slamtec import packets
-from scanwright.firmware_io.emulators.slamtec.models import DENSE, EXPRESS, IDENTITIES, STANDARD, ULTRA, ScanMode
+from scanwright.firmware_io.emulators.slamtec.models import (
+    DENSE,
+    EXPRESS,
+    IDENTITIES,
+    STANDARD,
+    ULTRA,
+    ULTRA_DENSE,
+    ScanMode,
+)
 from scanwright.firmware_io.emulators.world import spun_up, turned_deg
 
 _STOP, _RESET, _SCAN, _FORCE_SCAN, _EXPRESS_SCAN = 0x25, 0x40, 0x20, 0x21, 0x82
@@ -29,9 +37,21 @@ _CHUNK_NS = 8_000_000  # measured together, to save time
 _BOOT_NS = 1_000_000_000  # [assumed]
 _POINTS_ERROR = 2e-3  # relative, it measures faster than it states [assumed]
 _NEVER_NS = 1 << 62  # 146 years
-_POINTS: Final = {STANDARD: 8, EXPRESS: 32, ULTRA: 96, DENSE: 40}  # of a packet; 8 nodes are sent together
-_SIZES: Final = {STANDARD: 5, EXPRESS: 84, ULTRA: 132, DENSE: 84}
-_MOST_MM: Final = {STANDARD: 16_383, EXPRESS: 16_383, ULTRA: 28_655, DENSE: 65_535}  # largest range of a packet
+_POINTS: Final = {
+    STANDARD: 8,
+    EXPRESS: 32,
+    ULTRA: 96,
+    DENSE: 40,
+    ULTRA_DENSE: 64,
+}  # of a packet; 8 nodes are sent together
+_SIZES: Final = {STANDARD: 5, EXPRESS: 84, ULTRA: 132, DENSE: 84, ULTRA_DENSE: 170}
+_MOST_MM: Final = {
+    STANDARD: 16_383,
+    EXPRESS: 16_383,
+    ULTRA: 28_655,
+    DENSE: 65_535,
+    ULTRA_DENSE: 65_522,
+}  # largest range of a packet
 _EIGHTHS = np.round(9 * np.sin(np.arange(32) / 3)).astype(int)  # of both signs, as with triangulation
 _FAR_OFFSET_DEG = 8.0  # of a triangulated beam, as corrected by the SDK
 _OFFSET_WITHIN_DEG = 0.1  # largest difference of two estimates; edges exceed it and have no return
@@ -96,7 +116,8 @@ class SlamtecMachine:
         time_ns = self._from_ns + np.rint(number * self.point_ns).astype(np.int64)
         angle_deg = self._turned_deg(time_ns)
         sent, byte_ns = [], 10e9 / self.identity.baud
-        write = {STANDARD: self._nodes, EXPRESS: self._capsule, ULTRA: self._ultra, DENSE: self._dense}[self._mode.kind]
+        writers = {STANDARD: self._nodes, EXPRESS: self._capsule, ULTRA: self._ultra}
+        write = writers.get(self._mode.kind, self._dense)
         for first in range(0, self._many * self._chunk, self._many):
             of = slice(first, first + self._many + 1)
             data = write(angle_deg[of], time_ns[of])
@@ -218,8 +239,9 @@ class SlamtecMachine:
         return packets.ultra(angle_deg[0], seen.tolist(), first=self._begins())
 
     def _dense(self, angle_deg: Floats, time_ns: Times) -> bytes:
-        even_deg = np.linspace(angle_deg[0], angle_deg[-1], 40, endpoint=False)
-        return packets.dense(angle_deg[0], self._seen_mm(time_ns[:-1], even_deg).tolist(), first=self._begins())
+        seen = self._seen_mm(time_ns[:-1], np.linspace(angle_deg[0], angle_deg[-1], self._many, endpoint=False))
+        encode = packets.dense if self._mode.kind == DENSE else packets.ultra_dense
+        return encode(angle_deg[0], seen.tolist(), first=self._begins())
 
     def _begins(self) -> bool:
         first, self._first = self._first, False

@@ -1,7 +1,8 @@
 """Models of RPLIDAR: identity, baud rate, motor and scan modes.
 
 Sources: GET_LIDAR_CONF in sl_lidar_cmd.h of rplidar_sdk 2.1; the modes that rplidar_ros prints for real sensors (issues
-68 and 84 of robopeak/rplidar_ros, 48 of Slamtec/rplidar_ros). Undocumented values are marked [assumed].
+68 and 84 of robopeak/rplidar_ros, 48, 150 and 155 of Slamtec/rplidar_ros), and another program for an S1. Undocumented
+values are marked [assumed].
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import struct
 from dataclasses import dataclass
 from typing import Literal
 
-STANDARD, EXPRESS, ULTRA, DENSE = 0x81, 0x82, 0x84, 0x85  # types of packets
+STANDARD, EXPRESS, ULTRA, DENSE, ULTRA_DENSE = 0x81, 0x82, 0x84, 0x85, 0x86  # types of packets
 
 _COUNT, _SAMPLE_US, _MAX_DISTANCE, _ANSWER, _TYPICAL, _NAME = 0x70, 0x71, 0x74, 0x75, 0x7C, 0x7F  # keys of GET_CONF
 _DESIRED_SPEED = 0x01  # key of GET_CONF
@@ -77,19 +78,20 @@ def _triangulating(point_us: float, range_m: float) -> tuple[ScanMode, ...]:
 
 
 _A1, _A2, _A3 = _triangulating(127.0, 12.0), _triangulating(63.0, 12.0), _triangulating(63.0, 25.0)
-_S1 = (  # all but 9.2 thousand points a second [assumed]
-    ScanMode("Standard", STANDARD, 217.0, 40.0),
-    ScanMode("Express", EXPRESS, 108.7, 40.0),
-    ScanMode("DenseBoost", DENSE, 108.7, 40.0),
-)
+_S1 = ScanMode("Standard", STANDARD, 244.0, 40.0), ScanMode("DenseBoost", DENSE, 108.0, 40.0)
+_S1_EXPRESS = ScanMode("Express", EXPRESS, 108.0, 40.0)
 _S2 = ScanMode("Standard", STANDARD, 125.0, 30.0), ScanMode("DenseBoost", DENSE, 31.25, 30.0)
+_S2L = ScanMode("Standard", STANDARD, 125.0, 18.0), ScanMode("DenseBoost", DENSE, 31.25, 18.0)  # as the S2 [assumed]
+_S3 = ScanMode("Standard", STANDARD, 62.5, 16.0), ScanMode("DenseBoost", ULTRA_DENSE, 31.25, 40.0)  # 0x86 [assumed]
 _C1 = ScanMode("Standard", STANDARD, 200.0, 16.0), ScanMode("DenseBoost", DENSE, 200.0, 16.0)
 
 IDENTITIES = {
     "RPLIDAR A1": SlamtecIdentity(0x18, 115_200, "scan", _A1, 3, _A1[1]),
     "RPLIDAR A2": SlamtecIdentity(0x2C, 256_000, "pwm", _A2, 3, _A2[1]),
     "RPLIDAR A3": SlamtecIdentity(0x31, 256_000, "pwm", _A3, 3, _A3[1]),
-    "RPLIDAR S1": SlamtecIdentity(0x61, 256_000, "rpm", _S1, 2, _S1[1]),
+    "RPLIDAR S1": SlamtecIdentity(0x61, 256_000, "rpm", _S1, 1, _S1_EXPRESS, (1, 28)),
     "RPLIDAR S2": SlamtecIdentity(0x71, 1_000_000, "rpm", _S2, 1, _S2[0]),
+    "RPLIDAR S2L": SlamtecIdentity(0x71, 1_000_000, "rpm", _S2L, 1, _S2L[0]),  # model of the S2 [assumed]
+    "RPLIDAR S3": SlamtecIdentity(0x81, 1_000_000, "rpm", _S3, 1, _S3[0], (1, 2)),
     "RPLIDAR C1": SlamtecIdentity(0x41, 460_800, "scan", _C1, 0, _C1[0]),  # 4 for its series [assumed]
 }

@@ -103,7 +103,7 @@ class SlamtecLidar(LineDriver):
     def _recognise(self, model: str | None) -> None:
         """Stop its stream and identify it; close the line if nothing replies."""
         with self._line.closed_on_error():
-            possible = [series for series in SERIES.values() if model in (None, series.model)]
+            possible = [series for series in SERIES.values() if model is None or model in series.models]
             bauds = list(dict.fromkeys(baud for series in possible for baud in series.bauds))
             bauds = bauds if self._line.serial is not None else bauds[:1]  # a serial server sets its own baud rate
             for baud in bauds:
@@ -124,13 +124,13 @@ class SlamtecLidar(LineDriver):
 
     def _accept(self, info: protocol.Info, model: str | None) -> None:
         series = SERIES.get(info.model >> 4)
-        if series is None or model not in (None, series.model):
-            other = f"a model {info.model:#04x} of Slamtec's" if series is None else f"a {series.model}"
-            raise DeviceError(f"{self._line.name}: this is {other}, {f'not a {model}' if model else 'not supported'}")
+        if series is None or (model is not None and model not in series.models):
+            other = f"model {info.model:#04x} of Slamtec" if series is None else " or ".join(series.models)
+            raise DeviceError(f"{self._line.name}: this is a {other}, {f'not a {model}' if model else 'not supported'}")
         if self.serial_number not in ("", info.serial_number):
             raise DeviceError(f"{self._line.name}: this is {info.serial_number}, not {self.serial_number}")
         self._motor = series.motor
-        self._lidar = load_catalogue().get(series.model, Lidar)
+        self._lidar = load_catalogue().get(model or series.models[0], Lidar)
         self.serial_number, self.firmware = info.serial_number, info.firmware
 
     def _turn_motor(self, *, on: bool) -> None:

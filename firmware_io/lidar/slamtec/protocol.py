@@ -2,7 +2,7 @@
 
 A request is A5 and a command, with a payload also its length and the xor of all bytes. A reply begins with a
 descriptor: A5 5A, length (30 bits) and mode (2 bits), type. A stream has one descriptor, then nodes of 5 bytes,
-capsules of 84 or ultra capsules of 132. Invalid bytes raise ProtocolError.
+capsules of 84, ultra capsules of 132 or ultra-dense capsules of 170. Invalid bytes raise ProtocolError.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ NODES: Final = 0x81
 CAPSULES: Final = 0x82
 ULTRA: Final = 0x84
 DENSE: Final = 0x85
+ULTRA_DENSE: Final = 0x86
 
 CONF_SAMPLE_US: Final = 0x71
 CONF_ANSWER: Final = 0x75
@@ -43,13 +44,20 @@ CONF_TYPICAL: Final = 0x7C
 _MARK = b"\xa5\x5a"
 _DESCRIPTOR_SIZE = 7  # rplidar_sdk 2.1
 _LONGEST_REPLY = 512  # beyond it a descriptor is damage
-_CAPSULE_SIZE, _ULTRA_SIZE = 84, 132
+_CAPSULE_SIZE, _ULTRA_SIZE, _ULTRA_DENSE_SIZE = 84, 132, 170
 _NODE_SIZE = 5  # rplidar_sdk 2.1
-SIZES: Final = {NODES: _NODE_SIZE, CAPSULES: _CAPSULE_SIZE, ULTRA: _ULTRA_SIZE, DENSE: _CAPSULE_SIZE}
-POINTS: Final = {NODES: 1, CAPSULES: 32, ULTRA: 96, DENSE: 40}
+SIZES: Final = {
+    NODES: _NODE_SIZE,
+    CAPSULES: _CAPSULE_SIZE,
+    ULTRA: _ULTRA_SIZE,
+    DENSE: _CAPSULE_SIZE,
+    ULTRA_DENSE: _ULTRA_DENSE_SIZE,
+}
+POINTS: Final = {NODES: 1, CAPSULES: 32, ULTRA: 96, DENSE: 40, ULTRA_DENSE: 64}
 _SCALE_COUNT = np.array([0, 512, 1280, 1792, 3328])  # of an ultra capsule: start of each part of its scale,
 _SCALE_MM = np.array([0, 512, 2048, 4096, 16_384])  # and its range, in steps of 1, 2, 4, 8 and 16 mm
 _NO_RETURN = (-512, 511)  # of a predicted range
+_DENSE_SCALE_MM = np.array([0, 2046, 8187, 24_567])  # of an ultra-dense capsule: start of steps of 2, 3, 4 and 5 mm
 _CABINS = np.dtype([("distance", "<u2", 2), ("offsets", "u1")])
 
 
@@ -78,7 +86,7 @@ class SlamtecPacket:
     start_deg: float  # clockwise from the front
     first: bool  # whether it begins the stream, or of a node, a turn
     range_m: Float32s  # shape (n,), NaN without a return
-    quality: Float32s  # shape (n,), 0 in capsules
+    quality: Float32s  # shape (n,), 0 in capsules without it
     offset_deg: Float64[ndarray, " n"]  # of each point before its even place between two starts, shape (n,)
     words: Int64[ndarray, " cabins"] | None = None  # of an ultra capsule, shape (32,); None for the others
 
@@ -169,7 +177,29 @@ def dense(data: bytes) -> SlamtecPacket:
     return SlamtecPacket(start_deg, first, _ranges_m(range_mm), np.zeros(40, np.float32), np.zeros(40))
 
 
-_READ: dict[int, Callable[[bytes], SlamtecPacket]] = {NODES: node, CAPSULES: capsule, ULTRA: ultra, DENSE: dense}
+def ultra_dense(data: bytes) -> SlamtecPacket:
+    """Decode an ultra-dense capsule: 64 points, evenly between its start and the next one's.
+
+    Each has 20 bits: two that select the scale, 10 to 13 of the range and 8 to 5 of the quality. The time and the
+    state before the start angle are undocumented, and rplidar_sdk 2.1 ignores them too.
+    """
+    start_deg, first = _capsule_start(data, _ULTRA_DENSE_SIZE, angle_at=8)
+    cabins = np.frombuffer(data, _CABINS, 32, 10)
+    high = np.stack([cabins["offsets"] & 0xF, cabins["offsets"] >> 4], axis=1).astype(np.int64)
+    word = (cabins["distance"] | high << 16).ravel()
+    scale = word & 3
+    range_mm = (word >> 2 & (1 << 10 + scale) - 1) * (2 + scale) + _DENSE_SCALE_MM[scale]
+    quality = (word >> 12 + scale << scale).astype(np.float32)
+    return SlamtecPacket(start_deg, first, _ranges_m(range_mm), quality, np.zeros(64))
+
+
+_READ: dict[int, Callable[[bytes], SlamtecPacket]] = {
+    NODES: node,
+    CAPSULES: capsule,
+    ULTRA: ultra,
+    DENSE: dense,
+    ULTRA_DENSE: ultra_dense,
+}
 
 
 class ReplySplitter:
@@ -255,12 +285,12 @@ def _ultra(start_deg: float, words: Int64[ndarray, " cabins"], next_word: int, *
     return SlamtecPacket(start_deg, first, _ranges_m(all_mm), np.zeros(96, np.float32), offset_deg, words)
 
 
-def _capsule_start(data: bytes, size: int) -> tuple[float, bool]:
+def _capsule_start(data: bytes, size: int, angle_at: int = 2) -> tuple[float, bool]:
     if len(data) != size or data[0] >> 4 != 0xA or data[1] >> 4 != 0x5:
         raise ProtocolError(f"RPLIDAR: {len(data)} bytes that begin with {data[:2].hex()}: not a capsule")
     if reduce(xor, data[2:]) != (data[0] & 0xF | (data[1] & 0xF) << 4):
         raise ProtocolError("RPLIDAR: the checksum of a capsule is wrong")
-    word = data[2] | data[3] << 8
+    word = int.from_bytes(data[angle_at : angle_at + 2], "little")
     if word & 0x7FFF > 360 * 64 + 64:
         raise ProtocolError(f"RPLIDAR: a capsule at {(word & 0x7FFF) / 64:.1f} deg")
     return (word & 0x7FFF) / 64 % 360, bool(word & 0x8000)

@@ -82,41 +82,28 @@ def _off_both_lines(time_ns: Times, position_rad: Floats) -> Floats:
 
 
 def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed: bool) -> Iterator[Finding]:
-    """Check the angles in the order of their times.
+    """Check the angles, shape (n,), in the order of their times.
 
-    Args:
-        time_ns: shape (n,).
-        position_rad: shape (n,).
-        dropped: outliers are dropped.
-        timed: the times are exact enough to judge speeds by.
+    `dropped`: outliers are dropped; `timed`: the times are exact enough to judge speeds by.
     """
     wrong, off = outliers(time_ns, position_rad)
     if wrong.any():
         cost_mm = 1000 * AT_M * float(np.sin(min(off[wrong].max(), math.pi / 2)))
         share = np.mean(wrong)
-        yield Finding(
-            "angle_outliers",
-            "note" if dropped else "warning",
-            "angle",
-            f"{np.sum(wrong):,} angles ({share:.2%}) lie up to {math.degrees(off[wrong].max()):.3g} deg off both "
-            f"neighbours{': dropped' if dropped else f', {cost_mm:,.0f} mm at {AT_M:g} m'}",
-            float(share),
-            hint="" if dropped else "drop_outliers = true drops them",
-        )
+        far_deg = math.degrees(off[wrong].max())
+        text = f"{np.sum(wrong):,} angles ({share:.2%}) lie up to {far_deg:.3g} deg off both neighbours"
+        cost = ": dropped" if dropped else f", {cost_mm:,.0f} mm at {AT_M:g} m"
+        severity, hint = ("note", "") if dropped else ("warning", "drop_outliers = true drops them")
+        yield Finding("angle_outliers", severity, "angle", text + cost, float(share), hint=hint)
     if timed:
         yield from _jumps(time_ns, position_rad, wrong)
     again = np.diff(time_ns) == 0
     apart = np.abs(_wrapped(np.diff(position_rad)))[again]
     if apart.size and apart.max() > _LEAST_RAD / 10:
-        yield Finding(
-            "angle_stamps_repeat",
-            "warning",
-            "angle",
-            f"{apart.size:,} angles have the time of another one, and differ from it by up to "
-            f"{math.degrees(apart.max()):.3g} deg",
-            float(apart.size),
-            hint="check for two publishers, or a clock of low resolution",
-        )
+        apart_deg = math.degrees(apart.max())
+        text = f"{apart.size:,} angles have the time of another one, and differ from it by up to {apart_deg:.3g} deg"
+        hint = "check for two publishers, or a clock of low resolution"
+        yield Finding("angle_stamps_repeat", "warning", "angle", text, float(apart.size), hint=hint)
 
 
 def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> Iterator[Finding]:
@@ -138,16 +125,13 @@ def _jumps(time_ns: Times, position_rad: Floats, wrong: Bool[ndarray, " n"]) -> 
         jump |= caught_up & (_rests_before(step_rad) >= _RESTS)
     if jump.any():
         worst_rad = float(step_rad[jump].max())
-        yield Finding(
-            "angle_jumps",
-            "warning",
-            "angle",
+        text = (
             f"{np.sum(jump):,} steps between angles are faster than {_FASTEST:g} times the usual speed, up to "
             f"{math.degrees(worst_rad):.3g} deg: the angle rested, or the axis slipped; "
-            f"{1000 * AT_M * math.sin(min(worst_rad, math.pi / 2)):,.0f} mm at {AT_M:g} m",
-            float(np.sum(jump)),
-            hint="check the source of the angle around these times",
+            f"{1000 * AT_M * math.sin(min(worst_rad, math.pi / 2)):,.0f} mm at {AT_M:g} m"
         )
+        hint = "check the source of the angle around these times"
+        yield Finding("angle_jumps", "warning", "angle", text, float(np.sum(jump)), hint=hint)
 
 
 def _rests_before(step_rad: Floats) -> Ints:

@@ -28,12 +28,8 @@ def clock_findings(
 ) -> Iterator[Finding]:
     """Check the stamps of scans and angles, in the order of their receipt.
 
-    Args:
-        scans: times of the scans.
-        angles: times of the angles.
-        arc_ns: from the first to the last beam of each scan, shape (n,).
-        speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        same_clock: whether they share a clock, such as that of one message.
+    `arc_ns`: from the first to the last beam of each scan, shape (n,); `speed_rad_s`: usual speed of the axis, 0 if it
+    rests during each scan; `same_clock`: scans and angles share a clock, such as that of one message.
     """
     for name, stamps in (("scans", scans), ("angles", angles)):
         yield from _steps_back(name, stamps, speed_rad_s)

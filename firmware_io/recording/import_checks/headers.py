@@ -135,14 +135,9 @@ def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
     yield from _bearings(headers)
     yield from _time_increment(headers.judged(), speed_rad_s)
     yield from _longest_range(headers)
-    if headers.unequal_intensities:
-        yield Finding(
-            "intensities_unequal",
-            "note",
-            "intensities",
-            f"{headers.unequal_intensities} scans have another number of intensities than ranges: dropped",
-            headers.unequal_intensities,
-        )
+    if count := headers.unequal_intensities:
+        text = f"{count} scans have another number of intensities than ranges: dropped"
+        yield Finding("intensities_unequal", "note", "intensities", text, count)
 
 
 def _bearings(headers: Headers) -> Iterator[Finding]:
@@ -151,17 +146,13 @@ def _bearings(headers: Headers) -> Iterator[Finding]:
         return
     k = int(np.flatnonzero(wrong)[0])
     cost_mm = 1000 * AT_M * float(np.max(np.abs(span[wrong] - step[wrong] * (beams[wrong] - 1))))
-    yield Finding(
-        "bearings_disagree",
-        "warning",
-        "angle_increment",
+    text = (
         f"{np.sum(wrong)} scans: {beams[k]} beams at angle_increment {math.degrees(step[k]):.4g} deg span "
         f"{math.degrees(step[k] * (beams[k] - 1)):.4g} deg, angle_max - angle_min is {math.degrees(span[k]):.4g} deg: "
-        f"one of them is wrong, by up to {_mm(cost_mm)} at {AT_M:g} m",
-        cost_mm,
-        unit="mm",
-        hint='bearings = "limits" spreads the beams from angle_min to angle_max',
+        f"one of them is wrong, by up to {_mm(cost_mm)} at {AT_M:g} m"
     )
+    hint = 'bearings = "limits" spreads the beams from angle_min to angle_max'
+    yield Finding("bearings_disagree", "warning", "angle_increment", text, cost_mm, unit="mm", hint=hint)
 
 
 def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
@@ -178,30 +169,19 @@ def _time_increment(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:
         return
     ratio = headers.time_increment_ratio
     if abs(ratio - 1) > _TIME_ERROR and cost_mm >= _WRONG_MM:
-        yield Finding(
-            "time_increment_off",
-            "warning",
-            "time_increment",
+        text = (
             f"the time increment is {ratio:.3g} times the step's share of a turn of {headers.mirror_turn_s:.4g} s: "
-            f"beams are up to {_mm(cost_mm)} off at {AT_M:g} m at this speed",
-            ratio,
-            1.0,
-            "times",
-            hint,
+            f"beams are up to {_mm(cost_mm)} off at {AT_M:g} m at this speed"
         )
+        yield Finding("time_increment_off", "warning", "time_increment", text, ratio, 1.0, "times", hint)
     wander = np.abs(stated_s / np.median(stated_s) - 1) > _TIME_ERROR if np.median(stated_s) else np.zeros(0, bool)
     if wander.any():
         worst_mm = 1000 * AT_M * speed_rad_s * float(np.max(np.abs(stated_s - np.median(stated_s)) * arc))
         if worst_mm >= _LEAST_MM:
-            yield Finding(
-                "time_increment_changes",
-                "warning",
-                "time_increment",
-                f"{np.sum(wander)} scans have another time increment than most: beams are up to {_mm(worst_mm)} off at "
-                f"{AT_M:g} m at this speed",
-                float(np.sum(wander)),
-                hint=hint,
-            )
+            count = float(np.sum(wander))
+            cost = f"beams are up to {_mm(worst_mm)} off at {AT_M:g} m at this speed"
+            text = f"{count:.0f} scans have another time increment than most: {cost}"
+            yield Finding("time_increment_changes", "warning", "time_increment", text, count, hint=hint)
 
 
 def _longest_range(headers: Headers) -> Iterator[Finding]:
@@ -212,15 +192,9 @@ def _longest_range(headers: Headers) -> Iterator[Finding]:
     if count >= max(_FEWEST, _SAME_RANGE * headers.beams.sum()):
         limit = float(np.max(headers.range_max_m))
         what = "range_max" if longest_m >= np.float32(limit) else "one and the same range, the longest"
-        yield Finding(
-            "longest_range_repeats",
-            "warning",
-            "ranges",
-            f"{count:,} beams have {what}, {longest_m:.6g} m: probably no returns, which become points there",
-            longest_m,
-            unit="m",
-            hint=f"no_return_from_m = {longest_m:.6g} drops them",
-        )
+        text = f"{count:,} beams have {what}, {longest_m:.6g} m: probably no returns, which become points there"
+        hint = f"no_return_from_m = {longest_m:.6g} drops them"
+        yield Finding("longest_range_repeats", "warning", "ranges", text, longest_m, unit="m", hint=hint)
 
 
 def _mm(value: float) -> str:

@@ -44,10 +44,8 @@ def imu_findings(bag: Bag, angle_ns: Times, position_rad: Floats) -> Iterator[Fi
 def _turned_rad(rates: Floats, angle_ns: Times, position_rad: Floats) -> tuple[float, float]:
     """Return the largest rotation besides that of the axis, and the time [s] in common.
 
-    Args:
-        rates: time [ns] and rate [rad/s] about three axes, shape (n, 4).
-        angle_ns: of the axis, increasing, shape (m,).
-        position_rad: of the axis, shape (m,).
+    `rates`: time [ns] and rate [rad/s] about three axes, shape (n, 4); `angle_ns`, `position_rad`: of the axis, shape
+    (m,).
     """
     inside = (rates[:, 0] >= angle_ns[0]) & (rates[:, 0] <= angle_ns[-1])
     time_s, rate = (rates[inside, 0] - float(angle_ns[0])) / 1e9, rates[inside, 1:]

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from scanwright.design.arrays import Floats, Times
 from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.import_checks.angles import angle_findings, usual_speed_rad_s
@@ -68,52 +67,13 @@ class StreamChecks:
         headers = Headers.of(self._headers)
         time_ns, position_rad = (np.array(column) for column in zip(*self._angles, strict=True))
         unique_ns, first = np.unique(time_ns, return_index=True)
-        received_ns = np.array(self._received_ns, np.int64)
-        prompt_ns = headers.stamp_ns + headers.judged().arc_ns  # causes no finding
-        return sample_findings(
-            headers,
-            Stamps(headers.stamp_ns, np.where(received_ns == _UNKNOWN, prompt_ns, received_ns)),
-            Stamps(time_ns, time_ns),
-            time_ns,
-            position_rad,
-            0.0 if self._at_rest else usual_speed_rad_s(JointLog(unique_ns, position_rad[first])),
-            at_rest=self._at_rest,
-            same_clock=True,
-        )
-
-
-def sample_findings(
-    headers: Headers,
-    scans: Stamps,
-    angles: Stamps,
-    angle_ns: Times,
-    position_rad: Floats,
-    speed_rad_s: float,
-    *,
-    at_rest: bool,
-    same_clock: bool,
-    dropped: bool = False,
-    stamped: bool = True,
-    timed: bool = True,
-) -> Iterator[Finding]:
-    """Check scans and angles of a recording or a stream.
-
-    Args:
-        headers: of the scans.
-        scans: stamps and receipts of the scans.
-        angles: stamps and receipts of the angles.
-        angle_ns: times that the angles get, shape (n,).
-        position_rad: the angles, shape (n,).
-        speed_rad_s: usual speed of the axis; 0 if it rests during each scan.
-        at_rest: whether the axis rests during each scan.
-        same_clock: whether scans and angles share a clock.
-        dropped: whether outliers of the angles are dropped.
-        stamped: whether the times of the scans are their stamps.
-        timed: whether the times of the angles are exact enough for speeds.
-    """
-    if not at_rest:
-        order = np.argsort(angle_ns, kind="stable")
-        yield from angle_findings(angle_ns[order], position_rad[order], dropped=dropped, timed=timed)
-    yield from header_findings(headers, speed_rad_s)
-    if stamped:
-        yield from clock_findings(scans, angles, headers.judged().arc_ns, speed_rad_s, same_clock=same_clock)
+        speed_rad_s = 0.0
+        if not self._at_rest:
+            order = np.argsort(time_ns, kind="stable")
+            speed_rad_s = usual_speed_rad_s(JointLog(unique_ns, position_rad[first]))
+            yield from angle_findings(time_ns[order], position_rad[order], dropped=False, timed=True)
+        yield from header_findings(headers, speed_rad_s)
+        received_ns, arc_ns = np.array(self._received_ns, np.int64), headers.judged().arc_ns
+        # the receipt of the last beam causes no finding
+        scans = Stamps(headers.stamp_ns, np.where(received_ns == _UNKNOWN, headers.stamp_ns + arc_ns, received_ns))
+        yield from clock_findings(scans, Stamps(time_ns, time_ns), arc_ns, speed_rad_s, same_clock=True)

@@ -12,7 +12,7 @@ import numpy as np
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError, suggest
 from scanwright.firmware_io.recording.angle_sources import FrameSource, angles_in, turned_rad
-from scanwright.firmware_io.recording.bag_clocks import Stamps, times
+from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, scan_fault
 from scanwright.firmware_io.recording.import_checks.corrections import Corrections
 from scanwright.firmware_io.recording.import_checks.headers import Headers, header_of
@@ -41,15 +41,7 @@ def survey_bag(
     table: tuple[Times, Floats] | None,
     corrections: Corrections,
 ) -> BagSurvey:
-    """Read all scans and angles.
-
-    Args:
-        bag: open.
-        scan_source: of the scans.
-        angle_source: of the angles; None if they are in a table.
-        table: times and angles.
-        corrections: which echo to use.
-    """
+    """Read all scans and angles; those of a table are given as times [ns] and angles, without an `angle_source`."""
     left_out: Counter[str] = Counter()
     scans: list[tuple[int, int, bool]] = []
     rows: list[tuple[Any, ...]] = []
@@ -88,21 +80,21 @@ def survey_bag(
                 why = f"no joint '{source.field}'{suggest(source.field, joints)}; known: {', '.join(sorted(joints))}"
                 raise RecordingError(f"{bag.path}: {source.topic}: {why}")
             raise RecordingError(f"{bag.path}: {source}: nothing usable: {why}")
-    stamps, receives, without_end = zip(*scans, strict=True)
-    angle_stamps, angle_receives, values_of = zip(*angles, strict=True)
-    numbers, note = np.array(values_of, dtype=float), ""
+    scan_table = np.array([row[:2] for row in scans], np.int64)
+    angle_table = np.array([row[:2] for row in angles], np.int64)
+    numbers, note = np.array([row[2] for row in angles], dtype=float), ""
     turned = numbers.shape[1] == 4 and angle_source is not None
     if turned and angle_source is not None:
         angle, note = turned_rad(numbers, angle_source)
     else:
         angle = numbers[:, 0]
     return BagSurvey(
-        scan_stamps=Stamps(times(stamps), times(receives)),
+        scan_stamps=Stamps(*scan_table.T),
         headers=Headers.of(rows),
         range_limits_m=limits_m,
-        endless=sum(without_end),
+        endless=sum(row[2] for row in scans),
         echoes=echoes,
-        angle_stamps=Stamps(times(angle_stamps), times(angle_receives)),
+        angle_stamps=Stamps(*angle_table.T),
         angle=angle,
         turned=turned,
         angle_note=note,

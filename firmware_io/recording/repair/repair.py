@@ -25,7 +25,7 @@ from scanwright.design.errors import RecordingError, made_by
 from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.recording.mcap_chunks import TimedChunks, read_messages
-from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey, intact_messages, survey
+from scanwright.firmware_io.recording.repair.survey import RepairSummary, Survey
 
 
 def repair(path: Path, out: Path | None = None) -> RepairSummary:
@@ -47,10 +47,10 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
         raise RecordingError(f"{out}: the damaged recording itself: it stays as it is, name another file")
     size = path.stat().st_size
     data = foreign(f"{path}: cannot read", np.memmap, path, np.uint8, "r").data if size else memoryview(b"")
-    result = survey(data)
+    result = Survey(data)
     summary = result.summary
     lost_before = 0
-    for at, message in intact_messages(data, result):
+    for at, message in result.messages():
         topic = result.topic(message)
         if topic is None:
             summary.lost_messages += 1
@@ -69,7 +69,7 @@ def repair(path: Path, out: Path | None = None) -> RepairSummary:
         summary.repaired["what readers stumble over"] += 1
     if not summary.intact:
         with atomic_write(out, RecordingError) as part, foreign(f"{out}: cannot write", part.open, "wb") as stream:
-            _write(TimedChunks(stream), data, result)
+            _write(TimedChunks(stream), result)
     return summary
 
 
@@ -98,7 +98,7 @@ def _read_alike(path: Path, messages: Counter[str]) -> bool:
         return False
 
 
-def _write(writer: TimedChunks, data: memoryview, result: Survey) -> None:
+def _write(writer: TimedChunks, result: Survey) -> None:
     """Write all intact records, with new numbers of schemas and channels."""
     header = result.header or mcap.Header("ros2", "scanwright")
     writer.start(header.profile, header.library)
@@ -108,7 +108,7 @@ def _write(writer: TimedChunks, data: memoryview, result: Survey) -> None:
         else:
             writer.add_attachment(extra.create_time, extra.log_time, extra.name, extra.media_type, extra.data)
     numbers: dict[int, int] = {}
-    for _, message in intact_messages(data, result):
+    for _, message in result.messages():
         if result.topic(message) is None:
             continue
         if message.channel_id not in numbers:

@@ -119,7 +119,7 @@ def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None)
         ):
             unpacked, stop = unpacked_at(data, begin, until, packing)
             off = (zlib.crc32(unpacked) ^ checksum).bit_count() if checksum else 0
-            if stop and off <= 1 and (checksum or _intact_inside(unpacked)):
+            if stop and off <= 1 and (checksum or all(record is not None for _, record in inside_of(unpacked))):
                 return IntactChunk(begin, stop, packing, doubtful=bool(off))
     return None
 
@@ -142,23 +142,12 @@ def unpacked_at(data: memoryview, begin: int, end: int, packing: str) -> tuple[b
 
 
 def inside_of(unpacked: bytes) -> Iterator[tuple[int, Any]]:
-    """Yield schemas, channels and messages of a chunk, and their places in it."""
+    """Yield the records of a chunk (None for unreadable ones), and their places in it."""
     data, at = memoryview(unpacked), 0
     while at < len(data):
         record, end = record_at(data, at)
-        if isinstance(record, mcap.Schema | mcap.Channel | mcap.Message):
-            yield at, record
+        yield at, record
         at = end
-
-
-def _intact_inside(unpacked: bytes) -> bool:
-    """Whether a chunk without a checksum consists of complete records."""
-    data, at = memoryview(unpacked), 0
-    while at < len(data):
-        record, at = record_at(data, at)
-        if record is None:
-            return False
-    return at == len(data)
 
 
 def fits(record: Any, noted: mcap.ChunkIndex | None, messages: Counter[tuple[int, int, int]]) -> bool:

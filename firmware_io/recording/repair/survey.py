@@ -33,25 +33,15 @@ _MOST_LISTED = 8  # gaps
 
 @dataclass(slots=True)
 class RepairSummary:
-    """Content and damage of a recording.
+    """Content and damage of a recording."""
 
-    Attributes:
-        messages: intact ones by topic.
-        lost_messages: damaged ones, if the file has their number.
-        damaged_chunks: with a wrong checksum.
-        lost_bytes: of unreadable records, damaged chunks included.
-        repaired: other damage that a repair corrects.
-        times_ns: log times of the first and the last message.
-        missing_ns: known log times before and after lost messages.
-    """
-
-    messages: Counter[str] = field(default_factory=Counter)
-    lost_messages: int = 0
-    damaged_chunks: int = 0
-    lost_bytes: int = 0
-    repaired: Counter[str] = field(default_factory=Counter)
-    times_ns: tuple[int, int] = (2**64, 0)
-    missing_ns: list[tuple[int, int]] = field(default_factory=list)
+    messages: Counter[str] = field(default_factory=Counter)  # intact ones by topic
+    lost_messages: int = 0  # damaged ones, if the file has their number
+    damaged_chunks: int = 0  # with a wrong checksum
+    lost_bytes: int = 0  # of unreadable records, damaged chunks included
+    repaired: Counter[str] = field(default_factory=Counter)  # other damage that a repair corrects
+    times_ns: tuple[int, int] = (2**64, 0)  # log times of the first and the last message
+    missing_ns: list[tuple[int, int]] = field(default_factory=list)  # log times before and after lost messages
 
     def misses(self, before_ns: int, after_ns: int) -> None:
         """Add a gap between messages of these times; 0 if one is unknown."""
@@ -97,22 +87,65 @@ class RepairSummary:
         return [", ".join(gaps)]
 
 
-@dataclass(slots=True)
 class Survey:
-    """Intact records of a file, and their places."""
+    """Intact records of a file, and their places; after damage, the next readable record is searched."""
 
-    summary: RepairSummary = field(default_factory=RepairSummary)
-    header: mcap.Header | None = None
-    schemas: dict[int, mcap.Schema] = field(default_factory=dict)
-    channels: dict[int, mcap.Channel] = field(default_factory=dict)
-    extras: list[mcap.Metadata | mcap.Attachment] = field(default_factory=list)
-    chunks: list[IntactChunk] = field(default_factory=list)
-    loose: list[tuple[int, int]] = field(default_factory=list)  # begin and end of messages outside of chunks
-    announced: int = 0  # number of messages by the index at the end
-    summary_ns: tuple[int, int] = (0, 0)  # log times of the first and the last message by the index at the end
-    lost_at: list[int] = field(default_factory=list)  # places of lost bytes, increasing
+    def __init__(self, data: memoryview) -> None:
+        self.summary = RepairSummary()
+        self.header: mcap.Header | None = None
+        self.schemas: dict[int, mcap.Schema] = {}
+        self.channels: dict[int, mcap.Channel] = {}
+        self.extras: list[mcap.Metadata | mcap.Attachment] = []
+        self.announced = 0  # number of messages by the index at the end
+        self.summary_ns = 0, 0  # log times of the first and the last message by the index at the end
+        self.lost_at: list[int] = []  # places of lost bytes, increasing
+        self._data = data
+        self._chunks: list[IntactChunk] = []
+        self._loose: list[tuple[int, int]] = []  # begin and end of messages outside of chunks
+        self._repaired = self.summary.repaired
+        self._closed = False
+        self._due: Counter[tuple[int, int, int]] | None = None  # expected message indexes of the last chunk
+        index, self._end = index_at_the_end(data)
+        self._noted = {record.chunk_start_offset: record for record in index if isinstance(record, mcap.ChunkIndex)}
+        for record in index:
+            if isinstance(record, mcap.Statistics):
+                self.announced = record.message_count
+                self.summary_ns = (record.message_start_time, record.message_end_time)
+        self._learn(index)
+        unsure: list[Any] = []
+        at = len(MCAP0_MAGIC)
+        while at < self._end:
+            at = self._take(at, unsure)
+        self._learn(unsure)
+        if self._chunks or self.summary.damaged_chunks:  # in a file with chunks, loose messages are unverified
+            self.summary.lost_bytes += sum(end - at for at, end in self._loose)
+            self._loose.clear()
+        self._repaired["the index at the end"] += not index
+        self._repaired["the first or last bytes"] += not between_magics(data)
+        self._repaired["the end of the data"] += bool(index) and not self._closed
+        self._repaired["the header"] += self.header is None
+        self.summary.repaired = +self._repaired
 
-    def learn(self, records: Iterable[Any]) -> None:
+    def topic(self, message: mcap.Message) -> str | None:
+        """Return the topic of a message, if its topic and type are known."""
+        channel = self.channels.get(message.channel_id)
+        return channel.topic if channel and (not channel.schema_id or channel.schema_id in self.schemas) else None
+
+    def messages(self) -> Iterator[tuple[int, mcap.Message]]:
+        """Yield the place of the chunk of each intact message, and the message, in the order of the file."""
+        places: list[tuple[int, IntactChunk | None]] = [(chunk.begin, chunk) for chunk in self._chunks]
+        places += [(at, None) for at, _ in self._loose]
+        for at, chunk in sorted(places, key=itemgetter(0)):
+            if chunk is None:
+                yield at, record_at(self._data, at)[0]
+                continue
+            unpacked, _ = unpacked_at(self._data, chunk.begin, chunk.end, chunk.packing)
+            sure = len(unpacked) - 4 * chunk.doubtful
+            for place, item in inside_of(unpacked):
+                if isinstance(item, mcap.Message) and place + RECORD_HEAD.size + 22 + len(item.data) <= sure:
+                    yield at, item
+
+    def _learn(self, records: Iterable[Any]) -> None:
         """Add schemas and channels, the first of each number."""
         for record in records:
             if isinstance(record, mcap.Schema):
@@ -120,44 +153,7 @@ class Survey:
             elif isinstance(record, mcap.Channel):
                 self.channels.setdefault(record.id, record)
 
-    def topic(self, message: mcap.Message) -> str | None:
-        """Return the topic of a message, if its topic and type are known."""
-        channel = self.channels.get(message.channel_id)
-        return channel.topic if channel and (not channel.schema_id or channel.schema_id in self.schemas) else None
-
-
-def survey(data: memoryview) -> Survey:
-    """Find all readable records, and count lost bytes."""
-    surveyor = _Surveyor(data)
-    at, end_of_data = len(MCAP0_MAGIC), surveyor.end_of_data
-    while at < end_of_data:
-        at = surveyor.take(at)
-    return surveyor.finish()
-
-
-class _Surveyor:
-    """Reader of consecutive records that searches for the next one after damage."""
-
-    def __init__(self, data: memoryview) -> None:
-        self._data = data
-        self._result = Survey()
-        self._lost, self._repaired = self._result.summary, self._result.summary.repaired
-        self._index, self.end_of_data = index_at_the_end(data)
-        self._noted = {
-            record.chunk_start_offset: record for record in self._index if isinstance(record, mcap.ChunkIndex)
-        }
-        for record in self._index:
-            if isinstance(record, mcap.Statistics):
-                self._result.announced = record.message_count
-                self._result.summary_ns = (record.message_start_time, record.message_end_time)
-        self._result.learn(self._index)
-        self._repaired["the index at the end"] += not self._index
-        self._repaired["the first or last bytes"] += not between_magics(data)
-        self._unsure: list[Any] = []
-        self._closed = False
-        self._due: Counter[tuple[int, int, int]] | None = None  # expected message indexes of the last chunk
-
-    def take(self, at: int) -> int:
+    def _take(self, at: int, unsure: list[Any]) -> int:
         """Process the record at a place; return the place of the next one."""
         record, end = record_at(self._data, at)
         noted = self._noted.get(at)
@@ -169,7 +165,7 @@ class _Surveyor:
             self._chunk(chunk, record, noted)
             return chunk.end
         if record is None:
-            end = min(next_record(self._data, at, end, noted), self.end_of_data)
+            end = min(next_record(self._data, at, end, noted), self._end)
             self._lose(at, end, chunk=noted is not None)
         elif isinstance(record, mcap.Chunk):
             self._lose(at, end, chunk=True)
@@ -182,41 +178,28 @@ class _Surveyor:
             if begins < end:
                 self._lose(at, begins)
                 return begins
-            self._result.loose.append((at, end))
+            self._loose.append((at, end))
         elif isinstance(record, mcap.Attachment) and not sealed(self._data, at, end):
-            self._lost.lost_bytes += end - at
+            self.summary.lost_bytes += end - at
         elif isinstance(record, mcap.Attachment | mcap.Metadata):
-            self._result.extras.append(record)
-        elif isinstance(record, mcap.Header) and self._result.header is None:
-            self._result.header = record
+            self.extras.append(record)
+        elif isinstance(record, mcap.Header) and self.header is None:
+            self.header = record
         else:
             if isinstance(record, mcap.DataEnd):
                 self._closed = record.data_section_crc in (0, zlib.crc32(self._data[:at]))
-            self._unsure.append(record)
+            unsure.append(record)
         return end
 
-    def finish(self) -> Survey:
-        """Return the survey after all records."""
-        result, lost, repaired = self._result, self._lost, self._repaired
-        result.learn(self._unsure)
-        if result.chunks or lost.damaged_chunks:  # in a file with chunks, loose messages are unverified
-            lost.lost_bytes += sum(end - at for at, end in result.loose)
-            result.loose.clear()
-        repaired["the end of the data"] += bool(self._index) and not self._closed
-        repaired["the header"] += result.header is None
-        for what in [what for what, count in repaired.items() if not count]:
-            del repaired[what]
-        return result
-
     def _lose(self, at: int, end: int, *, chunk: bool = False) -> None:
-        self._lost.damaged_chunks += chunk
-        self._lost.lost_bytes += end - at
-        self._result.lost_at.append(at)
+        self.summary.damaged_chunks += chunk
+        self.summary.lost_bytes += end - at
+        self.lost_at.append(at)
 
     def _chunk(self, chunk: IntactChunk, record: Any, noted: mcap.ChunkIndex | None) -> None:
         inside = list(inside_of(unpacked_at(self._data, chunk.begin, chunk.end, chunk.packing)[0]))
-        self._result.learn(item for _, item in inside)
-        self._result.chunks.append(chunk)
+        self._learn(item for _, item in inside)
+        self._chunks.append(chunk)
         records = Counter(
             (item.channel_id, item.log_time, place) for place, item in inside if isinstance(item, mcap.Message)
         )
@@ -225,23 +208,8 @@ class _Surveyor:
 
     def _message_index(self, record: mcap.MessageIndex) -> None:
         if self._due is None:
-            self._lost.lost_messages += len(record.records)
+            self.summary.lost_messages += len(record.records)
             return
         indexed = Counter((record.channel_id, time_ns, place) for time_ns, place in record.records)
         self._repaired["indexes of chunks"] += bool(indexed - self._due)
         self._due -= indexed
-
-
-def intact_messages(data: memoryview, result: Survey) -> Iterator[tuple[int, mcap.Message]]:
-    """Yield the place of the chunk of each intact message, and the message, in the order of the file."""
-    places: list[tuple[int, IntactChunk | None]] = [(chunk.begin, chunk) for chunk in result.chunks]
-    places += [(at, None) for at, _ in result.loose]
-    for at, chunk in sorted(places, key=itemgetter(0)):
-        if chunk is None:
-            yield at, record_at(data, at)[0]
-            continue
-        unpacked, _ = unpacked_at(data, chunk.begin, chunk.end, chunk.packing)
-        sure = len(unpacked) - 4 * chunk.doubtful
-        for place, item in inside_of(unpacked):
-            if isinstance(item, mcap.Message) and place + RECORD_HEAD.size + 22 + len(item.data) <= sure:
-                yield at, item

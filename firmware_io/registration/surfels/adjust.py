@@ -39,16 +39,11 @@ _RANK = 1e-6  # times the largest eigenvalue: smaller ones are rounding
 _SHARES = 8  # of the beams, summed in parallel: the same on every machine, since the order of a sum affects rounding
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Adjusted:
-    """An adjusted pose."""
+def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> tuple[Pose, Float64[ndarray, "6 6"]] | None:
+    """Return the pose from a start with an error below `spacing_m`; None if the flat surfaces do not hold it.
 
-    T_a_b: Pose
-    covariance: Float64[ndarray, "6 6"]  # of a small motion (rotation vector [rad], translation [m]) on its right
-
-
-def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None:
-    """Return the pose from a start with an error below `spacing_m`; None if the flat surfaces do not hold it."""
+    Its covariance is that of a small motion (rotation vector [rad], translation [m]) on its right.
+    """
     cells = find_cells(
         np.concatenate([a.voxels_m, frames.apply(T_a_b, b.voxels_m)]),
         np.concatenate([a.counts, b.counts]),
@@ -76,7 +71,7 @@ def adjust(a: Beams, b: Beams, T_a_b: Pose, spacing_m: float) -> Adjusted | None
         if max(np.abs(solved.x[3:6]).max(), np.sqrt(solved.covariance[3:, 3:].trace()) / _VAGUE) > spacing_m:
             return None
         T = T @ frames.rigid(frames.rotvec_to_matrix(solved.x[:3]), solved.x[3:6])
-        adjusted = Adjusted(T, solved.covariance)
+        adjusted = T, solved.covariance
         reach_m = min(cells.reach_m, _REACH * solved.noise_m)
         still = solved.x[:6] @ np.linalg.solve(solved.covariance, solved.x[:6]) < _SETTLED
         if still and reach_m > _SAME_REACH * cells.reach_m:

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Ints
+from scanwright.firmware_io.clouds.filters import voxel_sums
 
 _LEVELS = 4  # edges of 1, 2, 4 and 8 spacings
 _FINEST = 2.5  # times the spacing: the edge of the smallest cubes
@@ -82,9 +83,9 @@ def find_cells(
         edge_m = _FINEST * spacing_m * 2**level
         _, cube = np.unique(cube_keys(points_m, edge_m), return_inverse=True)
         total = np.bincount(cube, counts)
-        mean = _sums(cube, points_m * counts[:, None]) / total[:, None]
+        mean = voxel_sums(cube, points_m * counts[:, None]) / total[:, None]
         off = points_m - mean[cube]
-        spread = _sums(cube, (off[:, :, None] * off[:, None] * counts[:, None, None]).reshape(-1, 9))
+        spread = voxel_sums(cube, (off[:, :, None] * off[:, None] * counts[:, None, None]).reshape(-1, 9))
         values, vectors = np.linalg.eigh((spread / total[:, None]).reshape(-1, 3, 3))
         axes = np.ascontiguousarray(np.swapaxes(vectors, 1, 2)[:, ::-1])
         across = np.abs(np.einsum("ij,ij->i", off, axes[cube, 2]))
@@ -132,8 +133,3 @@ def cube_keys(points_m: Float64[ndarray, "n 3"], edge_m: float) -> Int64[ndarray
     """Return the number of the cube around each point, shape (n,)."""
     a, b, c = (np.floor(points_m / edge_m).astype(np.int64) + (1 << (_BITS - 1))).T
     return (a << 2 * _BITS) | (b << _BITS) | c
-
-
-def _sums(cube: Int64[ndarray, " n"], values: Floats) -> Floats:
-    """Return the column sums of each cube."""
-    return np.stack([np.bincount(cube, column) for column in values.T], axis=1)

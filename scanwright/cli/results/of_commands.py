@@ -1,169 +1,100 @@
-"""Records of the `--json` output of the commands, and their JSON schemas.
+"""Records of the `--json` output of the commands; `angles.py` and `scans.py` have those that import more.
 
-The attributes of a record are its documentation: `scanwright schema COMMAND` and the reference page print them.
+The comments at the fields are their documentation: `scanwright schema COMMAND` and the reference page print them.
 """
 
 from __future__ import annotations
 
 import csv
-import inspect
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field, is_dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
-from pydantic import TypeAdapter
-
-from scanwright.cli.results.angles import Compared, Evaluated, Optimised
 from scanwright.design.findings import Finding
-from scanwright.firmware_io.assembly.assemble import AssembleSummary
-from scanwright.firmware_io.recording.convert import Converted
-from scanwright.firmware_io.recording.importer import ImportSummary
-from scanwright.firmware_io.recording.repair.survey import RepairSummary
-from scanwright.firmware_io.scan.scan_summary import ScanSummary
 
 
 @dataclass(frozen=True, slots=True)
 class CheckEntry:
-    """A check of the parts, as in `checks.json`.
+    """A check of the parts, as in `checks.json`."""
 
-    Attributes:
-        kind: kind of check, listed on the page of all checks.
-        severity: pass, note, warning or error; an error means: do not make these parts.
-        value: measured value; null if there is none.
-        limit: bound of the value; null if it only informs.
-        unit: unit of value and limit.
-        where: part or product.
-        message: sentence for a person.
-    """
-
-    kind: str
-    severity: str
-    value: float | None
-    limit: float | None
-    unit: str
-    where: str
-    message: str
+    kind: str  # kind of check, listed on the page of all checks
+    severity: str  # pass, note, warning or error; an error means: do not make these parts
+    value: float | None  # measured value; null if there is none
+    limit: float | None  # bound of the value; null if it only informs
+    unit: str  # unit of value and limit
+    where: str  # part or product
+    message: str  # sentence for a person
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """A build folder.
+    """A build folder."""
 
-    Attributes:
-        folder: the folder.
-        files: files in it, relative to it.
-        warnings: limits of the task that can surprise.
-        checks: all checks of the parts.
-    """
-
-    folder: Path
-    files: tuple[str, ...]
-    warnings: tuple[str, ...]
-    checks: list[CheckEntry]
+    folder: Path  # the folder
+    files: tuple[str, ...]  # files in it, relative to it
+    warnings: tuple[str, ...]  # limits of the task that can surprise
+    checks: list[CheckEntry]  # all checks of the parts
 
 
 @dataclass(frozen=True, slots=True)
 class Rebuilt:
-    """A folder compared with a second build (`build --check`).
+    """A folder compared with a second build (`build --check`)."""
 
-    Attributes:
-        folder: the folder.
-        difference: first difference; null if all files are the same.
-    """
-
-    folder: str
-    difference: str | None
+    folder: str  # the folder
+    difference: str | None  # first difference; null if all files are the same
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """The checks of a build.
+    """The checks of a build."""
 
-    Attributes:
-        task: name of the task.
-        checks: all checks.
-    """
-
-    task: str
-    checks: list[CheckEntry]
+    task: str  # name of the task
+    checks: list[CheckEntry]  # all checks
 
 
 @dataclass(frozen=True, slots=True)
 class Created:
-    """A new task file.
+    """A new task file."""
 
-    Attributes:
-        file: the task file.
-        task: its name.
-        warnings: limits of the task that can surprise, and products that the printed parts do not fit.
-    """
-
-    file: Path
-    task: str
-    warnings: list[str]
+    file: Path  # the task file
+    task: str  # its name
+    warnings: list[str]  # limits of the task that can surprise, and products that the printed parts do not fit
 
 
 @dataclass(frozen=True, slots=True)
 class Products:
-    """Products.
+    """Products."""
 
-    Attributes:
-        products: keys of their product files, and `provenance`: source and `verified` of each value.
-    """
-
-    products: list[dict[str, Any]]
+    products: list[dict[str, Any]]  # keys of their product files, and `provenance`: source and `verified` of each value
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredModel:
-    """Values for a product file, measured in a model of the device; none of them is verified.
+    """Values for a product file, measured in a model of the device; none of them is verified."""
 
-    Attributes:
-        values: keys of a product file.
-        notes: other screws that a hole may be for, and what was left out.
-        toml: written proposal.
-        picture: written picture.
-    """
-
-    values: dict[str, Any]
-    notes: tuple[str, ...]
-    toml: Path
-    picture: Path
+    values: dict[str, Any]  # keys of a product file
+    notes: tuple[str, ...]  # other screws that a hole may be for, and what was left out
+    toml: Path  # written proposal
+    picture: Path  # written picture
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenFiles:
-    """Files that a command wrote.
+    """Files that a command wrote."""
 
-    Attributes:
-        folder: folder of the files.
-        files: their names.
-        lines: what the command prints without `--json`.
-        passed: whether all cases passed; null if the command has no cases.
-    """
-
-    folder: Path
-    files: list[str]
-    lines: list[str]
-    passed: bool | None = None
+    folder: Path  # folder of the files
+    files: list[str]  # their names
+    lines: list[str]  # what the command prints without `--json`
 
 
 @dataclass(frozen=True, slots=True)
 class Studied:
-    """A study, or its plan.
+    """A study, or its plan."""
 
-    Attributes:
-        folder: folder of tables and winners.
-        plan: whether only the cost was estimated (`--plan`).
-        lines: what the command prints without `--json`.
-        rows: candidates as in `study.csv`, column -> text; empty for a plan.
-    """
-
-    folder: Path
-    plan: bool
-    lines: list[str]
+    folder: Path  # folder of tables and winners
+    plan: bool  # whether only the cost was estimated (`--plan`)
+    lines: list[str]  # what the command prints without `--json`
+    # candidates as in `study.csv`, column -> text; empty for a plan
     rows: list[dict[str, str]] = field(default_factory=list)
 
 
@@ -175,245 +106,88 @@ def read_rows(table: Path) -> list[dict[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """Devices of a scanner that runs until Ctrl-C; printed when they are ready.
+    """Devices of a scanner that runs until Ctrl-C; printed when they are ready."""
 
-    Attributes:
-        lidar: name of the lidar.
-        servo: name of the servo.
-        lidar_addresses: serial port, HOST:PORT, or both.
-        servo_port: serial port.
-    """
-
-    lidar: str
-    servo: str
-    lidar_addresses: list[str]
-    servo_port: str
-
-
-@dataclass(frozen=True, slots=True)
-class ScanResult:
-    """A scan, or its plan.
-
-    Attributes:
-        devices: lidar and servo.
-        angles: file of the angle set.
-        duration_s: time of the recording.
-        recording: what was recorded; null with `--dry-run`.
-        cloud: the point cloud; null with `--dry-run`.
-    """
-
-    devices: Devices
-    angles: Path
-    duration_s: float
-    recording: ScanSummary | None = None
-    cloud: AssembleSummary | None = None
+    lidar: str  # name of the lidar
+    servo: str  # name of the servo
+    lidar_addresses: list[str]  # serial port, HOST:PORT, or both
+    servo_port: str  # serial port
 
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """Data that `ros2` publishes until Ctrl-C; printed before it starts.
+    """Data that `ros2` publishes until Ctrl-C; printed before it starts."""
 
-    Attributes:
-        devices: lidar and servo; null if a recording is published.
-        recording: the recording; null if devices are used.
-    """
-
-    devices: Devices | None
-    recording: Path | None
+    devices: Devices | None  # lidar and servo; null if a recording is published
+    recording: Path | None  # the recording; null if devices are used
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """State of the devices and of this computer.
+    """State of the devices and of this computer."""
 
-    Attributes:
-        findings: in the order of the checks.
-    """
-
-    findings: list[Finding]
+    findings: list[Finding]  # in the order of the checks
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Permanent settings of a servo.
+    """Permanent settings of a servo."""
 
-    Attributes:
-        changes: settings that were written, or that would be with `--dry-run`, one line each.
-        undo: file that restores the old ones; null if nothing was written.
-        position_deg: where `--centre` left the horn; null without it.
-    """
-
-    changes: list[str]
-    undo: Path | None = None
-    position_deg: float | None = None
-
-
-@dataclass(slots=True)
-class Repaired(RepairSummary):
-    """A repaired recording.
-
-    Attributes:
-        out: the new file; not written if the recording is intact.
-    """
-
-    out: Path = Path()
+    changes: list[str]  # settings that were written, or that would be with `--dry-run`, one line each
+    undo: Path | None = None  # file that restores the old ones; null if nothing was written
+    position_deg: float | None = None  # where `--centre` left the horn; null without it
 
 
 @dataclass(frozen=True, slots=True)
 class Calibrated:
-    """Calibration of a scanner, as in the report next to the angle set.
+    """Calibration of a scanner, as in the report next to the angle set."""
 
-    Attributes:
-        recordings: names of the recordings.
-        left_out: dropped beams, reason -> count.
-        schema: version of these keys.
-        beams: beams with a return.
-        beams_used: beams on surfaces that were used.
-        beams_at_edges: beams near edges, not used.
-        surfaces: number of flat surfaces.
-        parameters: estimated errors: name, words, unit, value, sd (1 sigma), start, and applied_by.
-        covariance: names and matrix of the estimated errors, in SI units.
-        singular_values: of the normalised problem; a small one marks errors that are hard to tell apart.
-        held: parameters that were not estimated: names, words and why.
-        notes: warnings.
-        faults: reasons why the result is wrong; the angle set is then not written.
-        drift: for each recording: motion of the platform, with chi2 of 6 degrees of freedom.
-        second_looks: double coverage: beams asked for, compared, and in conflict (`seen_through`).
-        range_noise_mm: noise of a range.
-        wall_bulge_mm: unevenness of the surfaces.
-        residual_mm: rms distance from the surfaces: before, after, as_assembled.
-        wall_straightness_mm: rms bend of the largest walls: before, after, as_assembled.
-        entropy: map sharpness before and after, an independent check.
-    """
-
-    recordings: list[str]
-    left_out: dict[str, int]
-    schema: str
-    beams: int
-    beams_used: int
-    beams_at_edges: int
-    surfaces: int
-    parameters: list[dict[str, Any]]
-    covariance: dict[str, Any]
-    singular_values: list[float]
-    held: list[dict[str, Any]]
-    notes: list[str]
-    faults: list[str]
-    drift: list[dict[str, Any]]
-    second_looks: dict[str, int]
-    range_noise_mm: float
-    wall_bulge_mm: float
-    residual_mm: dict[str, float]
-    wall_straightness_mm: dict[str, list[float]]
-    entropy: dict[str, Any]
+    recordings: list[str]  # names of the recordings
+    left_out: dict[str, int]  # dropped beams, reason -> count
+    schema: str  # version of these keys
+    beams: int  # beams with a return
+    beams_used: int  # beams on surfaces that were used
+    beams_at_edges: int  # beams near edges, not used
+    surfaces: int  # number of flat surfaces
+    parameters: list[dict[str, Any]]  # estimated errors: name, words, unit, value, sd (1 sigma), start, and applied_by
+    covariance: dict[str, Any]  # names and matrix of the estimated errors, in SI units
+    singular_values: list[float]  # of the normalised problem; a small one marks errors that are hard to tell apart
+    held: list[dict[str, Any]]  # parameters that were not estimated: names, words and why
+    notes: list[str]  # warnings
+    faults: list[str]  # reasons why the result is wrong; the angle set is then not written
+    drift: list[dict[str, Any]]  # for each recording: motion of the platform, with chi2 of 6 degrees of freedom
+    second_looks: dict[str, int]  # double coverage: beams asked for, compared, and in conflict (`seen_through`)
+    range_noise_mm: float  # noise of a range
+    wall_bulge_mm: float  # unevenness of the surfaces
+    residual_mm: dict[str, float]  # rms distance from the surfaces: before, after, as_assembled
+    wall_straightness_mm: dict[str, list[float]]  # rms bend of the largest walls: before, after, as_assembled
+    entropy: dict[str, Any]  # map sharpness before and after, an independent check
 
 
 @dataclass(frozen=True, slots=True)
 class Registered:
-    """Aligned clouds.
+    """Aligned clouds."""
 
-    Attributes:
-        complete: whether every cloud was aligned; otherwise nothing was written.
-        points: points of the merged cloud.
-        files: files that were written.
-        notes: remarks, such as data that a file cannot store.
-    """
-
-    complete: bool
-    points: int
-    files: tuple[Path, ...]
-    notes: tuple[str, ...]
+    complete: bool  # whether every cloud was aligned; otherwise nothing was written
+    points: int  # points of the merged cloud
+    files: tuple[Path, ...]  # files that were written
+    notes: tuple[str, ...]  # remarks, such as data that a file cannot store
 
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """An occupancy grid.
+    """An occupancy grid."""
 
-    Attributes:
-        points: points of all clouds in the map.
-        moved: points that were dropped because beams of another cloud passed them.
-        files: YAML file and image.
-        notes: remarks, such as an unknown position of the scanner.
-    """
-
-    points: int
-    moved: int
-    files: tuple[Path, ...]
-    notes: tuple[str, ...]
+    points: int  # points of all clouds in the map
+    moved: int  # points that were dropped because beams of another cloud passed them
+    files: tuple[Path, ...]  # YAML file and image
+    notes: tuple[str, ...]  # remarks, such as an unknown position of the scanner
 
 
 @dataclass(frozen=True, slots=True)
 class OpenedPage:
-    """A page or a server, or a file for a viewer.
+    """A page or a server, or a file for a viewer."""
 
-    Attributes:
-        address: address to open; null if a file was written.
-        file: the file; null if an address is served until Ctrl-C.
-        scans: scans in the file; null if an address is served.
-    """
-
-    address: str | None = None
-    file: Path | None = None
-    scans: int | None = None
-
-
-RESULTS: dict[str, Any] = {
-    "new": Created,
-    "optimise": Optimised,
-    "evaluate": Evaluated,
-    "compare": Compared,
-    "catalogue": Products,
-    "accuracy": WrittenFiles,
-    "build": Built | Rebuilt,
-    "check": Checked,
-    "measure": MeasuredModel,
-    "report": WrittenFiles,
-    "study": Studied,
-    "emulate": Devices,
-    "doctor": Diagnosis | Settings,
-    "servo-setup": Settings,
-    "scan": ScanResult,
-    "ros2": Published,
-    "import": ImportSummary,
-    "repair": Repaired,
-    "assemble": AssembleSummary,
-    "calibrate": Calibrated,
-    "register": Registered,
-    "map": Mapped,
-    "convert": Converted,
-    "studio": OpenedPage,
-    "view": OpenedPage,
-}
-"""Command -> record that it prints with `--json`."""
-
-
-def result_schema(command: str) -> dict[str, Any]:
-    """Return the JSON schema of the `--json` output of a command, with descriptions from the records."""
-    schema = TypeAdapter(RESULTS[command]).json_schema(mode="serialization")
-    kinds = {kind.__name__: kind for kind in _records_in(RESULTS[command])}
-    for record in (schema, *schema.get("$defs", {}).values()):
-        if kind := kinds.get(record.get("title", "")):
-            record["description"] = inspect.cleandoc(kind.__doc__ or "").split("\n\n", maxsplit=1)[0]
-            for name, words in _attributes(kind).items():
-                record["properties"].get(name, {})["description"] = words
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def _records_in(kind: Any) -> Iterator[type[Any]]:
-    """Yield the dataclasses in a type."""
-    if is_dataclass(kind):
-        yield kind  # type: ignore[misc]
-        for inner in get_type_hints(kind).values():
-            yield from _records_in(inner)
-    for inner in get_args(kind):
-        yield from _records_in(inner)
-
-
-def _attributes(kind: type[Any]) -> dict[str, str]:
-    """Return attribute -> description, from the docstrings of a dataclass and its bases."""
-    described: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        _, _, text = inspect.cleandoc(base.__doc__ or "").partition("\nAttributes:\n")
-        attributes = re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", text, re.MULTILINE)
-        described |= {name: " ".join(words.split()) for name, words in attributes}
-    return described
+    address: str | None = None  # address to open; null if a file was written
+    file: Path | None = None  # the file; null if an address is served until Ctrl-C
+    scans: int | None = None  # scans in the file; null if an address is served

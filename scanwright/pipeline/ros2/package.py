@@ -87,9 +87,10 @@ def write_package(build: Path) -> None:
     name, root = package_name(angles.task), build / FOLDER
     for folder in (name, "resource", "meshes", "launch", "layouts"):
         (root / folder).mkdir(parents=True)
+    depends = "\n".join(f"  <exec_depend>{name}</exec_depend>" for name in _ROS)
     period_s = angles.motion.period_s if isinstance(angles.motion, Spin) else 0.0
     texts = {
-        "package.xml": _PACKAGE.format(name=name, task=escape(angles.task), depends=_depends()),
+        "package.xml": _PACKAGE.format(name=name, task=escape(angles.task), depends=depends),
         "setup.py": _SETUP.format(name=name, task=angles.task),
         "setup.cfg": _CONFIG.format(name=name),
         f"resource/{name}": "",
@@ -105,10 +106,6 @@ def write_package(build: Path) -> None:
     _write_script(root / name / "node.py", name)
     for name_of_file in ("angles.json", "own_body.npz"):
         shutil.copyfile(build / name_of_file, root / name_of_file)
-
-
-def _depends() -> str:
-    return "\n".join(f"  <exec_depend>{name}</exec_depend>" for name in _ROS)
 
 
 def _write_script(target: Path, name: str) -> None:

@@ -50,7 +50,7 @@ class Facts:
         best = min(self.mounts.values(), default=math.nan)
         return math.exp(min(best - self.J, 50.0)) if self.log and math.isfinite(best - self.J) else math.nan
 
-    def asked(self) -> list[tuple[str, bool, str]]:
+    def requirements(self) -> list[tuple[str, bool, str]]:
         """Return the limits of the task in words, whether they are met without parts, and the values."""
         limits, blind = self.limits, f"{percent(self.blind_weight)} blind"
         rows = [("no blind spot", self.blind_weight <= (limits.max_blind_weight or NO_BLIND_WEIGHT), blind)]

@@ -23,9 +23,9 @@ def facts_html(facts: Facts, field: str = "") -> str:
     state = "exact" if facts.exact else "dragging"
     best = min(facts.mounts, key=facts.mounts.__getitem__, default="")
     ratio = "" if math.isnan(facts.ratio) else f"<b>{facts.ratio:.2f} x</b> the beams of {escape(best)}"
-    asked = "".join(
+    requirements = "".join(
         _row(words, value, "&#10003; met" if met else '<span class="sw-bad">&#10007; not met</span>')
-        for words, met, value in facts.asked()
+        for words, met, value in facts.requirements()
     )
     rows = [
         ("J", f"<b>{facts.J:.5f}</b>", f"&plusmn; {error_words(facts.J, facts.J_error)}, {state}, without parts"),
@@ -38,7 +38,7 @@ def facts_html(facts: Facts, field: str = "") -> str:
         f'<div class="sw-setting" hidden data-angles="{angles}" data-field="{field}"></div>'
         f'<div style="font-size:16px;margin:2px 12px">{ratio}</div>'
         f'<table style="font-size:12px;line-height:1.35;border-spacing:0;margin:0 12px 6px">'
-        f"{asked}{''.join(_row(*row) for row in rows)}</table>"
+        f"{requirements}{''.join(_row(*row) for row in rows)}</table>"
     ) + "".join(_on_plane(region, figures) for region, figures in facts.planes)
 
 

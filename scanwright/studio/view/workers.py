@@ -88,7 +88,7 @@ class Workers:
         if not order.scene:
             return
         problem, placed = order.problem, order.loaded.task.scene if order.scene == "task" else None
-        joint_rad = problem.lines.angles_rad if problem.sweep is None else problem.sweep.angles_rad(0.5)
+        joint_rad = problem.joint_rad()
         folder = order.loaded.source.parent
         self._view.show_points(worker.ask("casting the scan ...", one_scan, order.scanner(), joint_rad, placed, folder))
 

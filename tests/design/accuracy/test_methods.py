@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import simpson
 
 from scanwright.cli.app import run as scanwright_command
-from scanwright.design.accuracy import work_precision
+from scanwright.design.accuracy import methods, work_precision
 from scanwright.design.accuracy.methods import METHODS, by_ball_count, by_ball_search
 from scanwright.design.accuracy.reference import smooth_reference
-from scanwright.design.accuracy.work_precision import measure_methods
+from scanwright.design.accuracy.work_precision import measure_methods, report_precision
 from scanwright.design.density.beams import beam_directions_rot, polar_and_azimuth
 from scanwright.design.density.spin import phase_statistics
 from scanwright.design.errors import TaskError
@@ -81,17 +81,6 @@ def test_the_error_is_the_worst_of_several_settings(ground, monkeypatch):
     assert off[0] <= found.error < 0.1 and off[1] < found.error
 
 
-def test_the_stress_command_writes_its_table(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["scanwright", "accuracy", "uniform", "--stress", "--out", str(tmp_path)])
-    with pytest.raises(SystemExit) as stop:
-        scanwright_command()
-    rows = list(csv.DictReader((tmp_path / "uniform/stress.csv").read_text().splitlines()))
-    assert len(rows) > 40
-    assert [row for row in rows if row["passed"] != "True"] == []
-    assert not stop.value.code
-    assert f"{len(rows)} of {len(rows)}" in capsys.readouterr().out
-
-
 def test_the_report_on_a_fixed_setting(tmp_path, monkeypatch, capsys):
     few = {name: (*METHODS[name][:2], METHODS[name][2][:2]) for name in ("segments", "mean count", "rings")}
     monkeypatch.setattr("scanwright.design.accuracy.methods.METHODS", few)
@@ -133,3 +122,18 @@ def test_a_looser_task_states_a_larger_error_and_keeps_it():
         assert abs(ours.J - truth.J) <= min(tolerance, ours.J_error) + truth.J_error
         stated.append(ours.J_error)
     assert stated == sorted(stated, reverse=True)
+
+
+def test_ways_to_compute_J_of_a_sweep(tmp_path, monkeypatch):
+    few = {name: (*methods.SWEPT[name][:2], methods.SWEPT[name][2][-1:]) for name in ("directions", "ball count")}
+    monkeypatch.setattr(methods, "SWEPT", few)
+    monkeypatch.setattr("scanwright.design.accuracy.reference.DRAWN", 2**12)
+    loaded = load_task(Path("indoor_urg"))
+    fixed = {"alpha_rot_deg": 0.0, "beta_rot_deg": -90.0, "alpha_laser_deg": -90.0, "beta_laser_deg": 90.0}
+    angles = loaded.task.angles.model_copy(update=fixed)
+    one = replace(loaded, task=loaded.task.model_copy(update={"angles": angles}))
+    report_precision(one, tmp_path, no_progress)
+    directions, ball = (
+        float(row["error"]) for row in csv.DictReader((tmp_path / "work_precision.csv").read_text().splitlines())
+    )
+    assert directions < 2e-3 < ball < 3e-2

@@ -133,7 +133,7 @@ def widest_deg(loaded, angles_rad):
 def test_a_gap_much_wider_than_the_lines_is_a_finding(angles_deg, weight, warns):
     loaded, angles_rad = task(weight=weight), np.radians(angles_deg)
     problem = problem_of(loaded)
-    gap = expected_cloud(loaded, problem, angles_rad, score(problem, angles_rad)).gap
+    gap = expected_cloud(loaded, problem, angles_rad, score(problem, angles_rad)).wide_gap
     wide = widest_deg(loaded, angles_rad)
     assert (gap is not None) == warns == (wide > WIDE * 0.5)
     if gap is not None:
@@ -149,7 +149,7 @@ def test_a_ball_as_wide_as_the_smallest_object_turns_the_gap_into_a_blind_spot()
     loaded = task(weight=weight, density={"ball_radius_deg": 1.0})
     problem, angles_rad = problem_of(loaded), np.radians((0, -55.68, -78.49, 80))
     cloud = expected_cloud(loaded, problem, angles_rad, score(problem, angles_rad))
-    assert cloud.gap is None and cloud.missed is None, "its blind spot is stated elsewhere"
+    assert cloud.wide_gap is None and cloud.missed_object is None, "its blind spot is stated elsewhere"
 
 
 def fewest(loaded, angles_rad, rng):

@@ -93,7 +93,6 @@ def test_the_figures_of_the_standard_alignments(uniform):
     assert pitching.seen_twice == pytest.approx(1 - np.cos(np.radians(45)), abs=2e-3)
     assert rolling.line_gap_deg == pitching.line_gap_deg == pytest.approx(0.5)
     assert gaps(uniform, np.radians(SETTINGS[3])).line_gap_deg == pytest.approx(0.5 * np.sin(np.radians(45)))
-    assert rolling.line_gap_mm(10) == pytest.approx(87.3, abs=0.1)
 
 
 def test_blind_cones_are_the_largest_empty_caps(uniform):

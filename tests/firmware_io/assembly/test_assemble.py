@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from benchmarks.firmware_io.deskew import deskew, place
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
-from scanwright.firmware_io.assembly.deskew import deskew, place
 from scanwright.firmware_io.assembly.options import AssembleOptions
 from scanwright.firmware_io.assembly.turns import turn_starts
 from scanwright.firmware_io.clouds.ply import read_ply

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from benchmarks.firmware_io.deskew import place
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
-from scanwright.firmware_io.assembly.deskew import place
 from scanwright.firmware_io.assembly.deskew_kernel import _sin_cos, place_block
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.clouds.ply import read_ply

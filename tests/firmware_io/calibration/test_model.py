@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.firmware_io.deskew import deskew, place
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.beam_outcome import Verdict
-from scanwright.firmware_io.assembly.deskew import deskew, place
 from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.calibration.model import (
     BACKLASH,

@@ -70,6 +70,24 @@ def test_captured_requests_get_the_captured_bytes(data, name):
             assert mine.echo + b"\n00P" == real[: len(mine.echo) + 4]
 
 
+@pytest.mark.parametrize(
+    ("once", "endless", "payload"),
+    [
+        (b"HD0000000201", b"ND0000000201000", b"0CB0?X&0O@001"),
+        (b"HE0000000201", b"NE0000000201000", b"0CB01T0?X01U&0O@01W001000"),
+    ],
+)
+def test_all_echoes_of_a_beam_follow_each_other(once, endless, payload):
+    """As urg_library 328b452 reads them: 1234 mm; 1000 and 2000 mm; nothing. Intensities from 100 on."""
+    range_m = np.full((2, 1081), np.inf)
+    range_m[:, 0], range_m[:, 1] = (1.234, np.inf), (1.0, 2.0)
+    bright = np.where(np.isfinite(range_m), 100.0 + np.array([[0], [2]]) + np.arange(1081), np.nan)
+    sensor = machine("UTM-30LX-EW", lambda _: (range_m, bright), laser=True)
+    assert asked(sensor, once).lines[1] == payload
+    assert sensor.answer(endless, 0) == endless + b"\n00P\n\n"
+    assert sensor.next_scan().split(b"\n")[::3] == [endless, protocol.summed(payload)]
+
+
 def test_the_models_are_those_of_the_catalogue():
     catalogue, shared = load_catalogue(), set()
     for model, identity in IDENTITIES.items():
@@ -102,6 +120,9 @@ def test_the_models_are_those_of_the_catalogue():
         ("UTM-30LX", b"CR00", "04"),
         ("URG-04LX", b"CR00", "03"),
         ("URG-04LX", b"ME0044072501000", "0E"),
+        ("UTM-30LX", b"ND0000108001000", "0E"),
+        ("UTM-30LX-EW", b"NS0000108001000", "0E"),
+        ("UTM-30LX-EW", b"HD0000108001", "10"),
         ("URG-04LX", b"SS115200", "00"),
         ("URG-04LX", b"VV;more than sixteen letters", "0G"),
     ],

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.firmware_io.deskew import place
 from scanwright.design import frames
 from scanwright.design.angles import STANDARD_DEG, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError
 from scanwright.design.scene.ray_caster import Hits, build_scene, cast
-from scanwright.firmware_io.assembly.deskew import place
 from scanwright.firmware_io.emulators.head import read_load
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.emulators.world import RangeModel, furnished_room, measure_ranges, range_model, rays, see

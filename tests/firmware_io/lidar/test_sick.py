@@ -16,7 +16,7 @@ from scanwright.firmware_io.lidar.sick.dialogue import RefusedError
 from scanwright.firmware_io.lidar.sick.driver import SickLidar
 from scanwright.firmware_io.lidar.sick.scan_data import scan_data
 
-MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151")
+MODELS = ("TiM551", "TiM561", "TiM571", "TiM781", "LMS111", "LMS151", "LMS511")
 
 
 def look(_time_ns, bearing_rad):
@@ -33,7 +33,8 @@ def emulator(model="LMS111", ranging=look, jitter_s=0.0, **state):
 def check(scan, model):
     bearing_rad = load_catalogue().get(model, Lidar).bearings_rad()
     np.testing.assert_allclose(scan.bearing_rad, bearing_rad, atol=1e-5)
-    expected = np.round(look(None, bearing_rad)[0], 3).astype(np.float32)
+    step_m = 2e-3 if model == "LMS511" else 1e-3  # its scale factor is 2
+    expected = (np.round(look(None, bearing_rad)[0] / step_m) * step_m).astype(np.float32)
     np.testing.assert_array_equal(scan.range_m, np.where(np.isinf(expected), np.nan, expected))
 
 
@@ -47,7 +48,7 @@ def until_fine(lidar):
 
 
 @pytest.mark.parametrize("dialects", [(True,), (False,), (True, False)], ids=["B", "A", "both"])
-@pytest.mark.parametrize("model", ["TiM551", "TiM571", "LMS111"])
+@pytest.mark.parametrize("model", ["TiM551", "TiM571", "LMS111", "LMS511"])
 def test_scans_come_as_they_were_seen(model, dialects):
     with emulator(model, dialects=dialects) as sensor, open_lidar(sensor.address, model) as lidar:
         assert (lidar.model, lidar.serial_number, lidar.firmware) == (model, "18030000", "V1.00")
@@ -328,9 +329,17 @@ OF_AN_LMS = [
     ("sMN mLMPsetscancfg 1388 1 1388 FFF92230 225510", "sAN mLMPsetscancfg 0 1388 1 1388 FFF92230 225510"),
     ("sMN mLMPsetscancfg 9C4 1 9C4 FFF92230 225510", "sAN mLMPsetscancfg 3 1388 1 1388 FFF92230 225510"),
 ]
+OF_AN_LMS5XX = [  # the angles of the capture above
+    ("sRN LMPoutputRange", "sRA LMPoutputRange 1 683 FFFF3CB0 1C3A90"),
+    ("sMN SetAccessMode 3 F4724744", "sAN SetAccessMode 1"),
+    ("sMN mLMPsetscancfg 9C4 1 683 FFFF3CB0 1C3A90", "sAN mLMPsetscancfg 0 9C4 1 683 FFFF3CB0 1C3A90"),
+    ("sMN mLMPsetscancfg 2710 1 683 FFFF3CB0 1C3A90", "sAN mLMPsetscancfg 1 9C4 1 683 FFFF3CB0 1C3A90"),
+]
 
 
-@pytest.mark.parametrize(("model", "dialogue"), [("TiM571", OTHER_REQUESTS), ("LMS111", OF_AN_LMS)])
+@pytest.mark.parametrize(
+    ("model", "dialogue"), [("TiM571", OTHER_REQUESTS), ("LMS111", OF_AN_LMS), ("LMS511", OF_AN_LMS5XX)]
+)
 def test_an_emulator_answers_what_other_programs_ask(model, dialogue):
     """The range of a TiM571: from -45 to 225 deg, in steps of a third of a degree cut to 0.3333."""
     machine = SickMachine(load_catalogue().get(model, Lidar), look, 0)

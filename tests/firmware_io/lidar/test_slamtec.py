@@ -1,6 +1,7 @@
 """RPLIDARs: bytes against published ones, the driver against the emulator, whatever breaks on the way."""
 
 import socket
+import struct
 import time
 from contextlib import suppress
 from dataclasses import replace
@@ -58,8 +59,8 @@ def wall_m(bearing_rad):
 
 
 def rounded_m(model):
-    """Ultra capsules have steps of 4 mm from 2 m on."""
-    return 5e-3 if " A" in model else 1.5e-3
+    """Ultra capsules have steps of 4 mm from 2 m on, ultra-dense ones of 3 mm."""
+    return 5e-3 if " A" in model else 3e-3 if model == "RPLIDAR S3" else 1.5e-3
 
 
 def ranging(time_ns, bearing_rad):
@@ -169,6 +170,21 @@ def test_a_cabin_is_read_by_its_bits():
     np.testing.assert_array_equal(packet.offset_deg[:4], [2.5, -1.0, 2.5, -1.0])
 
 
+def test_a_pair_of_an_ultra_dense_capsule_is_read_by_its_bits():
+    # Two bits of scale, then 10, 11, 12 or 13 of the range in steps of 2, 3, 4 or 5 mm, then the quality.
+    pairs = [
+        (0b00101000_0111110100_00, 0b0010100_00111110100_01),  # 500 * 2; 2046 + 500 * 3
+        (0b001010_000111110100_10, 0b00101_1111111111111_11),  # 8187 + 500 * 4; 24567 + 8191 * 5
+    ]
+    cabins = b"".join(struct.pack("<HHB", a & 0xFFFF, b & 0xFFFF, a >> 16 | b >> 16 << 4) for a, b in pairs * 16)
+    body = bytes(6) + (round(350.5 * 64) | 0x8000).to_bytes(2, "little") + cabins
+    total = int(np.bitwise_xor.reduce(np.frombuffer(body, np.uint8)))
+    packet = protocol.ultra_dense(bytes([0xA0 | total & 15, 0x50 | total >> 4]) + body)
+    assert (packet.start_deg, packet.first, packet.range_m.size) == (350.5, True, 64)
+    np.testing.assert_array_equal(packet.range_m[:4], np.float32([1.0, 3.546, 10.187, 65.522]))
+    np.testing.assert_array_equal(packet.quality[:4], 40)
+
+
 def stream_of(model, mode, turns=0.3):
     emulator = slamtec_emulator(lidar(model), ranging)
     start = protocol.request(protocol.EXPRESS_SCAN, bytes([mode, 0, 0, 0, 0]))
@@ -179,11 +195,12 @@ def stream_of(model, mode, turns=0.3):
     return data
 
 
-STREAMS = {  # nodes, capsules, ultra capsules and dense ones
+STREAMS = {  # nodes, capsules, ultra capsules, dense and ultra-dense ones
     ("RPLIDAR C1", 0): stream_of("RPLIDAR C1", 0),
     ("RPLIDAR A1", 1): stream_of("RPLIDAR A1", 1),
     ("RPLIDAR A1", 3): stream_of("RPLIDAR A1", 3),
     ("RPLIDAR S2", 1): stream_of("RPLIDAR S2", 1),
+    ("RPLIDAR S3", 1): stream_of("RPLIDAR S3", 1),
 }
 
 
@@ -217,6 +234,7 @@ READERS = [
     protocol.capsule,
     protocol.ultra,
     protocol.dense,
+    protocol.ultra_dense,
 ]
 
 
@@ -235,7 +253,11 @@ def test_anything_is_an_answer_or_a_typed_error(read, data):
 def test_turns_come_as_they_were_seen(model):
     with slamtec_emulator(lidar(model), ranging) as emulator:
         with open_lidar(emulator.port, model) as ours:
-            assert ours.model == model and ours.firmware == "1.29" and len(ours.serial_number) == 32
+            assert (
+                ours.model == model
+                and ours.firmware == "{}.{:02d}".format(*IDENTITIES[model].firmware)
+                and len(ours.serial_number) == 32
+            )
             ours.start(intensity=True)
             timed = [ours.read() for _ in range(5)]
             steps = np.diff([one.scan.stamp_ns for one in timed]) * lidar(model).scan_rate_hz / 1e9
@@ -252,6 +274,14 @@ def test_turns_come_as_they_were_seen(model):
         # angles are in sixty-fourths, and between two starts straight
         np.testing.assert_allclose(scan.range_m[~lost], wall_m(scan.bearing_rad[~lost]), atol=rounded_m(model))
         assert scan.time_ns[-1] < one.arrival_ns
+
+
+def test_an_s2_may_be_an_s2l_and_an_s3_has_its_own_series():
+    with slamtec_emulator(lidar("RPLIDAR S2L"), ranging) as emulator:
+        with open_lidar(emulator.port, "RPLIDAR S2L") as ours:
+            assert ours.model == "RPLIDAR S2L"
+        with pytest.raises(DeviceError, match="this is a RPLIDAR S2 or RPLIDAR S2L, not a RPLIDAR S3"):
+            open_lidar(emulator.port, "RPLIDAR S3")
 
 
 def test_another_model_is_refused_and_none_named_is_found():

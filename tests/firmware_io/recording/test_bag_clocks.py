@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scanwright.firmware_io.recording.bag_clocks import Stamps, log_at_rest, one_clock, times
+from scanwright.firmware_io.recording.bag_clocks import Stamps, log_at_rest, one_clock
 from scanwright.firmware_io.samples import JointLog
 
 
@@ -18,7 +18,7 @@ def test_a_scan_that_is_cut_short_ends_before_the_next_which_keeps_both_its_samp
 
 @pytest.mark.parametrize("ahead_s", [0.0, 0.12, 0.5])
 def test_stamps_of_one_clock_that_is_ahead_of_the_receiver_stay(ahead_s):
-    stamp_ns, arc_ns = times(range(10**10, 2 * 10**10, 10**8)), np.full(100, 6 * 10**7)
+    stamp_ns, arc_ns = np.arange(10**10, 2 * 10**10, 10**8), np.full(100, 6 * 10**7)
     received = stamp_ns - round(1e9 * ahead_s)
     scans, angles = Stamps(stamp_ns, received + arc_ns + 10**6), Stamps(stamp_ns, received + 10**6)
     chosen = one_clock(scans, angles, arc_ns)
@@ -26,7 +26,7 @@ def test_stamps_of_one_clock_that_is_ahead_of_the_receiver_stay(ahead_s):
 
 
 def test_of_clocks_that_differ_the_receipt_of_the_first_beam_decides():
-    stamp_ns, arc_ns = times(range(10**10, 2 * 10**10, 10**8)), np.full(100, 6 * 10**7)
+    stamp_ns, arc_ns = np.arange(10**10, 2 * 10**10, 10**8), np.full(100, 6 * 10**7)
     scans, angles = Stamps(stamp_ns + 4 * 10**8, stamp_ns + arc_ns), Stamps(stamp_ns, stamp_ns)
     chosen = one_clock(scans, angles, arc_ns)
     assert "another clock" in chosen.note and np.array_equal(chosen.scan_ns, stamp_ns)

@@ -9,8 +9,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
 
+from scanwright.design import frames
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_note, read_topics
@@ -22,7 +25,7 @@ def write(path, messages, **options):
     with path.open("wb") as stream:
         writer = Writer(stream, **options)
         writer.start()
-        writer.add_metadata("note", {"hold": "true"})
+        writer.add_metadata("scanwright", {"hold": "true"})
         schema = writer.register_schema("some/Type", "ros2msg", b"")
         channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in TOPICS}
         for topic, log_ns, data in messages:
@@ -58,7 +61,7 @@ def test_messages_come_as_the_formats_own_reader_gives_them(
 def test_topics_and_notes_are_found(tmp_path):
     path = write(tmp_path / "m.mcap", [("/a", 1, b"")])
     assert read_topics(path) == dict.fromkeys(TOPICS, "some/Type")
-    assert (read_note(path, "note"), read_note(path, "other")) == ({"hold": "true"}, {})
+    assert read_note(path) == {"hold": "true"}
 
 
 @pytest.mark.parametrize("where", [0.2, 0.5, 0.8])
@@ -122,6 +125,24 @@ def test_a_message_that_is_cut_off_is_an_error_and_not_a_value(size):
     store = get_typestore(Stores.ROS2_JAZZY)
     data = ros_messages.encode_joint(5, 1.0)
     assert len(data) > size
-    with pytest.raises((ValueError, IndexError, struct.error)):
+    with pytest.raises((ValueError, IndexError, struct.error, SerdeError)):
         ros_messages.decode_joint(data[:size])
     assert store.deserialize_cdr(data, ros_messages.JOINT_STATE).position[0] == 1.0
+
+
+def test_a_frame_of_tf_is_the_pose_that_it_was_made_of():
+    T = frames.rigid(frames.Rz(0.3) @ frames.Rx(-2.0), [1.0, 2.0, 3.0])
+    data = ros_messages.encode_transforms([("rot", "laser", T)], 1_700_000_000_123_456_789)
+    (said,) = ros_messages.decode_message(data, ros_messages.TRANSFORMS).transforms
+    q, t = said.transform.rotation, said.transform.translation
+    np.testing.assert_allclose(Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix(), T[:3, :3], atol=1e-12)
+    assert [t.x, t.y, t.z] == [1, 2, 3] and (said.header.frame_id, said.child_frame_id) == ("rot", "laser")
+    assert ros_messages.stamp_ns(said.header.stamp) == 1_700_000_000_123_456_789
+
+
+@pytest.mark.parametrize("shape", [(6,), (2, 3)])
+def test_points_keep_their_rows_and_columns(shape):
+    rows = np.zeros(shape, [("x", "<f4"), ("time", "<f8")])
+    message = ros_messages.decode_message(ros_messages.encode_points(rows, "world", 5), ros_messages.POINT_CLOUD)
+    assert (message.height, message.width) == (1, *shape)[-2:]
+    assert message.row_step == message.point_step * message.width and message.data.size == rows.nbytes

@@ -148,21 +148,3 @@ def test_devices_are_published_and_a_listener_that_is_killed_is_not_missed(tmp_p
     assert there.mean() > 0.5
     np.testing.assert_array_equal(there, np.isfinite(found["rebuilt"]))
     assert np.abs(found["said"] - found["rebuilt"])[there].max() < 1e-4
-
-
-def test_a_frame_of_tf_is_the_pose_that_it_was_made_of(domain):
-    """`tf2_msgs` is in no wheel: what `/tf` would hold is looked at, not sent."""
-    code = """if True:
-        import numpy as np
-        from scanwright.design import frames
-        from scanwright.firmware_io.ros.messages import transform
-        T = frames.rigid(frames.Rz(0.3) @ frames.Rx(-2.0), [1.0, 2.0, 3.0])
-        said = transform("rot", "laser", T, 1_700_000_000_123_456_789)
-        q, t = said.transform.rotation, said.transform.translation
-        x, y, z, w = q.x, q.y, q.z, q.w
-        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        assert np.allclose(np.eye(3) + 2 * w * K + 2 * K @ K, T[:3, :3]) and [t.x, t.y, t.z] == [1, 2, 3]
-        assert (said.header.frame_id, said.child_frame_id) == ("rot", "laser")
-        assert (said.header.stamp.sec, said.header.stamp.nanosec) == (1_700_000_000, 123_456_789)
-    """
-    ended(started("-c", code, domain=domain, cwd=HERE.parents[2]))

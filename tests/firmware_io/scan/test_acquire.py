@@ -26,7 +26,7 @@ from scanwright.firmware_io.recording.recording import open_recording
 from scanwright.firmware_io.recording.repair.repair import repair
 from scanwright.firmware_io.samples import JointLog
 from scanwright.firmware_io.scan import axis_thread, lidar_scans
-from scanwright.firmware_io.scan.setpoints import course
+from scanwright.firmware_io.scan.axis_thread import course
 from scanwright.firmware_io.servo.progress import ServoState
 
 SPIN = {"mode": "spin", "period_s": 2.0}

@@ -13,7 +13,7 @@ from scanwright.firmware_io.lidar.families import FAMILIES, family_of, open_lida
 from scanwright.firmware_io.lidar.scip import driver as scip
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT_WARNING, FAULT
 from scanwright.firmware_io.scan import doctor, lidar_scans
-from scanwright.firmware_io.scan.reporter import Reporter
+from scanwright.firmware_io.scan.live_feed import Reporter
 
 MODELS = ("UTM-30LX", "STL27L", "RPLIDAR A2", "RPLIDAR C1", "RPLIDAR S2", "TiM561", "LMS 200")
 MOST_LOST_S = 1.0

@@ -13,7 +13,7 @@ from scanwright.design.motion import Spin
 from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
 from scanwright.firmware_io.scan import acquire, axis_thread, lidar_scans
 from scanwright.firmware_io.scan.axis_thread import turning_servo
-from scanwright.firmware_io.scan.reporter import Reporter
+from scanwright.firmware_io.scan.live_feed import Reporter
 from scanwright.firmware_io.servo import guard
 from scanwright.firmware_io.servo.progress import ServoState
 from scanwright.firmware_io.servo.servo import open_servo

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scanwright.design.errors import DeviceError, UnsafeError
-from scanwright.firmware_io.scan.scan_summary import ScanSummary
+from scanwright.firmware_io.scan.scan_end import ScanSummary
 from scanwright.firmware_io.servo import guard, servo
 from scanwright.firmware_io.servo.servo import open_servo
 

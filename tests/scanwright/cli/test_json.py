@@ -14,7 +14,7 @@ from typer.main import get_command
 from scanwright.cli.app import app
 from scanwright.cli.console import show_json
 from scanwright.cli.results import of_commands
-from scanwright.cli.results.of_commands import RESULTS, result_schema
+from scanwright.cli.results.schemas import RESULTS, result_schema
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import write_clouds
 
@@ -47,26 +47,26 @@ def test_a_base_describes_keys_of_its_record(monkeypatch):
         """A base.
 
         Attributes:
-            one: first key, described
+            zero: a key of the docstring,
                 in two lines.
         """
 
+        zero: int
+        # first key, described
+        # in two lines
         one: int
 
     @dataclass
     class Record(Base):
-        """A record.
+        """A record."""
 
-        Attributes:
-            two: second key.
-        """
-
-        two: list[int]
+        two: list[int]  # second key
 
     monkeypatch.setitem(RESULTS, "build", Record)
     schema = result_schema("build")
     described = {key: value["description"] for key, value in schema["properties"].items()}
-    assert described == {"one": "first key, described in two lines.", "two": "second key."}
+    zero = "a key of the docstring, in two lines."
+    assert described == {"zero": zero, "one": "first key, described in two lines.", "two": "second key."}
     assert schema["description"] == "A record."
 
 

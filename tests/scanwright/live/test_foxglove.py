@@ -19,16 +19,16 @@ from patience import BOUND_S, until
 from rosbags.typesys import Stores, get_typestore
 from websockets.sync.client import connect
 
+from benchmarks.firmware_io.deskew import deskew
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError, TaskError
-from scanwright.firmware_io.assembly.deskew import deskew
 from scanwright.firmware_io.recording.recording import open_recording, recording_writer
 from scanwright.firmware_io.samples import straight
 from scanwright.firmware_io.scan.live_feed import Batch
 from scanwright.live.foxglove_channels import FoxgloveChannels
 from scanwright.live.foxglove_server import BACKLOG, foxglove_server
-from scanwright.live.foxglove_view import mcap_log, tell, view_recording, write_for_foxglove
+from scanwright.live.foxglove_view import mcap_log, pass_on, view_recording, write_for_foxglove
 from scanwright.serving.handshake import as_origins
 
 ANGLES = AngleSet(
@@ -159,11 +159,11 @@ def test_devices_that_began_anew_are_assembled_as_if_nothing_had_been_before(fol
     second = Batch(joints.time_ns + later_ns, joints.position_rad + 2.0, tuple(again), (), 0)
     with mcap_log(tmp_path / "live.mcap") as log:
         channels = FoxgloveChannels(ANGLES, None, None, log)
-        tell(first, channels)
-        tell(second, channels)
+        pass_on(first, channels)
+        pass_on(second, channels)
         channels.close()
         alone = FoxgloveChannels(ANGLES, None, None, log, wall_minus_ns=1)
-        tell(second, alone)
+        pass_on(second, alone)
         alone.close()
     with (tmp_path / "live.mcap").open("rb") as stream:
         decoded = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
@@ -180,7 +180,7 @@ def test_a_scan_comes_batch_by_batch_on_the_clock_of_the_world(folder, tmp_path)
     with mcap_log(tmp_path / "live.mcap") as log:
         channels = FoxgloveChannels(ANGLES, None, None, log, smooth=False, wall_minus_ns=5)
         for some, few in halves:
-            tell(Batch(joints.time_ns[some], joints.position_rad[some], tuple(few), ("a line",), 0), channels)
+            pass_on(Batch(joints.time_ns[some], joints.position_rad[some], tuple(few), ("a line",), 0), channels)
         channels.close()
     with (tmp_path / "live.mcap").open("rb") as stream:
         decoded = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())

@@ -19,16 +19,16 @@ from PIL import Image
 from scipy.stats import kstest
 from websockets.sync.client import connect
 
+from benchmarks.firmware_io.deskew import deskew
 from scanwright.cli import devices
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import DeviceError, ScanwrightError, UnsafeError, UnsafeNote
 from scanwright.design.task.task import load_task
-from scanwright.firmware_io.assembly.deskew import deskew
 from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.samples import JointLog, Scan
 from scanwright.firmware_io.scan import scan_end
 from scanwright.firmware_io.scan.live_feed import MOST_SCANS, Batch, CloudGrowth, Feed, Placing, growing
-from scanwright.firmware_io.scan.scan_summary import BETWEEN_STOPS, ScanSummary
+from scanwright.firmware_io.scan.scan_end import BETWEEN_STOPS, ScanSummary
 from scanwright.live import cloud_view, scan_page
 from scanwright.live.cloud_view import CloudView
 from scanwright.live.ruler import Ruler, nearest_to_ray

@@ -73,7 +73,7 @@ def test_blind_spots_are_named_and_no_ratio_is_stated_without_one(built):
 def test_a_region_that_the_robot_hides_leads(built, share, headline):
     severity = "warning" if share > 0.5 else "note"
     hidden = Finding("hidden_region", severity, "weight.0", "the robot hides most of it", share, 0.5, "1", "move it")
-    sees = cards(ANGLES, replace(built, cloud=replace(built.cloud, hidden=(hidden,))), None)[0]
+    sees = cards(ANGLES, replace(built, cloud=replace(built.cloud, hidden_regions=(hidden,))), None)[0]
     assert sees.headline == headline
     assert ("The robot hides most of it." in sees.text) == (share < 0.5)
     height = replace(hidden, code="deck_height", severity="warning", message="the optical centre is high")

@@ -234,7 +234,7 @@ def test_the_page_is_open_to_everybody(browser, folder, size, scheme):
 def test_the_first_screen_answers_in_at_most_200_words(browser, folder):
     page = browser.open((folder / "report.html").as_uri(), 1440, 900)
     seen = page.evaluate(
-        """[...document.querySelectorAll("body *:not(script, style, option, .hear)")].filter((e) => {
+        """[...document.querySelectorAll("body *:not(script, style, option, .visually-hidden)")].filter((e) => {
             const { top, height } = e.getBoundingClientRect();
             return height > 0 && top < innerHeight;
         }).flatMap((e) => [...e.childNodes].filter((n) => n.nodeType === 3).map((n) => n.textContent)).join(" ")"""

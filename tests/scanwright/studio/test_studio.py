@@ -162,7 +162,7 @@ def test_what_was_asked_for_is_ticked_and_ratios_are_against_the_best_usual_moun
     limits = Limits(min_density=3, max_line_gap_deg=0.01, max_blind_cone_deg=90)
     judge = Judge.for_task(replace(loaded, task=loaded.task.model_copy(update={"limits": limits})))
     facts = judge.exact(SETTING)
-    asked = {words: (met, value) for words, met, value in facts.asked()}
+    asked = {words: (met, value) for words, met, value in facts.requirements()}
     assert asked["no blind spot"][0] == (facts.blind_weight < 1e-6)
     assert asked["at least 3 beams per ball"] == (facts.least >= 3, str(facts.least))
     assert asked["scan lines at most 0.01 deg apart"] == (False, f"{facts.gap_deg:.3f} deg")

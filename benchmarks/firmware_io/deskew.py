@@ -1,11 +1,8 @@
-"""De-skew: transformation of each beam with the frames at its time.
+"""Plain reference of the de-skew, in NumPy and float64, a scan at a time: `place` for tests and benchmarks.
 
 A beam of time t, range r and bearing b is at
 
     p_map = T_map_world(t) @ T_world_laser(joint(t + lag)) @ [r cos b, r sin b, 0, 1]
-
-`place` computes this in NumPy, in float64, one scan at a time; `deskew_kernel` is the same for clouds, compiled, many
-scans at a time.
 """
 
 from __future__ import annotations

@@ -1,26 +1,33 @@
 """Regret against run time of the choices of the search: grid, nodes of the coarse J, margin, rounds of refinement.
 
+    uv run python -m benchmarks.trials.search_effort [TASK]
+
 The scanner of a task is optimised for other regions, drawn at random. The regret of a search is the difference of its
-J from the lowest J of all searches. One choice is varied at a time.
+J from the lowest J of all searches. One choice is varied at a time. Table and picture are written to
+`out/accuracy/<task>/`.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scanwright.design.accuracy.trials import Trial
-from scanwright.design.motion import Sweep
+from scanwright.cli.console import ConsoleProgress
+from scanwright.design.accuracy.trials import Trial, report_trials
+from scanwright.design.motion import Shortest, Sweep
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.progress import Progress
 from scanwright.design.search.coarse import MARGIN, USUAL, Effort
+from scanwright.design.search.optimum import find_optimum
 from scanwright.design.search.search import search
 from scanwright.design.task.angle_ranges import AngleRanges
 from scanwright.design.task.shapes import BandRegion, ConeRegion, Region
-from scanwright.design.task.task import LoadedTask
+from scanwright.design.task.task import LoadedTask, load_task
 
 TASKS = 5  # drawn at random
 SEED = 1
@@ -110,3 +117,18 @@ def _elsewhere(loaded: LoadedTask, rng: np.random.Generator) -> LoadedTask:
     plain = {"weight": tuple(regions), "mask": (), "scene": None, "limits": type(loaded.task.limits)()}
     task = loaded.task.model_copy(update={"density": density, **plain})
     return replace(loaded, task=task, maps=(), surface=None)
+
+
+def main(words: list[str] | None = None) -> None:
+    """Measure all choices and print them."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.trials.search_effort")
+    parser.add_argument("task", nargs="?", type=Path, default=Path("ground_ahead"))
+    parser.add_argument("--out", type=Path, default=Path("out/accuracy"))
+    asked = parser.parse_args(words)
+    loaded, progress = load_task(asked.task), ConsoleProgress()
+    fixed = find_optimum(loaded, progress).loaded if isinstance(loaded.task.motion, Shortest) else loaded
+    print(*report_trials(list(search_trials(fixed, progress)), asked.out / loaded.task.name, "search"), sep="\n")
+
+
+if __name__ == "__main__":
+    main()

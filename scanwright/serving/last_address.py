@@ -13,7 +13,7 @@ def state_file() -> Path:
     return Path(folder) / "scanwright" / "studio.json"
 
 
-def recalled() -> tuple[int, str] | None:
+def saved_address() -> tuple[int, str] | None:
     """Return port and token; None if there are none, or if others could have read or written them."""
     path = state_file()
     try:
@@ -26,7 +26,7 @@ def recalled() -> tuple[int, str] | None:
     return (port, token) if 0 < port < 65536 and len(token) >= 32 else None
 
 
-def remember(port: int, token: str) -> None:
+def save_address(port: int, token: str) -> None:
     """Write port and token, readable by this user only; do nothing if the folder cannot be written."""
     path = state_file()
     try:

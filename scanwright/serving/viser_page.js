@@ -51,7 +51,7 @@
     true,
   );
 
-  const mend = () => {
+  const update = () => {
     const root = document.getElementById("root");
     if (!root) return;
     set(root, "role", "main");
@@ -72,5 +72,5 @@
       }
   };
 
-  new MutationObserver(mend).observe(document, { childList: true, subtree: true });
+  new MutationObserver(update).observe(document, { childList: true, subtree: true });
 })();
