@@ -19,6 +19,7 @@ if sys.dont_write_bytecode:  # out of the checkout, then: else every worker and 
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.pop("COLUMNS", None)  # results would be wrapped, also in files
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers and what they start share the cores: threads would wait
 
 sys.path.insert(0, str(Path(__file__).parent / "house" / "virtual"))
 sys.path.insert(0, str(Path(__file__).parent / "house"))
@@ -30,8 +31,8 @@ from made_once import MadeOnce
 checked_arrays.install()
 
 # CI judges the change, not the dice; at a developer's desk every run draws new examples. Cores are shared everywhere.
-settings.register_profile("ci", derandomize=True, deadline=None)
-settings.register_profile("desk", deadline=None)
+settings.register_profile("ci", derandomize=True, deadline=None, max_examples=40)
+settings.register_profile("desk", deadline=None, max_examples=40)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
 
 # what a shell starts in the background ignores Ctrl-C, and so would every process that a test starts and ends with it
@@ -45,6 +46,9 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    if config.getoption("--every-sample"):
+        settings.register_profile("every sample", settings(), max_examples=100)
+        settings.load_profile("every sample")
     if config.getoption("--measure-slow"):
         config.pluginmanager.register(quick_tests.Stopwatch(hasattr(config, "workerinput")))
 
@@ -168,6 +172,7 @@ CHROMIUM = [
     "--no-sandbox",  # it refuses to run as root otherwise
     "--use-angle=swiftshader",  # WebGL 2 without a graphics card
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-rasterization",  # text and panels cost a third as much without that card's stand-in
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ]
 NOT_OURS = (  # the page server's own drawing library says so

@@ -33,8 +33,9 @@ from scanwright.design.objective.ball_search import SETS
 from scanwright.design.objective.named_objectives import homogeneity, log_density
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.objective.score import score
+from scanwright.design.progress import no_progress
 from scanwright.design.search.mounts.reference import reference_mounts
-from scanwright.design.search.search import search
+from scanwright.design.search.optimum import find_optimum
 from scanwright.design.sphere.directions import sample_set, spiral
 from scanwright.design.task.task import load_task
 from scanwright.pipeline.folder import report_folder
@@ -48,11 +49,15 @@ def multibeam(name):
 
 
 @pytest.fixture(scope="module")
-def ceiling():
-    """The task, its numbers and its search: the shipped task with the fewest settings."""
-    loaded = load_task(Path("ceiling"))
-    problem = problem_of(loaded)
-    return loaded, problem, search(problem, loaded.task.angles)
+def optimum():
+    """Of the shipped task with the fewest settings."""
+    return find_optimum(load_task(Path("ceiling")), no_progress)
+
+
+@pytest.fixture(scope="module")
+def ceiling(optimum):
+    """The task, its numbers and its search."""
+    return optimum.loaded, optimum.problem, optimum.search
 
 
 @pytest.fixture(scope="module")
@@ -259,7 +264,8 @@ def test_the_command_end_to_end(command, tmp_path, rows):
     ]
 
 
-def test_the_command_as_json(command, tmp_path, rows, monkeypatch):
+def test_the_command_as_json(command, tmp_path, rows, optimum, monkeypatch):
+    monkeypatch.setattr("scanwright.pipeline.comparison.find_optimum", lambda *_: optimum)
     monkeypatch.setattr("scanwright.pipeline.comparison.compare", lambda *_: rows)
     monkeypatch.setattr("scanwright.pipeline.comparison.compare_picture", lambda *_: None)
     code, out, _ = command("compare", "ceiling", "--json", "--out", tmp_path)

@@ -144,14 +144,24 @@ def test_angles_that_the_task_fixes_stay_through_the_refinement():
     assert [(entry.what, entry.saved) for entry in told] == [("search over alpha_rot_deg, beta_laser_deg", 2)]
 
 
-def test_refinement_never_makes_it_worse(monkeypatch):
-    monkeypatch.setattr(families, "FAMILIES", 3)
-    problem, ranges = CASES["one angle fixed, one range short"]
-    refined = search(problem, ranges).best[0].score
-    monkeypatch.setattr(families, "MOST_RUNS", (0, 0, 0))
-    plain = search(problem, ranges).best[0].score
-    assert refined.J <= plain.J
-    assert refined.J < plain.J - 1e-3, "at 30 deg there is something to gain"
+def found_with(cores, case):
+    """A search with three families on so many cores."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(families, "FAMILIES", 3)
+        patch.setattr(parallel, "cores", lambda: cores)
+        return search(*case)
+
+
+@pytest.fixture(scope="module")
+def refined():
+    return found_with(1, CASES["one angle fixed, one range short"])
+
+
+@pytest.mark.usefixtures("unrefined")
+def test_refinement_never_makes_it_worse(refined):
+    best, plain = refined.best[0].score, search(*CASES["one angle fixed, one range short"]).best[0].score
+    assert best.J <= plain.J
+    assert best.J < plain.J - 1e-3, "at 30 deg there is something to gain"
 
 
 @pytest.mark.usefixtures("unrefined")
@@ -178,18 +188,11 @@ def test_all_is_covered_with_fewer_evaluations():
     assert saved["equivalent settings"] == found.covered - found.evaluated
 
 
-def test_the_number_of_threads_changes_no_digit(monkeypatch):
-    monkeypatch.setattr(families, "FAMILIES", 3)
-    problem, ranges = CASES["one angle fixed, one range short"]
-    one, other = (found_with(cores, problem, ranges, monkeypatch) for cores in (1, 3))
+def test_the_number_of_threads_changes_no_digit(refined):
+    one, other = refined, found_with(3, CASES["one angle fixed, one range short"])
     assert other.best == one.best and len(one.best) == 3
     np.testing.assert_array_equal(other.planes, one.planes)
     assert (other.covered, other.evaluated, other.left_out) == (one.covered, one.evaluated, one.left_out)
-
-
-def found_with(cores, problem, ranges, monkeypatch):
-    monkeypatch.setattr(parallel, "cores", lambda: cores)
-    return search(problem, ranges)
 
 
 def test_the_shipped_grid_is_as_large_as_told():

@@ -50,8 +50,8 @@ def settled(true_ns, seconds=10):
 
 # A ten-hertz sensor gives 100 packets in 10 s: its rate is known later.
 @pytest.mark.parametrize(("period_ms", "after_s"), [(25.05, 10), (100.2, 30)])
-def test_an_hour_with_packets_up_to_20_ms_late(period_ms, after_s):
-    true_ns, stamp_ms, arrival_ns = sensor(3600, period_ms)
+def test_twenty_minutes_with_packets_up_to_20_ms_late(period_ms, after_s):
+    true_ns, stamp_ms, arrival_ns = sensor(1200, period_ms)
     clock = DeviceClock(round(period_ms / 1e3, 2 if after_s > 10 else 3), smallest_delay_ns=DELAY_NS)
     error_ms, uncertainty_ms = errors_ms(clock, true_ns, stamp_ms, arrival_ns)
     late = settled(true_ns, after_s)
