@@ -191,13 +191,7 @@ class LidarMachine:
             return protocol.reply(request, "05")
         if once and not self.laser:
             return protocol.reply(request, "10")
-        window = measurement.Window(
-            first_step=int(first),
-            last_step=int(last),
-            cluster=max(int(cluster), 1),
-            characters=2 if letter == b"S" else 3,
-            intensity=letter == b"E",
-        )
+        window = measurement.Window.requested(letter, first, last, cluster)
         began = (now_ns - self._zero_ns) / self.period_ns
         if once:
             turn = math.floor(began - self.arc_ns / self.period_ns)

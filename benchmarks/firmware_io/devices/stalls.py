@@ -50,11 +50,12 @@ from scanwright.firmware_io.samples import Scan
 MODELS = ["LD06", "LD19", "STL27L", "LMS 200"]
 MODELS += [f"RPLIDAR {series}" for series in ("A1", "A2", "A3", "S1", "S2", "C1")]
 NOT_GATHERED = ["URG-04LX", "UTM-30LX", "TiM561"]  # USB devices of their own, and Ethernet
-MODELS += NOT_GATHERED
+MODELS += [*NOT_GATHERED, "RPLIDAR S3"]
 SOAKED = ("LD19", "RPLIDAR C1", "LMS 200", "URG-04LX", "TiM561")
 BUFFER_BYTES = (4095, 69_631)
 LATENCY_MS = dict(zip(BUFFER_BYTES, (1, 16), strict=True))
-ROUNDED_MS = {model: 0.8 if " A" in model else 0.1 for model in MODELS}  # of a range: 8 mm of ultra capsules, or 1 mm
+ROUNDED_MS = {model: 0.8 if " A" in model else 0.2 if " S3" in model else 0.1 for model in MODELS}
+"""Rounding of a range: 8 mm of ultra capsules, 1.5 of ultra-dense ones, or 1."""
 
 _TIMED = (sensor_line, dialogue, ldrobot, lms2xx, scip_dialogue, scip, cola, sick)
 _M_S = 10.0  # by which the range grows

@@ -294,7 +294,7 @@ class SickMachine:
             return _refused(request, _ACCESS_DENIED)
         if name == "Run":  # ends the login
             self._level = 0
-            return out.number("u8", 1).telegram()
+            return out.number("u8", not self.lidar.name.startswith("LMS5")).telegram()  # manual 8013796/ZM63, p. 34
         self.measuring = name == "LMCstartmeas"
         return out.number("u8", 0).telegram()
 

@@ -29,6 +29,17 @@ class Window:
         if self.characters not in (2, 3) or (self.intensity and self.characters == 2):
             raise ProtocolError(f"{self.characters} characters per value: 3, or 2 without intensity")
 
+    @classmethod
+    def requested(cls, letter: bytes, first: bytes, last: bytes, cluster: bytes) -> Window:
+        """Return the window of a request: second letter of its command, and its numbers."""
+        return cls(
+            first_step=int(first),
+            last_step=int(last),
+            cluster=max(int(cluster), 1),
+            characters=2 if letter == b"S" else 3,
+            intensity=letter == b"E",
+        )
+
     @property
     def size(self) -> int:
         """Number of ranges."""
@@ -81,13 +92,7 @@ def measurement(reply: Reply) -> Measurement:
     if match is None or not is_scan(reply):
         raise ProtocolError(f"{reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
     _, letter, first, last, cluster, _, remaining = match.groups()
-    window = Window(
-        first_step=int(first),
-        last_step=int(last),
-        cluster=max(int(cluster), 1),
-        characters=2 if letter == b"S" else 3,
-        intensity=letter == b"E",
-    )
+    window = Window.requested(letter, first, last, cluster)
     stamp, *data = reply.lines or (b"",)
     if len(stamp) != 4 or any(len(line) != LINE_CHARACTERS for line in data[:-1]):
         raise ProtocolError(f"{reply.echo.decode()}: a line was cut")

@@ -1,4 +1,4 @@
-"""SICK TiM5xx, TiM7xx or LMS1xx over TCP in CoLa A or B. Not tested on a sensor."""
+"""SICK TiM5xx, TiM7xx, LMS1xx or LMS5xx over TCP in CoLa A or B. Not tested on a sensor."""
 
 from __future__ import annotations
 
@@ -100,8 +100,9 @@ class SickLidar(LineDriver):
         self._dialogue.ask(content.number("u16", skip + 1))
         self._measuring = True
         self._dialogue.insist(self._dialogue.writer("sMN LMCstartmeas"), 0)
+        # An LMS5xx gets ready after this request, and replies 0 (8013796/ZM63, p. 34); the others reply 1.
+        self._dialogue.ask(self._dialogue.writer("sMN Run"))
         self._wait_until_ready(min(_READY_S, max(self._until_s - time.monotonic(), 0.0)))
-        self._dialogue.insist(self._dialogue.writer("sMN Run"), 1)
         self._reset()
         self._dialogue.ask(self._dialogue.writer("sEN LMDscandata").number("u8", 1))
         self._every = skip + 1
