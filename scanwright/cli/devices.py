@@ -269,7 +269,8 @@ def ros2(
         )
     viewer = _viewer(out, foxglove=foxglove, allow_origins=allow_origin)
     from scanwright.cli.results.of_commands import Published
-    from scanwright.firmware_io.ros.serve import Publishing, serve_devices, serve_recording
+    from scanwright.firmware_io.ros.node import Publishing
+    from scanwright.firmware_io.ros.serve import serve_devices, serve_recording
     from scanwright.firmware_io.scan.plan import plan_scan
 
     node_arguments = ros_args or []

@@ -16,7 +16,6 @@ from mcap.writer import MCAP0_MAGIC
 from scanwright.firmware_io.recording.repair.salvage import (
     RECORD_HEAD,
     IntactChunk,
-    between_magics,
     chunk_at,
     fits,
     index_at_the_end,
@@ -121,7 +120,8 @@ class Survey:
             self.summary.lost_bytes += sum(end - at for at, end in self._loose)
             self._loose.clear()
         self._repaired["the index at the end"] += not index
-        self._repaired["the first or last bytes"] += not between_magics(data)
+        ends = data[: len(MCAP0_MAGIC)].tobytes(), data[-len(MCAP0_MAGIC) :].tobytes()
+        self._repaired["the first or last bytes"] += ends != (MCAP0_MAGIC, MCAP0_MAGIC)
         self._repaired["the end of the data"] += bool(index) and not self._closed
         self._repaired["the header"] += self.header is None
         self.summary.repaired = +self._repaired
