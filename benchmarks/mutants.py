@@ -34,7 +34,7 @@ MODULES = {
     "beams": ("design/density/beams.py", "tests/design/density/test_beams.py tests/design/objective/test_holes.py"),
     "score": ("design/objective/score.py", "tests/design/objective"),
     "families": ("design/search/families.py", "tests/design/search"),
-    "deskew": ("benchmarks/firmware_io/deskew.py", "tests/firmware_io/assembly"),
+    "deskew": ("benchmarks/firmware_io/recordings/deskew.py", "tests/firmware_io/assembly"),
     "encoder": ("firmware_io/assembly/axis_curve.py", "tests/firmware_io/assembly/test_axis_curve.py"),
     "clock": ("firmware_io/lidar/device_clock.py", "tests/firmware_io/lidar/test_device_clock.py"),
     "registers": (

@@ -31,7 +31,7 @@ import numpy as np
 from kiss_icp.preprocess import Preprocessor
 from mcap_ros2.reader import read_ros2_messages
 
-from benchmarks.firmware_io.deskew import place
+from benchmarks.firmware_io.recordings.deskew import place
 from benchmarks.trials.axis import interpolations
 from scanwright.design.angles import Angles, AngleSet, load_angles
 from scanwright.design.arrays import Floats

@@ -69,15 +69,14 @@ def witness(
     range_m, scans = float(np.average(few.range_m, weights=weight)), Scans.of(beams)
     width_m = max(3 * noise_m, 0.03, _SPACINGS * range_m * max(scans.gap_rad, scans.step_rad))
 
-    def crispness(x: Floats) -> _Crispness:
+    def sharpness(x: Floats) -> tuple[float, Floats]:
         late = few.under(x)
         origin, direction = beam_rays(mount, x, late)
         return _between(origin + (late.range_m + x[4])[:, None] * direction, weight, first, width_m)
 
-    before, after = crispness(start), crispness(estimated)
-    around = {PARAMETERS[k].name: _minimum(lambda x: crispness(x).entropy, estimated, k, after.entropy) for k in MOUNT}
-    spread = (after.share - before.share) * after.weight
-    return Witness(width_m, before.entropy, after.entropy, float(np.linalg.norm(spread)), around)
+    (before, part_before), (after, part_after) = sharpness(start), sharpness(estimated)
+    around = {PARAMETERS[k].name: _minimum(lambda x: sharpness(x)[0], estimated, k, after) for k in MOUNT}
+    return Witness(width_m, before, after, float(np.linalg.norm(part_after - part_before)), around)
 
 
 def _areas(mount: Mount, x: Floats, beams: ReturnedBeams) -> Float64[ndarray, " beams"]:
@@ -97,18 +96,10 @@ def _minimum(entropy: Callable[[Floats], float], x: Floats, k: int, here: float)
     return 0.5 * step * (low - high) / bend if min(low, high) > here else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Crispness:
-    """Entropy, with the contribution of each point, shape (n,)."""
-
-    entropy: float
-    weight: Floats  # among the points of its side
-    share: Floats  # of the sum; 1 if all were equal
-
-
 def _between(
     point: Float64[ndarray, "n 3"], weight: Float64[ndarray, " n"], first: Bool[ndarray, " n"], width_m: float
-) -> _Crispness:
+) -> tuple[float, Floats]:
+    """Return the entropy, and the part of each point in its sum, relative to that sum, shape (n,)."""
     weight = weight / np.where(first, weight[first].sum(), weight[~first].sum())
     trees = [cKDTree(point[half]) for half in (first, ~first)]
     pairs = trees[0].sparse_distance_matrix(trees[1], _REACH * width_m, output_type="ndarray")
@@ -118,4 +109,4 @@ def _between(
     share[first] = np.bincount(i, near * weight[~first][j], trees[0].n)
     share[~first] = np.bincount(j, near * weight[first][i], trees[1].n)
     total = max(float(share[first] @ weight[first]), 1e-300)
-    return _Crispness(-float(np.log(total)), weight, share / total)
+    return -float(np.log(total)), weight * share / total

@@ -81,24 +81,24 @@ def estimate(beams: ReturnedBeams, mount: Mount, start: Float64[ndarray, " param
         fixed = np.setdiff1d(np.arange(COUNT), choice.free)
         x[fixed] = start[fixed]
         grouping = group(tiles, mount, x, last_m, *np.radians([_LAST_DEG, _LAST_VAGUE_DEG]))
-        near = _refined(tiles, mount, x, choice.free, grouping, grouping.surface[tiles.tile] >= 0)
-        clear = clear_of_edges(mount, near.x, tiles, near.grouping, near.bulge_m)
-        last = _refined(tiles, mount, near.x, choice.free, near.grouping, clear)
-        x, grouping, normal = last.x, last.grouping, last.normal
-    part = reduced(normal, grouping, choice.free, last.bulge_m)
-    scale = float(np.average(misfits(normal, last.count)[grouping.used], weights=last.count[grouping.used]))
+        on_surface = grouping.surface[tiles.tile] >= 0
+        x, grouping, _, _, bulge = _refined(tiles, mount, x, choice.free, grouping, on_surface)
+        clear = clear_of_edges(mount, x, tiles, grouping, bulge)
+        x, grouping, normal, count, bulge = _refined(tiles, mount, x, choice.free, grouping, clear)
+    part = reduced(normal, grouping, choice.free, bulge)
+    scale = float(np.average(misfits(normal, count)[grouping.used], weights=count[grouping.used]))
     return Estimate(
         x=x,
         choice=choice,
         covariance=scale * covariance(part)
-        + _of_fixed_backlash(normal, grouping, choice.free, last.bulge_m, mount.backlash_rad),
+        + _of_fixed_backlash(normal, grouping, choice.free, bulge, mount.backlash_rad),
         spectrum=spectrum(part, choice.free),
         tiles=tiles,
         grouping=grouping,
         clear=clear,
         noise_m=tiles.noise_m * float(np.sqrt(scale)),
-        bulge_m=last.bulge_m,
-        drifts=drifts(mount, x, tiles, grouping, normal, choice.free, last.bulge_m, scale),
+        bulge_m=bulge,
+        drifts=drifts(mount, x, tiles, grouping, normal, choice.free, bulge, scale),
     )
 
 
@@ -110,21 +110,14 @@ def _of_fixed_backlash(normal: Floats, grouping: Grouping, free: Ints, bulge: fl
     return np.outer(moved, moved)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Refined:
-    """Solution with some of the beams."""
-
-    x: Float64[ndarray, " parameters"]
-    grouping: Grouping
-    normal: Floats
-    count: Ints  # beams of each tile
-    bulge_m: float
-
-
 def _refined(
     tiles: FlatTiles, mount: Mount, x: Floats, free: Ints, grouping: Grouping, which: NDArray[np.bool_]
-) -> _Refined:
-    """Solve with some beams of the tiles; drop tiles without beams, and those that do not fit."""
+) -> tuple[Floats, Grouping, Floats, Ints, float]:
+    """Solve with some beams of the tiles; drop tiles without beams, and those that do not fit.
+
+    Returns:
+        Parameters, grouping, sums, the number of beams of each tile, and the unevenness of the walls [m].
+    """
     own, tile = tiles.beams.select(which), tiles.tile[which]
     weight = 1 / tiles.variance_m2[tile]
     count = np.bincount(tile, minlength=tiles.count.size)
@@ -134,7 +127,7 @@ def _refined(
         x, grouping, normal = _iterated(mount, x, free, grouping, own, tile, weight, bulge)
         grouping = without_misfits(grouping, misfits(normal, count), count)
         bulge = bulge_m(normal, grouping)
-    return _Refined(x, grouping, normal, count, bulge)
+    return x, grouping, normal, count, bulge
 
 
 def _coarse(

@@ -38,7 +38,7 @@ _LONGEST_HEADER = 1 << 16  # bytes: hundreds of fields
 _DIGITS = 16  # of a count
 _MOST_PACKED = 100  # above the compression ratio of LZF, 264 bytes in 3
 _KINDS = {"<f4", "<f8", *(f"<{kind}{size}" for kind in "iu" for size in (1, 2, 4, 8))}
-_PADDING = "_"  # name of fields without a meaning
+_PADDING = "_ "  # begin of the names of columns without a meaning; those of fields have no spaces
 _AT_ORIGIN = ("0", "0", "0", "1", "0", "0", "0")
 
 
@@ -62,11 +62,7 @@ def parts(path: Path, rows: int) -> Parts | None:
 
 
 def _cloud(rows: NDArray[np.void], header: PcdHeader, shape: tuple[int, int]) -> Cloud:
-    fields = [field for field in header.fields if field.name != _PADDING]
-    named = np.empty(rows.size, [(name, kind) for field in fields for name, kind in field.columns()])
-    for field in fields:
-        for k, (name, _) in enumerate(field.columns()):
-            named[name] = rows[field.key].reshape(rows.size, -1)[:, k]
+    named = rows[[name for name, _ in header.columns if not name.startswith(_PADDING)]]
     cloud = cloud_from_rows(_unpacked(named), header.comments)
     return Cloud(cloud.points_m, cloud.columns, shape, header.T_world_cloud, cloud.start_ns)
 
@@ -86,26 +82,12 @@ def _chunks(path: Path, header: PcdHeader, rows: int) -> Iterator[NDArray[np.voi
             place += len(lines)
 
 
-@dataclass(frozen=True, slots=True)
-class PcdField:
-    """A field of a header: `count` numbers of one type, `key` unlike that of any other field."""
-
-    name: str
-    key: str
-    kind: str
-    count: int
-
-    def columns(self) -> list[tuple[str, str]]:
-        """Return names and types of its columns: `fpfh_0`, `fpfh_1` and so on of several numbers."""
-        names = [self.name] if self.count == 1 else [f"{self.name}_{k}" for k in range(self.count)]
-        return [(name, self.kind) for name in names]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PcdHeader:
     """The header of a cloud, checked against the file."""
 
-    fields: tuple[PcdField, ...]  # of a row, padding included
+    columns: tuple[tuple[str, str], ...]  # unique name and type of each number of a row, padding included
+    counts: tuple[int, ...]  # numbers in each field: `fpfh_0`, `fpfh_1` and so on of several
     shape: tuple[int, int]  # HEIGHT and WIDTH
     encoding: str  # ascii, binary or binary_compressed
     start: int  # byte after the header
@@ -120,7 +102,7 @@ class PcdHeader:
     @property
     def layout(self) -> np.dtype[np.void]:
         """Type of a row."""
-        return np.dtype([(field.key, field.kind, (field.count,)) for field in self.fields])
+        return np.dtype(list(self.columns))
 
 
 def _header(path: Path) -> PcdHeader:
@@ -140,15 +122,19 @@ def _header(path: Path) -> PcdHeader:
         if len(entries.get(key, [])) != len(names):
             entry = " ".join(entries.get(key, []))[:80]
             raise RecordingError(f"{path}: {key} {entry}: must be one for each of {len(names)} fields")
-    fields = []
-    for k, name in enumerate(names):
+    columns: list[tuple[str, str]] = []
+    counts = tuple(_integer(path, entries, "COUNT", k) for k in range(len(names)))
+    if sum(counts) > size:
+        raise RecordingError(f"{path}: COUNT {max(counts)}: more than the bytes of the file")
+    for k, (name, count) in enumerate(zip(names, counts, strict=True)):
         kind = f"<{entries['TYPE'][k].lower()}{entries['SIZE'][k]}"
         if kind not in _KINDS:
             raise RecordingError(
                 f"{path}: field {name}: TYPE {entries['TYPE'][k]} of SIZE {entries['SIZE'][k]}: unknown"
             )
-        fields.append(PcdField(name, f"{k}", kind, _integer(path, entries, "COUNT", k)))
-    used = [field.name for field in fields if field.name != _PADDING]
+        name = f"{_PADDING}{k}" if name == "_" else name
+        columns += [(name, kind)] if count == 1 else [(f"{name}_{i}", kind) for i in range(count)]
+    used = [name for name, _ in columns if not name.startswith(_PADDING)]
     if len(set(used)) != len(used) or not {*"xyz"} <= set(used):
         raise RecordingError(f"{path}: the fields are {' '.join(used)[:200]}; a cloud has x y z, each field once")
     if "WIDTH" in entries:
@@ -163,10 +149,10 @@ def _header(path: Path) -> PcdHeader:
     x, y, z, w, *axis = viewpoint
     comments = tuple(line[1:].strip() for line in lines if line.startswith("#"))
     T = pose_matrix([x, y, z, *axis, w])
-    header = PcdHeader(tuple(fields), (height, width), end[1].decode(), end.end(), T, comments)
-    if max(field.count for field in fields) > size:
-        raise RecordingError(f"{path}: COUNT {max(field.count for field in fields)}: more than the bytes of the file")
-    least = 2 * sum(field.count for field in fields) if header.encoding == "ascii" else header.layout.itemsize
+    header = PcdHeader(
+        tuple(columns), tuple(filter(None, counts)), (height, width), end[1].decode(), end.end(), T, comments
+    )
+    least = 2 * len(columns) if header.encoding == "ascii" else header.layout.itemsize
     room = (size - header.start) * (_MOST_PACKED if header.encoding == "binary_compressed" else 1)
     if not 0 < rows == header.rows or rows * least > room + (header.encoding == "ascii"):
         raise RecordingError(
@@ -179,25 +165,25 @@ def _header(path: Path) -> PcdHeader:
 def _from_text(path: Path, lines: Sequence[str], place: int, count: int, header: PcdHeader) -> NDArray[np.void]:
     """Read rows of an ascii cloud; `place` is the number of the first line."""
     values = read_numbers(path, lines, place)
-    if values.shape != (count, sum(field.count for field in header.fields)):
+    if values.shape != (count, len(header.columns)):
         raise RecordingError(f"{path}: {values.shape[0]} rows of {values.shape[1]} numbers, {count} announced")
-    rows, begin = np.empty(count, header.layout), 0
-    for field in header.fields:
-        part = values[:, begin : begin + field.count]
-        if field.name != _PADDING:
+    rows = np.empty(count, header.layout)
+    for (name, kind), column in zip(header.columns, values.T, strict=True):
+        if not name.startswith(_PADDING):
             with of_file(path):
-                rows[field.key] = as_type(part.ravel(), field.kind).reshape(part.shape)
-        begin += field.count
+                rows[name] = as_type(column, kind)
     return rows
 
 
 def _from_columns(path: Path, body: bytes, header: PcdHeader) -> NDArray[np.void]:
     if len(body) < header.rows * header.layout.itemsize:
         raise RecordingError(f"{path}: {len(body)} bytes unpacked, {header.rows} rows announced")
-    rows, begin = np.empty(header.rows, header.layout), 0
-    for field in header.fields:  # field by field
-        values = np.frombuffer(body, field.kind, header.rows * field.count, begin)
-        rows[field.key] = values.reshape(header.rows, field.count)
+    rows, columns, begin = np.empty(header.rows, header.layout), iter(header.columns), 0
+    for count in header.counts:  # field by field
+        names, kinds = zip(*islice(columns, count), strict=True)
+        values = np.frombuffer(body, kinds[0], header.rows * count, begin)
+        for name, column in zip(names, values.reshape(-1, count).T, strict=True):
+            rows[name] = column
         begin += values.nbytes
     return rows
 

@@ -15,12 +15,10 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from jaxtyping import Float64
-from numpy import ndarray
 from numpy.typing import NDArray
 
 from scanwright.design.errors import RecordingError
-from scanwright.design.files.atomic_file import atomic_write, check_place
+from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
 from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
 from scanwright.firmware_io.clouds.text import read_numbers
@@ -85,19 +83,6 @@ class PlyRows:
             "end_header",
         ]
         return ("\n".join(lines) + "\n").encode("ascii", "replace")
-
-
-def write_points(path: Path, points_m: Float64[ndarray, "n 3"], comments: Iterable[str] = ()) -> None:
-    """Write points (n, 3) as a cloud of x y z."""
-    check_place(path, RecordingError)
-    if path.suffix != ".ply":
-        raise RecordingError(f"{path}: clouds are written as PLY; name it {path.with_suffix('.ply').name}")
-    fields = np.dtype([(axis, "<f4") for axis in "xyz"])
-    rows = np.empty(len(points_m), fields)
-    for column, axis in enumerate("xyz"):
-        rows[axis] = points_m[:, column]
-    with ply_writer(path, fields, comments) as cloud:
-        cloud.write(rows)
 
 
 @dataclass(frozen=True, slots=True)

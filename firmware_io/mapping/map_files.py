@@ -1,7 +1,8 @@
-"""`scanwright map`: clouds become an occupancy grid. Unusable input raises RecordingError."""
+"""`scanwright map`: clouds become an occupancy grid, in files of a ROS map_server. Errors raise RecordingError."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +13,15 @@ from scanwright.design import frames
 from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Vector
 from scanwright.design.errors import RecordingError
+from scanwright.design.files.atomic_file import atomic_write, check_place
 from scanwright.design.progress import Progress, no_progress
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import read_clouds
 from scanwright.firmware_io.mapping.floor import find_floor
-from scanwright.firmware_io.mapping.map_server import check_map_place, write_map
 from scanwright.firmware_io.mapping.occupancy import (
     FREE,
     OCCUPIED,
+    UNKNOWN,
     Heights,
     OccupancyGrid,
     check_resolution,
@@ -28,6 +30,9 @@ from scanwright.firmware_io.mapping.occupancy import (
 from scanwright.firmware_io.mapping.seen_through import Stand, seen_through
 from scanwright.firmware_io.registration.poses import cloud_names, read_poses
 
+_SHADES = {UNKNOWN: 205, FREE: 254, OCCUPIED: 0}
+# 205 means 0.19608, above the lower threshold: unknown. With Nav2's default, 0.25, it would be free.
+_THRESHOLDS = {"occupied_thresh": 0.65, "free_thresh": 0.196}
 _COUNT = "count"  # of points in a voxel, as written by `merge` of the registration
 
 
@@ -79,7 +84,7 @@ def map_files(
     progress: Progress = no_progress,
 ) -> MapSummary:
     """Read clouds, find the floor, write the map; the arguments are those of `scanwright.make_map`."""
-    check_map_place(out)
+    _check_place(out)
     check_resolution(resolution_m)
     Heights(0.0 if floor_m is None else floor_m, from_m, to_m)
     positions, notes = _positions(paths, scanner, poses, progress)
@@ -142,3 +147,41 @@ def _about_eyes(positions: Sequence[Stand]) -> list[str]:
     subject = "the cloud" if len(positions) == 1 else f"{unknown} of {len(positions)} clouds"
     free = "no cell is free" if unknown == len(positions) else "these free no cell"
     return [f"unknown scanner position of {subject}, so {free}: pass the angle set (`angles`) or `poses`"]
+
+
+def _check_place(path: Path) -> None:
+    """Raise RecordingError if a map cannot be written."""
+    check_place(path, RecordingError)
+    if path.suffix not in (".yaml", ".yml"):
+        raise RecordingError(
+            f"{path}: a map_server reads {path.with_suffix('.yaml').name}, with a .pgm in the same folder"
+        )
+    check_place(path.with_suffix(".pgm"), RecordingError)
+
+
+def write_map(path: Path, grid: OccupancyGrid) -> tuple[Path, Path]:
+    """Write a map, and return its files: YAML and image.
+
+    The first row of the image has the largest y; the origin is the lower left corner of the lower left pixel, its third
+    number the yaw.
+    """
+    _check_place(path)
+    image = path.with_suffix(".pgm")
+    rows, columns = grid.cells.shape
+    shades = np.zeros(256, np.uint8)
+    for value, shade in _SHADES.items():
+        shades[value] = shade  # index -1 is the last one
+    with atomic_write(image, RecordingError) as part:
+        part.write_bytes(f"P5\n{columns} {rows}\n255\n".encode() + shades[grid.cells[::-1]].tobytes())
+    x, y = (round(float(value), 6) for value in grid.origin_m)
+    lines = [
+        f"image: {json.dumps(image.name)}",  # a string of JSON is one of YAML
+        "mode: trinary",
+        f"resolution: {grid.resolution_m!r}",
+        f"origin: [{x!r}, {y!r}, 0.0]",
+        "negate: 0",
+        *(f"{name}: {value}" for name, value in _THRESHOLDS.items()),
+    ]
+    with atomic_write(path, RecordingError) as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path, image

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float64, Int64
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from scanwright.design.arrays import Vector
+from scanwright.design.arrays import Floats, Vector
 from scanwright.design.errors import RecordingError
 
 _BEAMS = 10  # fewer can be on one side of a point, or miss a thin object: benchmarks/firmware_io/mapping/
@@ -55,41 +55,26 @@ def seen_through(positions: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool
         )
     moved = [np.zeros(len(stand.points_m), bool) for stand in positions]
     for k in known:
-        view = _View(positions[k])
-        for other in known:
+        eye_m = positions[k].eye_m
+        along, range_m = _directions(positions[k].points_m, eye_m)
+        ends_m, tree = np.append(range_m, -np.inf), cKDTree(along)
+        sample = along[:: max(1, len(along) // _SAMPLE)]
+        reach = _REACH * float(np.median(tree.query(sample, _BEAMS + 1)[0][:, -1]))
+        for other in known if np.isfinite(reach) else ():  # infinite for a few points
             if other != k:
                 left = np.flatnonzero(~moved[other])
-                moved[other][left] = view.through(positions[other].points_m[left], beyond_m)
+                towards, point_m = _directions(positions[other].points_m[left], eye_m)
+                for here, off, beam in _nearest(tree, towards, _BEAMS, reach):
+                    behind = ends_m[beam].min(axis=1) > point_m[here] + beyond_m
+                    moved[other][left[here]] = np.isfinite(off).all(axis=1) & behind
     return [_as_neighbours(stand.points_m, mask) for stand, mask in zip(positions, moved, strict=True)]
 
 
-class _View:
-    """Range of one scan position in each direction."""
-
-    def __init__(self, stand: Stand) -> None:
-        self._eye_m = stand.eye_m
-        along, self._range_m = self._directions(stand.points_m)
-        self._tree = cKDTree(along)
-        sample = along[:: max(1, len(along) // _SAMPLE)]
-        self._reach = _REACH * float(np.median(self._tree.query(sample, _BEAMS + 1)[0][:, -1]))  # inf of a few points
-
-    def through(self, points_m: Float64[ndarray, "n 3"], beyond_m: float) -> Bool[ndarray, " n"]:
-        """Return the points behind which it saw, by more than `beyond_m`."""
-        marked = np.zeros(len(points_m), bool)
-        if not np.isfinite(self._reach):
-            return marked
-        along, range_m = self._directions(points_m)
-        for here, off, beam in _nearest(self._tree, along, _BEAMS, self._reach):
-            there = np.isfinite(off).all(axis=1)
-            ends_m = np.append(self._range_m, -np.inf)[beam].min(axis=1)
-            marked[here] = there & (ends_m > range_m[here] + beyond_m)
-        return marked
-
-    def _directions(self, points_m: Float64[ndarray, "n 3"]) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, " n"]]:
-        """Return unit vectors from the eye, and ranges; a point at the eye has a zero vector."""
-        along = points_m - self._eye_m
-        range_m = np.linalg.norm(along, axis=1)
-        return along / np.where(range_m > 0, range_m, 1.0)[:, None], range_m
+def _directions(points_m: Float64[ndarray, "n 3"], eye_m: Vector) -> tuple[Floats, Floats]:
+    """Return unit vectors from the eye, and ranges; a point at the eye has a zero vector."""
+    along = points_m - eye_m
+    range_m = np.linalg.norm(along, axis=1)
+    return along / np.where(range_m > 0, range_m, 1.0)[:, None], range_m
 
 
 def _as_neighbours(points_m: Float64[ndarray, "n 3"], moved: Bool[ndarray, " n"]) -> Bool[ndarray, " n"]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from scanwright.firmware_io.foreign import foreign
 from scanwright.firmware_io.poses.trajectory import Trajectory, trajectory_of
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.mcap_chunks import read_messages, read_topics
+from scanwright.firmware_io.recording.ros_messages import TRANSFORMS
 from scanwright.firmware_io.tables import Row, csv_rows, lines_of, row_of
 
 _COLUMNS = {
@@ -70,31 +71,20 @@ def _tum(path: Path) -> Iterator[Row]:
             yield row_of(path, number, words[0], 9, words[1:])
 
 
-def _of_tf(message: Any) -> Iterator[tuple[Any, str, Any, Any]]:
-    for transform in message.transforms:
-        yield from _of_transform(transform)
+_TRANSFORM = "geometry_msgs/msg/TransformStamped"
+_POSES = {TRANSFORMS, _TRANSFORM, "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"}
+"""Types of messages with poses."""
 
 
-def _of_transform(message: Any) -> Iterator[tuple[Any, str, Any, Any]]:
-    yield message.header, message.child_frame_id, message.transform.translation, message.transform.rotation
-
-
-def _of_odometry(message: Any) -> Iterator[tuple[Any, str, Any, Any]]:
-    pose = message.pose.pose
-    yield message.header, message.child_frame_id, pose.position, pose.orientation
-
-
-def _of_pose(message: Any) -> Iterator[tuple[Any, str, Any, Any]]:
-    yield message.header, "", message.pose.position, message.pose.orientation
-
-
-_POSES: dict[str, Callable[[Any], Iterator[tuple[Any, str, Any, Any]]]] = {
-    "tf2_msgs/msg/TFMessage": _of_tf,
-    "geometry_msgs/msg/TransformStamped": _of_transform,
-    "nav_msgs/msg/Odometry": _of_odometry,
-    "geometry_msgs/msg/PoseStamped": _of_pose,
-}
-"""Message type -> header, child frame, translation and rotation of each pose in a message."""
+def _poses_in(message: Any, kind: str) -> list[tuple[Any, str, Any, Any]]:
+    """Return header, child frame ("" if unknown), translation and rotation of each pose in a message."""
+    if kind == TRANSFORMS:
+        return [pose for transform in message.transforms for pose in _poses_in(transform, _TRANSFORM)]
+    child = getattr(message, "child_frame_id", "")
+    if kind == _TRANSFORM:
+        return [(message.header, child, message.transform.translation, message.transform.rotation)]
+    pose = getattr(message.pose, "pose", message.pose)  # an odometry's has a covariance around it
+    return [(message.header, child, pose.position, pose.orientation)]
 
 
 def _topic(
@@ -103,7 +93,7 @@ def _topic(
     """Yield the poses of a pair of frames; add all pairs of the topic to `seen`."""
     for _, data in read_messages(recording, {topic}):
         message = foreign(f"{recording}: a message of {topic}", ros_messages.decode_message, data, kind)
-        for header, child, p, q in _POSES[kind](message):
+        for header, child, p, q in _poses_in(message, kind):
             pair = (header.frame_id.lstrip("/"), child.lstrip("/"))
             seen.add(pair)
             if not frames and len(seen) > 1:

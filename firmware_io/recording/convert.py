@@ -14,12 +14,19 @@ from scanwright.firmware_io.recording.bag_export import export_bag
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """Result of a conversion."""
+    """Result of a conversion.
 
-    files: tuple[Path, ...]  # written files or folder
-    rows: int | None  # of the clouds; None for a recording
-    messages: dict[str, int] | None  # topic -> number; None for a cloud
-    notes: tuple[str, ...]  # data that the format cannot store, one sentence each
+    Attributes:
+        files: written files or folder.
+        rows: of the clouds; None for a recording.
+        messages: topic -> number; None for a cloud.
+        notes: data that the format cannot store, one sentence each.
+    """
+
+    files: tuple[Path, ...]
+    rows: int | None
+    messages: dict[str, int] | None
+    notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
         """Format the result."""

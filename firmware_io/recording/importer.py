@@ -154,12 +154,9 @@ def import_bag(
         findings += [_remark("angle_unit", doubt, hint) for doubt, hint in doubts]
         if not still:
             order = np.argsort(clock.angle_ns, kind="stable")
-            time_ns, angle_rad, dropped = (
-                clock.angle_ns[order],
-                survey.angle[order] * unit_rad,
-                corrections.drop_outliers,
-            )
-            findings += angle_findings(time_ns, angle_rad, dropped=dropped, timed=not clock.note)
+            angle_rad, timed = survey.angle[order] * unit_rad, not clock.note
+            dropped = corrections.drop_outliers
+            findings += angle_findings(clock.angle_ns[order], angle_rad, dropped=dropped, timed=timed)
         checked = headers.corrected(increment_s, corrections)
         findings += header_findings(checked, speed_rad_s)
         if not clock.note and corrections.stamp != "receipt":  # the times of the scans are their stamps

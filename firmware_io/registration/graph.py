@@ -97,7 +97,8 @@ def _least_squares(
         step[6:] = np.linalg.solve(H[6:, 6:], -g[6:])
         if np.abs(step).max(initial=0.0) < _SETTLED:
             break
-        poses = np.array([_moved(T, step[6 * k : 6 * k + 6]) for k, T in enumerate(poses)])
+        w, v = step.reshape(n, 2, 3).swapaxes(0, 1)
+        poses = poses @ frames.rigid(Rotation.from_rotvec(w).as_matrix(), v)
     spread = np.linalg.inv(H[6:, 6:])
     covariance = np.zeros((n, 6, 6))
     for k in range(1, n):
@@ -120,7 +121,3 @@ def _residual(
     J_j[:3, :3] = np.eye(3)
     J_j[3:, 3:] = turned
     return residual, J_i, J_j
-
-
-def _moved(T: Pose, step: Float64[ndarray, " 6"]) -> Pose:
-    return T @ frames.rigid(frames.rotvec_to_matrix(step[:3]), step[3:])

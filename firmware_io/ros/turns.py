@@ -29,16 +29,20 @@ class Turns:
         done = []
         joint_rad = float(line.joint_rad[0]) if line.joint_rad.size else math.nan
         if not math.isnan(joint_rad):
-            if back := self._turned_back(joint_rad):
+            if self._sense and (self._extreme_rad - joint_rad) * self._sense > BACK_RAD:
                 done.append(self._cut(self._extreme + 1, self._extreme_rad))
-                self._sense = -back
+                self._sense = -self._sense
             if math.isnan(self._begin_rad):
                 self._begin_rad = self._extreme_rad = joint_rad
             turn_rad, turned_rad = 2 * math.pi, abs(joint_rad - self._begin_rad)
             if turned_rad >= turn_rad:
                 turns = math.copysign(turn_rad * (turned_rad // turn_rad), joint_rad - self._begin_rad)
                 done.append(self._cut(len(self._lines), self._begin_rad + turns))
-            self._follow(joint_rad)
+            ahead_rad = joint_rad - self._extreme_rad
+            if not self._sense and abs(ahead_rad) > BACK_RAD:
+                self._sense = 1 if ahead_rad > 0 else -1
+            if self._sense and ahead_rad * self._sense >= 0:
+                self._extreme, self._extreme_rad = len(self._lines), joint_rad
         if self._lines and self._beams + line.scan.range_m.size > MOST_BEAMS:
             done.append(self._cut(len(self._lines), self._begin_rad))
         self._lines.append(line)
@@ -49,17 +53,6 @@ class Turns:
         """Return the incomplete turn."""
         turn = self._cut(len(self._lines), math.nan)
         return [turn] if turn else []
-
-    def _turned_back(self, joint_rad: float) -> int:
-        """Return the direction (1 or -1) before a reversal that this angle shows; 0 without one."""
-        return self._sense if self._sense and (self._extreme_rad - joint_rad) * self._sense > BACK_RAD else 0
-
-    def _follow(self, joint_rad: float) -> None:
-        ahead_rad = joint_rad - self._extreme_rad
-        if not self._sense and abs(ahead_rad) > BACK_RAD:
-            self._sense = 1 if ahead_rad > 0 else -1
-        if self._sense and ahead_rad * self._sense >= 0:
-            self._extreme, self._extreme_rad = len(self._lines), joint_rad
 
     def _cut(self, count: int, begin_rad: float) -> list[ScanPoints]:
         """Return the first `count` scans; the others begin a turn at an angle."""

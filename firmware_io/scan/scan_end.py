@@ -24,19 +24,33 @@ _HEADINGS: dict[Outcome, str] = {
 
 @dataclass(frozen=True, slots=True)
 class ScanSummary:
-    """Data of a scan."""
+    """Data of a scan.
+
+    Attributes:
+        recording: the file.
+        scans: number of scans in it.
+        joint_samples: number of servo angles in it.
+        duration_s: from the first to the last scan.
+        speed_deg_s: mean speed of the servo; 0 for a sweep.
+        ripple_deg: rms deviation from uniform rotation over half a second.
+        clock_ns: standard uncertainty of the beam times at the end.
+        reconnects: number of times that the lidar disconnected and came back.
+        left_out: dropped data, reason -> count.
+        lost_replies: missing or damaged replies of the servo.
+        longest_gap_s: longest time between two servo angles.
+    """
 
     recording: Path
     scans: int
     joint_samples: int
-    duration_s: float  # from the first to the last scan
-    speed_deg_s: float  # mean speed of the servo; 0 for a sweep
-    ripple_deg: float  # rms deviation from uniform rotation over half a second
-    clock_ns: int  # standard uncertainty of the beam times at the end
-    reconnects: int  # of the lidar
-    left_out: dict[str, int]  # dropped data, reason -> count
-    lost_replies: int = 0  # missing or damaged ones of the servo
-    longest_gap_s: float = 0.0  # between two servo angles
+    duration_s: float
+    speed_deg_s: float
+    ripple_deg: float
+    clock_ns: int
+    reconnects: int
+    left_out: dict[str, int]
+    lost_replies: int = 0
+    longest_gap_s: float = 0.0
 
     @property
     def lost_data(self) -> bool:

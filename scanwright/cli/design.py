@@ -83,10 +83,11 @@ def evaluate(
     )
     angles_deg = np.degrees(result.angles_rad).round(9).tolist()
     if cloud is not None:
-        from scanwright.firmware_io.clouds.ply import write_points
+        from scanwright.firmware_io.clouds.cloud import Cloud
+        from scanwright.firmware_io.clouds.formats import write_clouds
 
         beams = result.beam_directions()
-        write_points(cloud, beams, [f"task {loaded.task.name}, simulated beams on the unit sphere, frame world"])
+        write_clouds(cloud, [Cloud(beams.astype(np.float32))])
     if as_json:
         from scanwright.cli.results.angles import Evaluated
 

@@ -10,7 +10,7 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from scanwright.design.arrays import Floats, Ints, Times
-from scanwright.design.findings import Finding
+from scanwright.design.findings import Finding, Severity
 from scanwright.firmware_io.recording.import_checks.headers import AT_M
 from scanwright.firmware_io.samples import JointLog
 
@@ -93,7 +93,8 @@ def angle_findings(time_ns: Times, position_rad: Floats, *, dropped: bool, timed
         far_deg = math.degrees(off[wrong].max())
         text = f"{np.sum(wrong):,} angles ({share:.2%}) lie up to {far_deg:.3g} deg off both neighbours"
         cost = ": dropped" if dropped else f", {cost_mm:,.0f} mm at {AT_M:g} m"
-        severity, hint = ("note", "") if dropped else ("warning", "drop_outliers = true drops them")
+        hint = "" if dropped else "drop_outliers = true drops them"
+        severity: Severity = "note" if dropped else "warning"
         yield Finding("angle_outliers", severity, "angle", text + cost, float(share), hint=hint)
     if timed:
         yield from _jumps(time_ns, position_rad, wrong)

@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool
@@ -42,7 +41,7 @@ class Headers:
 
     @classmethod
     def of(cls, rows: Iterable[tuple[float, ...]]) -> Headers:
-        """Combine rows of `header_of` or `header_of_scan`."""
+        """Combine rows of `header_of`."""
         stamps, beams, steps, spans, increments, scan_times, limits, unequal, longest_m, count = map(
             np.array, zip(*rows, strict=True)
         )
@@ -108,26 +107,21 @@ class Headers:
         return np.rint(1e9 * increment_s * (self.beams - 1)).astype(np.int64)
 
 
-def header_of(message: Any, stamp_ns: int) -> tuple[float, ...]:
-    """Return the row of a LaserScan for `Headers.of`."""
-    span = float(message.angle_max) - float(message.angle_min)
-    numbers = float(message.time_increment), float(message.scan_time), float(message.range_max)
-    return _row(stamp_ns, message.ranges, message.intensities, float(message.angle_increment), span, *numbers)
-
-
-def header_of_scan(scan: Scan) -> tuple[float, ...]:
-    """Return the row of a scan for `Headers.of`."""
-    span = scan.angle_increment_rad * (scan.range_m.size - 1)
-    numbers = scan.time_increment_s, scan.scan_time_s, scan.range_max_m
-    return _row(scan.stamp_ns, scan.range_m, scan.intensity, scan.angle_increment_rad, span, *numbers)
-
-
-def _row(stamp_ns: int, ranges: Any, intensities: Any, *numbers: float) -> tuple[float, ...]:
-    range_m = np.asarray(ranges, np.float32)
-    longest_m = range_m[np.isfinite(range_m)].max(initial=0)
-    unequal = len(intensities) not in (0, range_m.size)
-    count = int(np.sum(range_m == longest_m)) if longest_m > 0 else 0
-    return stamp_ns, range_m.size, *numbers, unequal, float(longest_m), count
+def header_of(scan: Scan, span_rad: float, intensities: int) -> tuple[float, ...]:
+    """Return the row of a scan for `Headers.of`; `span_rad`: angle_max - angle_min, `intensities`: their number."""
+    longest_m = scan.range_m[np.isfinite(scan.range_m)].max(initial=0)
+    return (
+        scan.stamp_ns,
+        scan.range_m.size,
+        scan.angle_increment_rad,
+        span_rad,
+        scan.time_increment_s,
+        scan.scan_time_s,
+        scan.range_max_m,
+        intensities not in (0, scan.range_m.size),
+        float(longest_m),
+        int(np.sum(scan.range_m == longest_m)) if longest_m > 0 else 0,
+    )
 
 
 def header_findings(headers: Headers, speed_rad_s: float) -> Iterator[Finding]:

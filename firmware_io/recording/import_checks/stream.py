@@ -11,7 +11,7 @@ from scanwright.design.findings import Finding
 from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.import_checks.angles import angle_findings, usual_speed_rad_s
 from scanwright.firmware_io.recording.import_checks.clocks import clock_findings
-from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings, header_of_scan
+from scanwright.firmware_io.recording.import_checks.headers import Headers, header_findings, header_of
 from scanwright.firmware_io.samples import JointLog, Scan
 
 WINDOW_S = 20.0
@@ -39,7 +39,8 @@ class StreamChecks:
 
     def scan(self, scan: Scan, received_ns: int | None = None) -> list[Finding]:
         """Add a scan, in the order of receipt; every `EVERY_S` return the new findings."""
-        self._headers.append(header_of_scan(scan))
+        span_rad = scan.angle_increment_rad * (scan.range_m.size - 1)
+        self._headers.append(header_of(scan, span_rad, scan.intensity.size))
         self._received_ns.append(_UNKNOWN if received_ns is None else received_ns)
         while scan.stamp_ns - self._headers[0][0] > WINDOW_S * 1e9:
             self._headers.popleft()

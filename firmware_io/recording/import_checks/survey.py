@@ -11,6 +11,7 @@ import numpy as np
 
 from scanwright.design.arrays import Floats, Times
 from scanwright.design.errors import RecordingError, suggest
+from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.recording.angle_sources import FrameSource, angles_in, turned_rad
 from scanwright.firmware_io.recording.bag_clocks import Stamps
 from scanwright.firmware_io.recording.bags import Bag, Source, laser_scan_at, scan_fault
@@ -62,7 +63,9 @@ def survey_bag(
                 echoes = max(echoes, laser_scan.echoes[0].shape[1] if hasattr(laser_scan, "echoes") else 1)
                 scans.append((scan_stamp_ns, message.receive_ns, endless(laser_scan)))
                 limits_m = float(laser_scan.range_min), float(laser_scan.range_max)
-                rows.append(header_of(laser_scan, scan_stamp_ns or message.receive_ns))
+                scan = ros_messages.scan_from_message(laser_scan, scan_stamp_ns or message.receive_ns)
+                span_rad = float(laser_scan.angle_max) - scan.angle_min_rad
+                rows.append(header_of(scan, span_rad, len(laser_scan.intensities)))
         if angle_source is not None and message.topic == angle_source.topic:
             values = angles_in(message.body, angle_source, bag.path)
             if not values and isinstance(angle_source, Source):

@@ -99,12 +99,6 @@ def index_at_the_end(data: memoryview) -> tuple[list[Any], int]:
     return (records, begin) if place == at else ([], len(data))
 
 
-def between_magics(data: memoryview) -> bool:
-    """Whether a file begins and ends with the magic bytes."""
-    size = len(MCAP0_MAGIC)
-    return data[:size].tobytes() == MCAP0_MAGIC == data[-size:].tobytes()
-
-
 def chunk_at(data: memoryview, at: int, end: int, noted: mcap.ChunkIndex | None) -> IntactChunk | None:
     """Return the chunk at a place if its checksum is valid, even with a damaged head."""
     if at + RECORD_HEAD.size + _CHUNK_HEAD.size > len(data):

@@ -16,7 +16,6 @@ from mcap.writer import MCAP0_MAGIC
 from scanwright.firmware_io.recording.repair.salvage import (
     RECORD_HEAD,
     IntactChunk,
-    between_magics,
     chunk_at,
     fits,
     index_at_the_end,
@@ -33,15 +32,25 @@ _MOST_LISTED = 8  # gaps
 
 @dataclass(slots=True)
 class RepairSummary:
-    """Content and damage of a recording."""
+    """Content and damage of a recording.
 
-    messages: Counter[str] = field(default_factory=Counter)  # intact ones by topic
-    lost_messages: int = 0  # damaged ones, if the file has their number
-    damaged_chunks: int = 0  # with a wrong checksum
-    lost_bytes: int = 0  # of unreadable records, damaged chunks included
-    repaired: Counter[str] = field(default_factory=Counter)  # other damage that a repair corrects
-    times_ns: tuple[int, int] = (2**64, 0)  # log times of the first and the last message
-    missing_ns: list[tuple[int, int]] = field(default_factory=list)  # log times before and after lost messages
+    Attributes:
+        messages: intact ones by topic.
+        lost_messages: damaged ones, if the file has their number.
+        damaged_chunks: with a wrong checksum.
+        lost_bytes: of unreadable records, damaged chunks included.
+        repaired: other damage that a repair corrects.
+        times_ns: log times of the first and the last message.
+        missing_ns: known log times before and after lost messages.
+    """
+
+    messages: Counter[str] = field(default_factory=Counter)
+    lost_messages: int = 0
+    damaged_chunks: int = 0
+    lost_bytes: int = 0
+    repaired: Counter[str] = field(default_factory=Counter)
+    times_ns: tuple[int, int] = (2**64, 0)
+    missing_ns: list[tuple[int, int]] = field(default_factory=list)
 
     def misses(self, before_ns: int, after_ns: int) -> None:
         """Add a gap between messages of these times; 0 if one is unknown."""
@@ -121,7 +130,8 @@ class Survey:
             self.summary.lost_bytes += sum(end - at for at, end in self._loose)
             self._loose.clear()
         self._repaired["the index at the end"] += not index
-        self._repaired["the first or last bytes"] += not between_magics(data)
+        ends = data[: len(MCAP0_MAGIC)].tobytes(), data[-len(MCAP0_MAGIC) :].tobytes()
+        self._repaired["the first or last bytes"] += ends != (MCAP0_MAGIC, MCAP0_MAGIC)
         self._repaired["the end of the data"] += bool(index) and not self._closed
         self._repaired["the header"] += self.header is None
         self.summary.repaired = +self._repaired

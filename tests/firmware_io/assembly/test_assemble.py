@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from benchmarks.firmware_io.deskew import deskew, place
+from benchmarks.firmware_io.recordings.deskew import deskew, place
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.assemble import assemble_recording

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from benchmarks.firmware_io.deskew import place
+from benchmarks.firmware_io.recordings.deskew import place
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.beam_outcome import Verdict

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.firmware_io.deskew import place
+from benchmarks.firmware_io.recordings.deskew import place
 from scanwright.design.angles import AngleSet
 from scanwright.firmware_io.assembly.deskew_kernel import place_block
 from scanwright.firmware_io.samples import JointLog, Scan, blocks

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.firmware_io.deskew import deskew, place
+from benchmarks.firmware_io.recordings.deskew import deskew, place
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.assembly.beam_outcome import Verdict

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.firmware_io.deskew import place
+from benchmarks.firmware_io.recordings.deskew import place
 from scanwright.design import frames
 from scanwright.design.angles import STANDARD_DEG, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue

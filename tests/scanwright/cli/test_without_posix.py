@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 import scanwright as sw
 from scanwright.firmware_io.calibration import entropy
-from scanwright.firmware_io.clouds.ply import read_ply, write_points
+from scanwright.firmware_io.clouds.cloud import Cloud
+from scanwright.firmware_io.clouds.ply import read_ply, write
 from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import Scan
 from scanwright.cli.app import run as main
@@ -54,7 +55,8 @@ entropy._SAMPLE = 4000  # the pairs of points grow with the square
 run("assemble", "imported.mcap", "--angles", "angles.json", "-o", "cloud.ply")
 run("calibrate", "imported.mcap", "--angles", "angles.json", "-o", "calibrated.json")
 rows = read_ply(Path("cloud.ply"))
-write_points(Path("moved.ply"), np.stack([rows[axis][::2] for axis in "xyz"], axis=1) + (0.05, 0.0, 0.0))
+moved = np.stack([rows[axis][::2] for axis in "xyz"], axis=1) + np.float32([0.05, 0.0, 0.0])
+write(Path("moved.ply"), Cloud(moved))
 run("register", "cloud.ply", "moved.ply", "-o", "merged.ply")
 run("map", "cloud.ply", "-o", "map.yaml")
 run("catalogue")

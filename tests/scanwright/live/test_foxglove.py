@@ -19,7 +19,7 @@ from patience import BOUND_S, until
 from rosbags.typesys import Stores, get_typestore
 from websockets.sync.client import connect
 
-from benchmarks.firmware_io.deskew import deskew
+from benchmarks.firmware_io.recordings.deskew import deskew
 from benchmarks.firmware_io.rooms import FURNISHED, Setup, Truth, simulate
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import RecordingError, TaskError

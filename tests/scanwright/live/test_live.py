@@ -19,7 +19,7 @@ from PIL import Image
 from scipy.stats import kstest
 from websockets.sync.client import connect
 
-from benchmarks.firmware_io.deskew import deskew
+from benchmarks.firmware_io.recordings.deskew import deskew
 from scanwright.cli import devices
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.errors import DeviceError, ScanwrightError, UnsafeError, UnsafeNote
