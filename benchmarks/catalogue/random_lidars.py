@@ -75,10 +75,9 @@ def random_holes(random: np.random.Generator, half: tuple[float, float], tall: f
                 at = np.insert([aside * half[1 - across], height], across, sign * half[across]).tolist()
                 holes.append({"at_mm": at, "axis": face, "kind": kind, "size": size, "depth_mm": depth})
     for _ in range(int(random.integers(0, 3))):
-        at = (*tuple(random.uniform(-0.9, 0.9, 2) * half), 0.0)
         holes.append(
             {
-                "at_mm": at,
+                "at_mm": [*random.uniform(-0.9, 0.9, 2) * half, 0.0],
                 "axis": "-z",
                 "kind": str(random.choice(["pin", "case_screw", "slot"])),
                 "size": "M3",
