@@ -72,8 +72,8 @@ def random_holes(random: np.random.Generator, half: tuple[float, float], tall: f
         for face in faces:
             across, sign = "xy".index(face[1]), 1.0 if face[0] == "+" else -1.0
             for aside in random.uniform(-0.8, 0.8, int(random.integers(1, 4))).tolist():
-                at = np.insert([aside * half[1 - across], height], across, sign * half[across]).tolist()
-                holes.append({"at_mm": at, "axis": face, "kind": kind, "size": size, "depth_mm": depth})
+                mouth = np.insert([aside * half[1 - across], height], across, sign * half[across]).tolist()
+                holes.append({"at_mm": mouth, "axis": face, "kind": kind, "size": size, "depth_mm": depth})
     for _ in range(int(random.integers(0, 3))):
         holes.append(
             {
