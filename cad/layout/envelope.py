@@ -42,7 +42,7 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class SideWall:
     """A wall of the sub-plate at a side of the lidar, with one joint's screws; laser frame."""
 
     outwards: tuple[float, float, float]  # unit vector from the lidar
@@ -123,7 +123,7 @@ def sub_plate_mm(lidar: Lidar) -> float:
 
 def sub_plate_cm3(lidar: Lidar) -> float:
     """Return the volume of walls and the floor between them; 0 without walls."""
-    walls = walls_of(lidar)
+    walls = side_walls(lidar)
     if not walls:
         return 0.0
     floor = 4 * lidar.half_mm[0] * lidar.half_mm[1] * sub_plate_mm(lidar)
@@ -137,16 +137,16 @@ def lidar_thread_mm(lidar: Lidar) -> float:
     return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
 
 
-def walls_of(lidar: Lidar) -> tuple[Wall, ...]:
+def side_walls(lidar: Lidar) -> tuple[SideWall, ...]:
     """Return the walls that hold a lidar by threads in its sides; none if it is held by its base.
 
     Raises:
         BuildError: the head of a screw would be in front of the window, or at a cable.
     """
-    return tuple(_wall(lidar, face, pattern) for face, pattern in lidar.sides.items())
+    return tuple(_side_wall(lidar, face, pattern) for face, pattern in lidar.sides.items())
 
 
-def _wall(lidar: Lidar, face: Face, pattern: HolePattern) -> Wall:
+def _side_wall(lidar: Lidar, face: Face, pattern: HolePattern) -> SideWall:
     across, sign = "xy".index(face[1]), 1.0 if face[0] == "+" else -1.0
     seat, thick, head = -lidar.optical_height_mm, sub_plate_mm(lidar), SCREWS[pattern.screw].driver_radius
     sideways, heights = zip(*pattern.places, strict=True)
@@ -168,7 +168,7 @@ def _wall(lidar: Lidar, face: Face, pattern: HolePattern) -> Wall:
     def at(away: float, aside: float, height: float) -> tuple[float, float, float]:
         return (sign * away, aside, seat + height) if across == 0 else (aside, sign * away, seat + height)
 
-    return Wall(
+    return SideWall(
         outwards=(sign, 0.0, 0.0) if across == 0 else (0.0, sign, 0.0),
         box=_box(at(inner, ends[0], -thick), at(outer, ends[1], top)),
         root=_box(at(half - WALL_ROOT, ends[0], -thick), at(outer, ends[1], 0.0)),
@@ -249,7 +249,7 @@ def envelope_of(lidar: Lidar) -> Envelope:
         (-half_x, -half_y, seat),
         (half_x, half_y, lidar.body_mm[2] - lidar.optical_height_mm),
     ]
-    for wall in walls_of(lidar):
+    for wall in side_walls(lidar):
         heads = np.array(wall.screws) + wall.screw.head_height * np.array(wall.outwards)
         corners += [*wall.box, *heads.tolist()]
     (x0, y0, low), (x1, y1, top) = np.min(corners, axis=0).tolist(), np.max(corners, axis=0).tolist()

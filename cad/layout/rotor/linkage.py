@@ -12,13 +12,13 @@ from scanwright.cad.layout.envelope import (
     PLATE_THICKNESS,
     Box,
     Envelope,
-    Wall,
+    SideWall,
     box_corners,
     ear_screws,
     screw_travel_mm,
+    side_walls,
     slot_ends,
     sub_plate_mm,
-    walls_of,
 )
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import round_wall_mm
@@ -67,7 +67,7 @@ class AlignmentLinkage:
     half_y: float
     chamfer: float
     body: Box
-    walls: tuple[Wall, ...]  # of a sub-plate
+    walls: tuple[SideWall, ...]  # of a sub-plate
     ears: Box | None  # space of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: Thread
@@ -94,7 +94,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         BuildError: the screw holes come too near to the plate's edge.
     """
     lidar, printer = scanner.lidar, scanner.printer
-    held, walls = next(iter(lidar.held.values())), walls_of(lidar)
+    held, walls = next(iter(lidar.held.values())), side_walls(lidar)
     screw = SCREWS[held.screw]
     hole = passing_hole(screw, printer)
     half_x, half_y, _ = envelope.plate(stack.sub_plate)[1]

@@ -20,9 +20,9 @@ from scanwright.cad.layout.envelope import (
     envelope_of,
     lidar_thread_mm,
     screw_travel_mm,
+    side_walls,
     slot_ends,
     sub_plate_mm,
-    walls_of,
 )
 from scanwright.cad.layout.hub import Axis, Hub
 from scanwright.cad.layout.joints import Joint, ScrewAxis, fixing_in, fixing_of, placed_axes, screws, upright_axes
@@ -113,7 +113,7 @@ def lidar_joint(place: Placement, part: str, grip: float) -> Joint:
 
 def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
     """Make the sub-plate, its ears along an axis of the laser frame."""
-    lidar, printer, walls = scanner.lidar, scanner.printer, walls_of(scanner.lidar)
+    lidar, printer, walls = scanner.lidar, scanner.printer, side_walls(scanner.lidar)
     half_x, half_y = lidar.half_mm
     low, high = -lidar.optical_height_mm - sub_plate_mm(lidar), -lidar.optical_height_mm
     screw, ear_hole = SCREWS[next(iter(lidar.held.values())).screw], passing_hole(EAR_SCREW, printer) / 2

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.cad.combinations import screws_without_a_hole
 from scanwright.cad.assembly.bought_shapes import lidar_body, lidar_cable
-from scanwright.cad.layout.envelope import walls_of
+from scanwright.cad.layout.envelope import side_walls
 from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.layout.screw_patterns import screw_patterns
 from scanwright.cad.parts.all_parts import laid_out
@@ -81,7 +81,7 @@ def test_random_sets_in_the_sides_hold_a_lidar_at_any_attitude_by_all_their_hole
     assert {(round(x, 3), round(y, 3), round(z, 3), face) for x, y, z, face in holes} == found
     assert list(screws_without_a_hole(layout)) == []
     window = layout.scanner.lidar.window_z_mm[0] - layout.scanner.lidar.optical_height_mm
-    assert all(wall.box[1][2] < window for wall in walls_of(layout.scanner.lidar))
+    assert all(wall.box[1][2] < window for wall in side_walls(layout.scanner.lidar))
     turned = replace(layout, scanner=with_holes(layout.scanner, {"+y": [0.0, 20.0], "-x": [0.0]}, size, z=z))
     assert len(list(screws_without_a_hole(turned))) >= 1
 
