@@ -104,8 +104,9 @@ def test_plates_on_a_frame_leave_its_servo_and_all_that_turns_free(seed):
                 frame.half_x + 1.2 < abs(x) - ears.thread.hole / 2 and abs(x) + ears.thread.hole / 2 < ears.half_x - 1.2
             )
             assert frame.ends_y[0] + 1.2 < y - ears.thread.hole / 2 and y + ears.thread.hole / 2 < frame.ends_y[1] - 1.2
+        assert frame.opening > place.stack.flange_radius + 0.4  # it turns in the opening, and next to the heads
         for x, y in scanner.servo.front.places:
-            assert math.hypot(x, y) - heads > place.stack.flange_radius + 0.4  # the flange turns next to their heads
+            assert math.hypot(x, y) - heads > place.stack.flange_radius + 0.4
             assert (
                 abs(x) if plate.part != "cage_base" and place.stack.bearing is None else math.hypot(x, y)
             ) + heads < (ears.opening)
