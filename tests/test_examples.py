@@ -33,7 +33,7 @@ def test_none_is_forgotten_and_none_is_long():
 def test_it_runs(script, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(EXAMPLES)
-    monkeypatch.setattr(entropy, "_SAMPLE", 4000)  # the pairs of points grow with the square
+    monkeypatch.setattr(entropy, "_SAMPLE", 1500)  # the pairs of points grow with the square
     runpy.run_path(str(EXAMPLES / script), run_name="__main__")
     said = capsys.readouterr().out
     found = re.search(SAID[script], said)

@@ -36,7 +36,7 @@ def run(monkeypatch, tmp_path, command):
     """Run the command of a block of the page here; what it prints, and what the page shows."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(lidar_scans, "_CLOCK_LEAST_S", 0.3)
-    monkeypatch.setattr(entropy, "_SAMPLE", 4000)
+    monkeypatch.setattr(entropy, "_SAMPLE", 1500)
     FOLDER.mkdir(parents=True)
     (FOLDER / "angles.json").write_text(SCANNER.to_json())
     VirtualScanner(SCANNER).install(monkeypatch)

@@ -61,6 +61,7 @@ def test_the_command_reports_every_choice_and_the_chosen_one(monkeypatch, tmp_pa
     monkeypatch.setattr(meshes, "ANGLES", (0.5, meshes.CHORD_ANGLE))
     monkeypatch.setattr(meshes, "CHORDS", (meshes.CHORD_ERROR,))
     monkeypatch.setattr(solvers, "TOLERANCES", (1e-6,))
+    monkeypatch.setattr(solvers, "METHODS", ("LSODA", "Radau"))
     monkeypatch.setattr(axis, "BEAMS", 20_000)
     (tmp_path / "ahead.toml").write_text(cheapest_task)
     choices.main([str(tmp_path / "ahead.toml"), "--out", str(tmp_path)])

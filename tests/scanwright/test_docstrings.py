@@ -20,7 +20,7 @@ from scanwright.firmware_io.recording.bag_export import export_bag
 FUNCTIONS = {name for name, value in vars(api).items() if isfunction(value)}
 OF_BUILDS = {"build", "make_parts", "check"}
 OF_DEVICES = {"open_servo", "set_up_servo", "open_lidar", "scan"}
-SETUP = Setup(beams=180)
+SETUP = Setup(beams=120)
 SCANNER = designed(SETUP).model_copy(update={"sensor": "UTM-30LX", "motion": Spin(period_s=2.0)})
 
 
@@ -46,7 +46,7 @@ def recordings(tmp_path_factory):
 @pytest.fixture
 def here(recordings, monkeypatch):
     monkeypatch.chdir(recordings)
-    monkeypatch.setattr(entropy, "_SAMPLE", 4000)  # the pairs of points grow with the square
+    monkeypatch.setattr(entropy, "_SAMPLE", 1500)  # the pairs of points grow with the square
 
 
 @pytest.fixture

@@ -159,8 +159,13 @@ def test_some_nodes_of_the_papers_grid_stand_for_all(monkeypatch):
     assert abs(some.J - every.J) <= some.J_error + every.J_error
 
 
-@pytest.mark.parametrize("motion", ["spin", "seam", "stop_and_go"])
-@pytest.mark.parametrize("objective", ["log", "homogeneity", "required", "kl"])
+CONTROLLED = [("spin", "log"), ("seam", "homogeneity"), ("stop_and_go", "required"), ("seam", "kl")]
+
+
+@pytest.mark.parametrize(
+    ("motion", "objective"),
+    samples(product(("spin", "seam", "stop_and_go"), ("log", "homogeneity", "required", "kl")), CONTROLLED),
+)
 def test_the_control_variate_does_not_change_the_mean(motion, objective, monkeypatch):
     loaded = a_task([GROUND], motion=MOTIONS[motion], objective=objective, required=30.0, ball_radius_deg=1.5)
     controlled = counted_J(loaded, SETTING, 1, 256, 8)

@@ -43,7 +43,7 @@ QUICK = Setup(beams=180)
 @pytest.fixture(autouse=True)
 def few_points(monkeypatch):
     """The entropy of fewer points: the pairs of them grow with the square."""
-    monkeypatch.setattr(entropy, "_SAMPLE", 4000)
+    monkeypatch.setattr(entropy, "_SAMPLE", 1500)
 
 
 def errors(found, truth):

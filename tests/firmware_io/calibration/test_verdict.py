@@ -35,7 +35,7 @@ def calibrated(folder, scene_motion, setup=PITCHING):
 @pytest.fixture(autouse=True)
 def few_points(monkeypatch):
     """The entropy of fewer points: the pairs of them grow with the square."""
-    monkeypatch.setattr(entropy, "_SAMPLE", 4000)
+    monkeypatch.setattr(entropy, "_SAMPLE", 1500)
 
 
 @pytest.fixture(scope="module")

@@ -249,8 +249,7 @@ def test_import_and_assemble_a_real_recording(command, data, tmp_path):
     assert len(trimesh.load(cloud).vertices) == 467_596
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("words", [["--version"], ["catalogue"]])
+@pytest.mark.parametrize(("words", "unbuffered"), [(["--version"], ""), (["catalogue"], "1")])
 def test_results_that_cannot_be_written_are_told_of_standard_output(words, unbuffered):
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(

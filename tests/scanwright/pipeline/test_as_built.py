@@ -61,19 +61,26 @@ def test_every_place_states_the_same_numbers_of_a_build(built, command):
     assert factors == sorted(factors) and len(factors) == 4
 
 
-def test_compare_puts_a_build_before_what_has_no_parts(made, command, tmp_path):
+@pytest.fixture(scope="module")
+def evaluated(made):
+    """What the tilted scanner sees, as built."""
+    return sw.evaluate(made.folder)
+
+
+def test_compare_puts_a_build_before_what_has_no_parts(made, evaluated, command, tmp_path):
     code, out, _ = command("compare", made.folder, "--out", tmp_path, "-v")
     assert code == 0
     with (tmp_path / "tilted/compare.csv").open(newline="") as file:
         first, optimum, *_ = csv.DictReader(file)
-    seen = sw.evaluate(made.folder).as_built.own
+    seen = evaluated.as_built.own
     assert (first["name"], optimum["name"]) == ("as built, with parts", "optimum")
     assert float(first["blind_weight"]) == seen.blind_weight and float(first["blind_fraction"]) == seen.blind_fraction
     assert float(first["J"]) == pytest.approx(seen.J, abs=seen.J_error)
     assert "parts: all rows but 'as built, with parts' are without parts" in out
 
 
-def test_another_setting_of_a_build_folder_is_judged_without_its_parts(made):
+def test_another_setting_of_a_build_folder_is_judged_without_its_parts(made, evaluated):
+    assert evaluated.as_built is not None
     assert sw.evaluate(made.folder, (0, 35, -20, -70)).as_built is not None
     assert sw.evaluate(made.folder, (0, 30, -20, -70)).as_built is None
     assert sw.evaluate(open_built(made.folder).loaded, (0, 35, -20, -70)).as_built is None

@@ -256,6 +256,7 @@ def test_another_process_builds_the_same_bytes_and_finds_the_one_file_that_was_t
     (tmp_path / "rebuild.py").write_text(REBUILD)
     words = [sys.executable, tmp_path / "rebuild.py", "build", "--check", tilted]
     environment = os.environ | {"PYTHONHASHSEED": "4242", "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests' / 'house'}"}
+    environment["OPENBLAS_NUM_THREADS"] = "2"  # not as in this process
     done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=BOUND_S)
     drawing.write_bytes(kept)
     assert done.returncode == 1, done.stderr
