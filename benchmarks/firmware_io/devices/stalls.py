@@ -4,7 +4,7 @@
     python -m benchmarks.firmware_io.devices.stalls --soak HOURS [--only MODEL ...]
     python -m benchmarks.firmware_io.devices.stalls --real MINUTES [--only MODEL]
 
-Each lidar streams to its driver on one virtual clock, and the driver is held up STALLS times (default 20, which are 520
+Each lidar streams to its driver on one virtual clock, and the driver is held up STALLS times (default 20, which are 560
 in all), for 0.05 to 10 s, in a read or between two. What comes meanwhile waits in a buffer of a pseudo-terminal's or of
 a serial port's size; what finds it full is lost. An adapter hands bytes over every 1 or 16 ms. Ranges tell when each
 beam was measured. A soak runs one lidar of each family for hours of that clock, with a stall every 20 s in the mean.
