@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float64
 from numpy import ndarray
-from scipy.interpolate import BSpline, PPoly, make_lsq_spline
+from scipy.linalg import solveh_banded
 
-from scanwright.design.arrays import Floats, Times
+from scanwright.design.arrays import Floats, Ints, Times
 from scanwright.firmware_io.recording.import_checks.angles import outliers
 from scanwright.firmware_io.samples import AxisCurve, JointLog, straight
 
@@ -142,10 +142,10 @@ def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> tup
         return f"they lie {np.degrees(rms):.2g} deg rms off a smooth curve, more than their steps explain", residual
     if np.abs(residual).max() > _SWING * rms + step_rad:
         return f"they jump: one lies {np.degrees(np.abs(residual).max()):.2g} deg off a smooth curve", residual
-    knots = best.spline.t[3:-3]
+    knots = best.knots[3:-3]
     curve = AxisCurve(
         knot_ns=log.time_ns[0] + np.rint(knots * 1e9).astype(np.int64),
-        coefficient=np.ascontiguousarray(PPoly.from_spline(best.spline).c[::-1, 3:-3].T),
+        coefficient=np.ascontiguousarray(_polynomials(best.knots, best.weight)),
     )
     smoothed = SmoothAxis(
         curve=curve,
@@ -163,7 +163,8 @@ def _smooth(log: JointLog, longest_knot_s: float, per_knot: float | None) -> tup
 class _Fit:
     """A least-squares spline."""
 
-    spline: BSpline
+    knots: Floats
+    weight: Floats
     residual: Floats
     per_knot: float
     score: float  # expected mean squared error of a new sample (cross-validation)
@@ -186,10 +187,47 @@ def _fit(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], per_
     # knots at samples, uniform by number and not by time, so that none is in a gap
     inner = seconds[np.linspace(0, count - 1, max(round(count / per_knot), 1) + 1).round().astype(int)]
     knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    spline = make_lsq_spline(seconds, position, knots)
-    residual = position - spline(seconds)
-    score = np.mean(residual**2) / (1 - spline.c.size / count) ** 2
-    return _Fit(spline, residual, per_knot, float(score))
+    # normal equations of cubic B-splines: at each sample four consecutive ones are not 0, so the matrix is banded
+    piece = np.searchsorted(inner[1:-1], seconds, "right") + 3
+    value, first = _b_splines(seconds, knots, piece, 3), piece - 3
+    unknowns = knots.size - 4
+    band, right = np.zeros((4, unknowns)), np.zeros(unknowns)
+    for k in range(4):
+        right += np.bincount(first + k, value[k] * position, unknowns)
+        for below in range(4 - k):
+            band[below] += np.bincount(first + k, value[k] * value[k + below], unknowns)
+    weight = solveh_banded(band, right, lower=True)
+    residual = position - sum(value[k] * weight[first + k] for k in range(4))
+    score = np.mean(residual**2) / (1 - unknowns / count) ** 2
+    return _Fit(knots, weight, residual, per_knot, float(score))
+
+
+def _b_splines(at: Floats, knots: Floats, piece: Ints, degree: int) -> list[Floats]:
+    """Return the non-zero B-splines in the piece of each time, from number `piece - degree` (de Boor's recurrence)."""
+    value = [np.ones_like(at)]
+    for d in range(1, degree + 1):
+        carry = np.zeros_like(at)
+        for k in range(d):
+            after, before = knots[piece + k + 1], knots[piece + k + 1 - d]
+            part = value[k] / (after - before)
+            value[k] = carry + (after - at) * part
+            carry = (at - before) * part
+        value.append(carry)
+    return value
+
+
+def _polynomials(knots: Floats, weight: Floats) -> Floats:
+    """Return the polynomials of a cubic spline, shape (pieces, 4): powers 0 to 3 of the time since a knot.
+
+    They follow from four values in each piece.
+    """
+    inner, first = knots[3:-3], np.arange(knots.size - 7)
+    length, parts = np.diff(inner), np.linspace(0, 1, 4)
+    values = []
+    for part in parts:
+        splines = _b_splines(inner[:-1] + part * length, knots, first + 3, 3)
+        values.append(sum(splines[k] * weight[first + k] for k in range(4)))
+    return (np.linalg.solve(np.vander(parts, increasing=True), values) / length ** np.arange(4)[:, None]).T
 
 
 def _straight_score(seconds: Float64[ndarray, " n"], position: Float64[ndarray, " n"], step_rad: float) -> float:
@@ -209,7 +247,7 @@ def _error(
     with half the knots misses 16 times as much of the motion (rms), which shows in the difference beyond noise.
     """
     count = seconds.size
-    noise = rms**2 * best.spline.c.size / count * max(correlated, 1.0)
+    noise = rms**2 * best.weight.size / count * max(correlated, 1.0)
     coarse = _fit(seconds, position, 2 * best.per_knot)
     differs = float(np.mean((coarse.residual - best.residual) ** 2))
     missed = max(differs - noise / 2, 0.0) / 15**2

@@ -31,7 +31,7 @@ _POSITION = slice(-16, -8)  # of a message of `encode_joint`, before two empty s
 
 
 def blocks_in(messages: Sequence[bytes]) -> Iterator[Block]:
-    """Yield blocks of LaserScan messages in CDR with one layout; an exception for other messages."""
+    """Yield blocks of LaserScan messages in CDR with one layout, as views; an exception for other messages."""
     for (length, order), run in groupby(messages, lambda data: (len(data), data[1])):
         listed = list(run)
         if order != _LITTLE_ENDIAN or length % 4:  # of other recorders; slower
@@ -72,7 +72,7 @@ def joints_in(messages: Sequence[bytes]) -> tuple[Times, Floats]:
 
 
 def _numbers(rows: Bytes, place: slice, kind: DTypeLike) -> np.ndarray[Any, Any]:
-    return np.ascontiguousarray(rows[:, place]).view(kind)
+    return rows[:, place].view(kind)
 
 
 def _times(rows: Bytes) -> Times:

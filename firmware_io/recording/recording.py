@@ -177,7 +177,9 @@ class Recording:
             return
         messages = (data for _, data in read_messages(self.path, {SCAN_TOPIC}, summed=False))
         while some := list(islice(messages, _BLOCK)):
-            yield from foreign(f"{self.path}: a message of {SCAN_TOPIC}", list[Block], blocks_in(some))
+            for block in foreign(f"{self.path}: a message of {SCAN_TOPIC}", list[Block], blocks_in(some)):
+                range_m, intensity = np.ascontiguousarray(block.range_m), np.ascontiguousarray(block.intensity)
+                yield replace(block, range_m=range_m, intensity=intensity)
 
     def arrays(self) -> RecordingArrays:
         """Read the entire recording."""
