@@ -171,7 +171,7 @@ def test_a_case_without_ears_around_the_flange_is_refused():
     ears = tuple(Hole(at_mm=(x, y, -6.5), axis="+z", kind="through", size="M2.5", depth_mm=2.0) for x, y in holes)
     servo = scanner.servo.model_copy(update={"holes": ears})
     wrong = replace(scanner, servo=servo)
-    with pytest.raises(BuildError, match=r"cage_base: ears: holes"):
+    with pytest.raises(BuildError, match=r"servo_frame: plate: holes = .* in front: leave a wall of -3.95 mm"):
         drive_of(wrong)
 
 
