@@ -42,7 +42,7 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
+class SideWall:
     """A wall of the sub-plate at a side of the lidar, with one joint's screws; laser frame."""
 
     outwards: tuple[float, float, float]  # unit vector from the lidar
@@ -137,7 +137,7 @@ def lidar_thread_mm(lidar: Lidar) -> float:
     return min(lidar.base.depth_mm, lidar.window_z_mm[0] - 1.0)
 
 
-def walls_of(lidar: Lidar) -> tuple[Wall, ...]:
+def walls_of(lidar: Lidar) -> tuple[SideWall, ...]:
     """Return the walls that hold a lidar by threads in its sides; none if it is held by its base.
 
     Raises:
@@ -146,7 +146,7 @@ def walls_of(lidar: Lidar) -> tuple[Wall, ...]:
     return tuple(_wall(lidar, face, pattern) for face, pattern in lidar.sides.items())
 
 
-def _wall(lidar: Lidar, face: Face, pattern: HolePattern) -> Wall:
+def _wall(lidar: Lidar, face: Face, pattern: HolePattern) -> SideWall:
     across, sign = "xy".index(face[1]), 1.0 if face[0] == "+" else -1.0
     seat, thick, head = -lidar.optical_height_mm, sub_plate_mm(lidar), SCREWS[pattern.screw].driver_radius
     sideways, heights = zip(*pattern.places, strict=True)
@@ -168,7 +168,7 @@ def _wall(lidar: Lidar, face: Face, pattern: HolePattern) -> Wall:
     def at(away: float, aside: float, height: float) -> tuple[float, float, float]:
         return (sign * away, aside, seat + height) if across == 0 else (aside, sign * away, seat + height)
 
-    return Wall(
+    return SideWall(
         outwards=(sign, 0.0, 0.0) if across == 0 else (0.0, sign, 0.0),
         box=_box(at(inner, ends[0], -thick), at(outer, ends[1], top)),
         root=_box(at(half - WALL_ROOT, ends[0], -thick), at(outer, ends[1], 0.0)),
@@ -232,19 +232,24 @@ def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
 
 
-def envelope_of(lidar: Lidar) -> Envelope:
-    """Return the boxes of one lidar (origin at the optical centre)."""
-    half_x, half_y = lidar.half_mm
-    seat = -lidar.optical_height_mm
+def cables_of(lidar: Lidar) -> tuple[Box, ...]:
+    """Return the boxes of the straight pieces of its cables, in the laser frame."""
+    half_x, seat = lidar.half_mm[0], -lidar.optical_height_mm
     half = lidar.cable_diameter_mm / 2 + CABLE_GAP
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
-    cables = tuple(
+    return tuple(
         (
             (back, y - half, seat + max(lidar.cable_z_mm - half, 0.5)),
             (1.0 - half_x, y + half, seat + lidar.cable_z_mm + half),
         )
         for y in lidar.cable_y_mm
     )
+
+
+def envelope_of(lidar: Lidar) -> Envelope:
+    """Return the boxes of one lidar (origin at the optical centre)."""
+    half_x, half_y = lidar.half_mm
+    seat = -lidar.optical_height_mm
     corners: list[Sequence[float]] = [
         (-half_x, -half_y, seat),
         (half_x, half_y, lidar.body_mm[2] - lidar.optical_height_mm),
@@ -254,7 +259,7 @@ def envelope_of(lidar: Lidar) -> Envelope:
         corners += [*wall.box, *heads.tolist()]
     (x0, y0, low), (x1, y1, top) = np.min(corners, axis=0).tolist(), np.max(corners, axis=0).tolist()
     gap = BODY_GAP
-    return Envelope(lidar, ((x0 - gap, y0 - gap, low), (x1 + gap, y1 + gap, top)), cables)
+    return Envelope(lidar, ((x0 - gap, y0 - gap, low), (x1 + gap, y1 + gap, top)), cables_of(lidar))
 
 
 def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:

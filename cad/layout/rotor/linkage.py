@@ -12,7 +12,7 @@ from scanwright.cad.layout.envelope import (
     PLATE_THICKNESS,
     Box,
     Envelope,
-    Wall,
+    SideWall,
     box_corners,
     ear_screws,
     screw_travel_mm,
@@ -67,7 +67,7 @@ class AlignmentLinkage:
     half_y: float
     chamfer: float
     body: Box
-    walls: tuple[Wall, ...]  # of a sub-plate
+    walls: tuple[SideWall, ...]  # of a sub-plate
     ears: Box | None  # space of a sub-plate's ears
     ear_screws: tuple[tuple[float, float], ...]
     ear_thread: Thread
