@@ -232,19 +232,24 @@ def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
 
 
-def envelope_of(lidar: Lidar) -> Envelope:
-    """Return the boxes of one lidar (origin at the optical centre)."""
-    half_x, half_y = lidar.half_mm
-    seat = -lidar.optical_height_mm
+def cables_of(lidar: Lidar) -> tuple[Box, ...]:
+    """Return the boxes of the straight pieces of its cables, in the laser frame."""
+    half_x, seat = lidar.half_mm[0], -lidar.optical_height_mm
     half = lidar.cable_diameter_mm / 2 + CABLE_GAP
     back = -half_x - lidar.cable_straight_mm - lidar.cable_diameter_mm
-    cables = tuple(
+    return tuple(
         (
             (back, y - half, seat + max(lidar.cable_z_mm - half, 0.5)),
             (1.0 - half_x, y + half, seat + lidar.cable_z_mm + half),
         )
         for y in lidar.cable_y_mm
     )
+
+
+def envelope_of(lidar: Lidar) -> Envelope:
+    """Return the boxes of one lidar (origin at the optical centre)."""
+    half_x, half_y = lidar.half_mm
+    seat = -lidar.optical_height_mm
     corners: list[Sequence[float]] = [
         (-half_x, -half_y, seat),
         (half_x, half_y, lidar.body_mm[2] - lidar.optical_height_mm),
@@ -254,7 +259,7 @@ def envelope_of(lidar: Lidar) -> Envelope:
         corners += [*wall.box, *heads.tolist()]
     (x0, y0, low), (x1, y1, top) = np.min(corners, axis=0).tolist(), np.max(corners, axis=0).tolist()
     gap = BODY_GAP
-    return Envelope(lidar, ((x0 - gap, y0 - gap, low), (x1 + gap, y1 + gap, top)), cables)
+    return Envelope(lidar, ((x0 - gap, y0 - gap, low), (x1 + gap, y1 + gap, top)), cables_of(lidar))
 
 
 def ear_corner(lidar: Lidar, sub_plate: Axis) -> tuple[float, float]:

@@ -15,9 +15,9 @@ from scanwright.cad.layout.envelope import (
     EAR_REACH,
     EAR_SCREW,
     PLATE_THICKNESS,
+    cables_of,
     ear_corner,
     ear_screws,
-    envelope_of,
     lidar_thread_mm,
     screw_travel_mm,
     side_walls,
@@ -130,7 +130,7 @@ def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
             length = sub_plate_mm(lidar) + 2.0
             cuts += [solids.cylinder(hole, at + outside, -outside, length) for at in np.array(wall.screws)]
         if "-x" in lidar.sides:
-            cuts += [solids.box(corner, (x, y, ABOVE)) for corner, (x, y, _) in envelope_of(lidar).cables]
+            cuts += [solids.box(corner, (x, y, ABOVE)) for corner, (x, y, _) in cables_of(lidar)]
         cuts += [solids.upright(ear_hole, low - 1.0, high + 1.0, *at) for at in ear_screws(lidar, axis)]
         front_x = max([half_x, *(wall.box[1][0] for wall in walls)])
         front = front_mark(front_x + (EAR_REACH if axis == "x" else 0.0))
