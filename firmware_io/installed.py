@@ -4,20 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib.metadata import entry_points
-from typing import Protocol, TypeVar
+from typing import Any, TypeVar
 
 from scanwright.design.errors import DeviceError, ScanwrightError
 
-
-class Named(Protocol):
-    """A family of lidars or servos, or a format of clouds."""
-
-    @property
-    def name(self) -> str:
-        """Unique name."""
-
-
-F = TypeVar("F", bound=Named)
+F = TypeVar("F", bound=Any)  # a family of lidars or servos, or a format of clouds, with a unique `name`
 
 
 def with_installed(
