@@ -39,6 +39,7 @@ REPORT = "report.html"
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note", "ok")  # the worst first
 RAYS = 90_000  # of the cloud of one scan: it shares the 3 MB of a page with the scanner and the drawings
 SPREAD_PERCENT = 1, 99  # of the heights, to which the colours reach
+FLAT_M = 0.01  # heights of the cloud of an upright axis and a level lidar
 CEILING_M = 1.2  # above the scanner, from which the cloud is cut away: it would hide the room
 
 
@@ -142,7 +143,7 @@ def _task_scene(
     return room_scene(room, centre_m, np.array(sphere.middle), sphere.below) | {
         "robot": robot_bodies(loaded.task, loaded.source.parent, centre_m),
         "maps": len(sphere.maps),
-        "cloud": cloud_scene(points + centre_m, (points[:, 2] - low) / (high - low)),
+        "cloud": cloud_scene(points + centre_m, (points[:, 2] - low) / max(high - low, FLAT_M)),
         "shown": len(points),
         "cast": problem.lines.count * problem.lines.repeats * len(problem.bearings_rad),
         "heights": [f"{low:.1f} m", f"{high:.1f} m"],
