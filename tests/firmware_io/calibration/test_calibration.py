@@ -238,7 +238,7 @@ def test_scans_of_another_lidar_than_that_of_the_angle_set_are_named(tmp_path):
         calibrate_recordings([recording], angles, tmp_path / "a.json")
 
 
-def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, command):
+def test_the_real_tilting_scanner_sees_nothing_twice(data, tmp_path, command):
     source = {"scan": "/slice:laserScan", "angle": "/slice:stepAngle"}
     import_bag(data / "tilting/first_scan.bag", tmp_path / "r.mcap", **source, angle_unit="deg", hold=True)
     angles = "design/angle_sets/tilting_urg.json"
@@ -246,6 +246,4 @@ def test_the_real_tilting_scanner_sees_nothing_twice_but_no_lag(data, tmp_path, 
     assert (code, len(complaints)) == (2, 1)
     assert "too little is seen twice" in complaints[0]
     assert "turned 60 deg" in complaints[0]
-    (sd_s,) = map(float, re.findall(r"no delay, with an uncertainty of (\d\.\d{3}) s", complaints[0]))
-    assert 0.05 < sd_s < 0.08  # of the tenth of a second between two scans, half
     assert not (tmp_path / "a.json").exists()
