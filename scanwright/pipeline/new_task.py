@@ -204,7 +204,7 @@ def _motion(answers: Answers, lidar: Lidar, servo: Servo, ring: SlipRing | None)
         ]
     why = f"{servo.name} does not read its angle all around"
     if servo.position_feedback_deg == 360:
-        why = f"the case of {servo.name} has no holes for the parts of a slip ring"
+        why = f"a slip ring does not fit {servo.name}, or needs a printed frame around it"
     return [
         "",
         f"[motion]  # {why}: it sweeps back and forth, and its cable hangs in a loop",

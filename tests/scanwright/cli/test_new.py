@@ -80,7 +80,7 @@ def test_what_was_asked_for_stands_in_the_file(command, here):
     assert isinstance(ground, GroundRegion) and isinstance(ceiling, CeilingRegion)
     assert (ground.from_m, ground.to_m, ground.height_m, ceiling.ceiling_m) == (0.5, 5, 0.4, 2.5)
     assert (task.sensor, task.servo, task.slip_ring) == ("UST-20LX", "XM430-W350", None)
-    assert "the case of XM430-W350 has no holes for the parts of a slip ring: it sweeps back and forth" in text
+    assert "a slip ring does not fit XM430-W350, or needs a printed frame around it: it sweeps back and forth" in text
     again = next(line for line in text.splitlines() if line.startswith("# Made by: ")).removeprefix("# Made by: ")
     (here / "FILE.toml").unlink()
     assert command(*shlex.split(again)[1:])[0] == 0
