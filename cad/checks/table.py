@@ -126,7 +126,8 @@ CHANGES = {
     "belt_tension": f"take a longer period_s in [motion], or {LIGHTER}",
     "waist_torque": "choose a servo with a smaller stall torque (servo)",
     "shaft_slope": f"{LIGHTER} or a shorter ring (slip_ring)",
-    "retention": 'choose a printer profile with thread = "nut" or "insert" (printer), or a lighter lidar (sensor)',
+    "retention": "if a printed part yields, choose a printer profile with nuts or inserts (printer); otherwise a servo "
+    "with metal threads (servo), or a lighter lidar (sensor)",
     "angle_held": f"{LIGHTER}, or {OTHER_MOUNT}",
     "screw": "choose a printer profile with another thread (printer)",
     "wiring": "correct the value in the catalogue file, or choose another device",
