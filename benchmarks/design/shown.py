@@ -36,6 +36,7 @@ from scanwright.design.objective.score import score
 from scanwright.design.progress import no_progress
 from scanwright.design.search.families import Family
 from scanwright.design.search.mounts.reference import reference_mounts
+from scanwright.design.search.shortest_period import with_period
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.sphere.directions import spiral
 from scanwright.design.task.task import LoadedTask
@@ -132,7 +133,7 @@ def _compare_fully(drawn: RandomTask, _: Path) -> None:
 
 
 def _report(drawn: RandomTask, _: Path) -> None:
-    loaded, shadow = drawn.loaded, _shadow(drawn)
+    loaded, shadow = with_period(drawn.loaded, drawn.angles_rad, no_progress), _shadow(drawn)
     angles = loaded.angle_set(drawn.angles_deg)
     problem = problem_as_built(loaded, angles)
     found = answer(loaded, angles, shadow)

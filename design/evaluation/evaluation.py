@@ -26,6 +26,7 @@ from scanwright.design.objective.score import Score
 from scanwright.design.objective.stated_error import error_words, rounded_to_error
 from scanwright.design.objective.tolerance import rise_words, sensitivity
 from scanwright.design.progress import Progress
+from scanwright.design.search.shortest_period import with_period
 from scanwright.design.search.with_parts import checked_score
 from scanwright.design.self_occlusion import SelfOcclusion
 from scanwright.design.task.angle_ranges import NAMES
@@ -76,6 +77,7 @@ class Evaluation:
         coverage: blind and masked shares.
         gaps: blind cones, gaps and crossings of scan lines.
         cap: the largest empty cap of a sweep; None for full turns, which have blind cones.
+        shortest_s: period of a full turn that was chosen for this mount; None if the task gives the motion.
         interlaced_s: period at which the lines of the next turn lie between those of this one; None without a spin.
         rises: rise of J if each angle is 1 deg off.
         hit: the probability to hit a pole, if requested.
@@ -93,6 +95,7 @@ class Evaluation:
     coverage: Coverage
     gaps: Gaps
     cap: BlindCone | None
+    shortest_s: float | None
     interlaced_s: float | None
     rises: dict[str, float]
     hit: PoleChances | None
@@ -134,6 +137,7 @@ class Evaluation:
             "min_density": self.score.least,
             **asdict(self.gaps),
             **({} if self.cap is None else {"empty_cap": asdict(self.cap)}),
+            **({} if self.shortest_s is None else {"period_s": self.shortest_s}),
             **({} if self.interlaced_s is None else {"interlaced_period_s": self.interlaced_s}),
             "J_rises_1_deg_off": self.rises,
             **({} if self.hit is None else {"pole": asdict(self.hit)}),
@@ -184,6 +188,10 @@ class Evaluation:
             lines.append(
                 f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest"
             )
+        if self.shortest_s is not None:
+            lines.append(
+                f"period         {self.shortest_s:g} s a turn: the shortest that keeps the limits, at most longest_s"
+            )
         if self.interlaced_s is not None:
             lines.append(
                 f"interlaced     with {self.interlaced_s:g} s a turn: the next turn's lines fall between these"
@@ -210,6 +218,9 @@ def evaluate(
     """
     if pole is not None:
         require_in_range(pole, loaded.lidar)
+    chosen = with_period(loaded, angles_rad, progress)
+    shortest_s = None if chosen is loaded else chosen.task.motion.duration_s
+    loaded = chosen
     problem = problem_of(loaded)
     if lever is not None:
         problem = replace(problem, lever=lever.shares())
@@ -233,6 +244,7 @@ def evaluate(
         coverage=coverage(problem, angles_rad),
         gaps=gaps(problem, angles_rad),
         cap=cap,
+        shortest_s=shortest_s,
         interlaced_s=interlaced_s,
         rises=sensitivity(problem, angles_rad, np.radians(1.0)),
         hit=None if pole is None else pole_chances(problem, angles_rad, pole),

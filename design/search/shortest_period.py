@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -45,7 +46,7 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
     except TaskError as error:
         raise TaskError(f"{loaded.source}: even with motion.longest_s = {motion.longest_s:g}: {error}") from error
     for _ in range(ROUNDS):
-        periods = [_shortest(loaded, problem, family) for family in result.best]
+        periods = [_shortest(loaded, problem, family.angles_rad) for family in result.best]
         period = min(periods)
         if period >= now.task.motion.duration_s * (1 - 1e-9):
             break
@@ -64,6 +65,23 @@ def fastest(loaded: LoadedTask, progress: Progress) -> tuple[LoadedTask, Problem
         except TaskError:  # the families of this search do not include the one that allows the period: keep that
             break
     return now, problem, result
+
+
+def with_period(loaded: LoadedTask, angles_rad: Setting, progress: Progress) -> LoadedTask:
+    """Return a task with the shortest period of one mount, at most `longest_s`; the task itself if it has a period."""
+    motion = loaded.task.motion
+    if not isinstance(motion, Shortest):
+        return loaded
+    slowest = _at(loaded, motion.longest_s)
+    try:
+        period_s = _shortest(loaded, problem_of(slowest), angles_rad)
+    except TaskError:
+        period_s = math.inf
+    if period_s > motion.longest_s:
+        progress(f"this mount breaks the limits of the task even at longest_s = {motion.longest_s:g} s")
+        return slowest
+    progress(f"one turn in {period_s:g} s: the shortest of this mount that keeps the limits")
+    return _at(loaded, period_s)
 
 
 def shortest_period_s(
@@ -106,19 +124,19 @@ def _at(loaded: LoadedTask, period_s: float) -> LoadedTask:
     return replace(loaded, task=loaded.task.model_copy(update={"motion": Spin(period_s=period_s)}))
 
 
-def _shortest(loaded: LoadedTask, problem: Problem, family: Family) -> float:
-    """Return the shortest period of one family: the longest of those that servo, density and gaps require."""
+def _shortest(loaded: LoadedTask, problem: Problem, angles_rad: Setting) -> float:
+    """Return the shortest period of one mount: the longest of those that servo, density and gaps require."""
     limits, rate = loaded.task.limits, loaded.lidar.scan_rate_hz
     periods = [
         np.ceil(60 / fastest_rpm(loaded.task.product_names(), loaded.task.motion, loaded.products)[0] * rate - 1e-9)
         / rate
     ]
     if limits.max_line_gap_deg is not None:
-        gap = float(line_gaps_deg(problem, family.angles_rad[None, 2:])[0]) / np.degrees(problem.lines.step_rad)
+        gap = float(line_gaps_deg(problem, angles_rad[None, 2:])[0]) / np.degrees(problem.lines.step_rad)
         periods.append(np.ceil(360 * gap / limits.max_line_gap_deg - 1e-9) / rate)
     if limits.min_density is not None:
         least = int(np.ceil(limits.min_density))
-        periods.append(shortest_period_s(problem, family.angles_rad, rate, least))
+        periods.append(shortest_period_s(problem, angles_rad, rate, least))
     return float(max(periods))
 
 

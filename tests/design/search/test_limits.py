@@ -10,6 +10,7 @@ from scans import simulated_scan
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.density.spin import ball_search
 from scanwright.design.errors import TaskError
+from scanwright.design.evaluation.evaluation import evaluate
 from scanwright.design.evaluation.gaps import gaps
 from scanwright.design.objective.ball_search import start_phases
 from scanwright.design.objective.problem import problem_of
@@ -131,6 +132,22 @@ def test_the_shortest_period_for_a_gap_is_the_one_that_makes_it():
     assert gaps(problem, result.best[0].angles_rad).line_gap_deg <= 1.0 + 1e-9
     one_less = problem_of(loaded(motion={"period_s": now.task.motion.period_s - 1 / 40}))
     assert gaps(one_less, result.best[0].angles_rad).line_gap_deg > 1.0
+
+
+def test_evaluate_chooses_the_shortest_period_of_the_mount_that_it_shows():
+    """At the period chosen the gap keeps its limit, one scan less breaks it; a mount that never can has longest_s."""
+    task = loaded(motion={"period_s": "shortest", "longest_s": 12.0}, limits={"max_line_gap_deg": 1.0})
+    for angles_deg in ((0, 90, 0, -90), (10, -40, -60, 50)):
+        angles = np.radians(angles_deg)
+        found = evaluate(task, angles, None, None, no_progress)
+        assert found.gaps.line_gap_deg <= 1.0 + 1e-9
+        assert found.facts()["period_s"] == found.shortest_s < 12.0
+        one_less = problem_of(loaded(motion={"period_s": found.shortest_s - 1 / 40}))
+        assert gaps(one_less, angles).line_gap_deg > 1.0
+    hopeless = loaded(motion={"period_s": "shortest", "longest_s": 12.0}, limits={"min_density": 10_000})
+    found = evaluate(hopeless, np.radians((0, 90, 0, -90)), None, None, no_progress)
+    assert found.shortest_s == 12.0
+    assert "12 s a turn" in "\n".join(found.lines())
 
 
 def test_shortest_asks_for_a_limit(tmp_path):
