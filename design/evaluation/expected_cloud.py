@@ -70,6 +70,7 @@ class ExpectedCloud:
     # warning that an object as wide as a ball of the task can get no beam; null if none can
     missed_object: Finding | None
     planes: tuple[PlaneFigures, ...]  # points on ground, walls and ceilings of the task
+    empty_areas: tuple[Finding, ...]  # warning for each plane of which a part gets no points
     hidden_regions: tuple[Finding, ...]  # regions that the robot hides in part
 
     def lines(self) -> list[str]:
@@ -79,7 +80,7 @@ class ExpectedCloud:
             f"{self.expected_error.words()}{far}",
             *(f"one full scan, {plane.words()}" for plane in self.planes),
             *(f"warning: {sentence(each)}" for each in (self.missed_object, self.wide_gap) if each is not None),
-            *(f"{each.severity}: {sentence(each)}" for each in self.hidden_regions),
+            *(f"{each.severity}: {sentence(each)}" for each in (*self.empty_areas, *self.hidden_regions)),
         ]
 
 
@@ -96,12 +97,14 @@ def expected_cloud(
     `shadow` are the beams that its parts block and `checks` the checks of these parts, if it was built.
     """
     far = expected_error(loaded, problem, angles_rad, checks, FAR_M)
+    planes = on_planes(loaded, problem, angles_rad, shadow)
     return ExpectedCloud(
         expected_error(loaded, problem, angles_rad, checks),
         far if far.at_m == FAR_M else None,
         wide_gap(problem, angles_rad, free_beams(problem, angles_rad, shadow)),
         missed_object(loaded, angles_rad, own, shadow),
-        on_planes(loaded, problem, angles_rad, shadow),
+        planes,
+        tuple(warning for plane in planes if (warning := plane.empty(problem.ball_rad)) is not None),
         hidden_regions(loaded),
     )
 

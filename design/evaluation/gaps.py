@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from scanwright.design.arrays import Array, Plane, Setting, Vector
 from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
-from scanwright.design.evaluation.metres import AT_M
+from scanwright.design.evaluation.metres import AT_M, spacing
 from scanwright.design.findings import Finding
 from scanwright.design.frames import R_rot_laser, R_world_rot
 from scanwright.design.objective.holes import heading, triple
@@ -88,9 +88,7 @@ def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]
     from scipy.spatial import cKDTree
 
     directions = weighted_samples(problem.field, DIRECTIONS).directions
-    fan = problem.beams_rot(angles_rad[2:])
-    beam_step = float(np.median(np.diff(np.sort(problem.bearings_rad))))
-    spacing_deg = float(np.degrees(max(beam_step, problem.lines.step_rad * line_spacing(fan, angles_rad[2:]))))
+    spacing_deg = float(np.degrees(spacing(problem, angles_rad)))
     tree = cKDTree(beams, balanced_tree=False, compact_nodes=False)
     chord = 2 * np.sin(problem.ball_rad / 2)
     distances = tree.query(directions, distance_upper_bound=float(chord))[0]

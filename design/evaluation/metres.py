@@ -15,7 +15,8 @@ from numpy import ndarray
 from pydantic import WithJsonSchema
 
 from scanwright.design.arrays import Array, Ints, Setting, Vector
-from scanwright.design.density.beams import polar_and_azimuth, scan_at
+from scanwright.design.density.beams import line_spacing, polar_and_azimuth, scan_at
+from scanwright.design.findings import Finding
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import Problem
 from scanwright.design.self_occlusion import SelfOcclusion
@@ -37,6 +38,7 @@ Infinite = Annotated[float, WithJsonSchema({"type": ["number", "null"]})]
 
 QUARTERS = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
 SPOT = 0.8  # gaps off the axis are stated separately if they are narrower than this share of the widest gap
+EMPTY = 0.01  # share of the area without points that is reported
 SLACK = 0.02  # relative error of a stated diameter, which is never too small
 
 
@@ -49,6 +51,8 @@ class PlaneFigures:
     beyond_range: float  # share of the area beyond that range; the other figures refer to the rest
     points: int  # number of points
     points_per_m2: float  # mean over the unmasked area
+    # share of the unmasked area outside the surface that the beams sweep: no point lies within their spacing
+    empty_share: float
     at_m: float  # distance of `gap_cm` from the optical centre: `AT_M`, or the nearest distance within the region
     # diameter of the largest disc without a point, centred at that distance; null if there are no points
     gap_cm: Infinite
@@ -72,6 +76,18 @@ class PlaneFigures:
         twice = f"an object {rounded(self.twice_cm)} cm wide is hit twice even at the worst place"
         return f"{self.region}: {part}{rounded(self.points_per_m2)} points per m2, {gaps}; {twice}"
 
+    def empty(self, ball_rad: float) -> Finding | None:
+        """Return a warning if a part of the area gets no points; directions within the ball radius count as seen."""
+        if self.empty_share <= EMPTY or self.beyond_range == 1:
+            return None
+        ball_deg = float(np.degrees(ball_rad))
+        message = f"{100 * self.empty_share:.0f}% of the area of {self.region} gets no points"
+        hint = (
+            f"J counts what lies within {ball_deg:.2g} deg of a beam as seen: set density.ball_radius_deg = "
+            f"{ball_deg / 2:.2g}, or enlarge the region"
+        )
+        return Finding("empty_area", "warning", self.region, message, self.empty_share, EMPTY, "1", hint)
+
 
 def planes_of(loaded: LoadedTask) -> list[PlaneRegion]:
     """Return the plane regions of a task with a weight above 0."""
@@ -90,8 +106,15 @@ def on_planes(
         return ()
     beams = free_beams(problem, angles_rad, shadow)
     spots = _spots(problem if shadow is None else problem.behind(shadow), angles_rad)
-    reach_m = loaded.lidar.practical_range_m
-    return tuple(on_plane(region, beams, problem, spots, reach_m) for region in regions)
+    spacing_rad, reach_m = spacing(problem, angles_rad), loaded.lidar.practical_range_m
+    return tuple(on_plane(region, beams, problem, spots, spacing_rad, reach_m) for region in regions)
+
+
+def spacing(problem: Problem, angles_rad: Setting) -> float:
+    """Return the largest angle [rad] between neighbouring scan lines, or between beams of a line if that is larger."""
+    beam_step = float(np.median(np.diff(np.sort(problem.bearings_rad))))
+    fan = problem.beams_rot(angles_rad[2:])
+    return max(beam_step, float(problem.lines.step_rad * line_spacing(fan, angles_rad[2:])))
 
 
 def free_beams(problem: Problem, angles_rad: Setting, shadow: SelfOcclusion | None) -> Float[ndarray, "n 3"]:
@@ -116,9 +139,13 @@ def on_plane(
     beams: Float[ndarray, "n 3"],
     problem: Problem,
     spots: Float[ndarray, "spots 4"],
+    spacing_rad: float,
     reach_m: float,
 ) -> PlaneFigures:
-    """Return the points of beams (unit vectors in the world) on one region; `spots` are cones without beams."""
+    """Return the points of beams (unit vectors in the world) on one region.
+
+    `spots` are cones without beams, `spacing_rad` is that of lines and beams.
+    """
     corners = np.array(region.corners_m())
     sides = corners[1] - corners[0], corners[3] - corners[0]
     normal = np.cross(*sides)
@@ -130,15 +157,18 @@ def on_plane(
 
     beyond = region.share_beyond(reach_m)
     plane = _Plane(corners[0], sides[0], sides[1], problem.field, NO_SPOTS, reach_m).near()
-    away = np.linalg.norm(plane.points(_grid(CELLS)), axis=1)
+    places = plane.points(_grid(CELLS))
+    away = np.linalg.norm(places, axis=1)
     seen = ~plane.hidden(_grid(CELLS))
     if not inside.any() or not seen.any():
-        return PlaneFigures(region.words(), reach_m, beyond, 0, 0.0, AT_M, np.inf, np.inf, np.inf)
+        return PlaneFigures(region.words(), reach_m, beyond, 0, 0.0, 1.0, AT_M, np.inf, np.inf, np.inf)
     area_m2 = float(np.linalg.norm(np.cross(plane.along, plane.across)) * seen.mean())
     at_m = float(np.clip(AT_M, away[seen].min(), away[seen].max()))
     from scipy.spatial import cKDTree  # a heavy import that few tasks need
 
     nearest = cKDTree(ends).query  # also of points just outside the region, which limit gaps too
+    chord = 2 * np.sin(spacing_rad / 2)
+    beam_off = cKDTree(beams[facing]).query((places / away[:, None])[seen], distance_upper_bound=chord)[0]
     there = at_m * (1 - RING), at_m * (1 + RING)
     return PlaneFigures(
         region.words(),
@@ -146,6 +176,7 @@ def on_plane(
         beyond,
         int(inside.sum()) * problem.lines.repeats,
         float(inside.sum() * problem.lines.repeats / area_m2),
+        float(np.isinf(beam_off).mean()),
         at_m,
         200 * plane.widest(nearest, 1, there),
         200 * replace(plane, spots=spots).widest(nearest, 1, there),

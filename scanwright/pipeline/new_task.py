@@ -111,7 +111,7 @@ def task_text(answers: Answers, products: Catalogue, command: str, path: Path) -
         "alpha_laser_deg = [-90, 90]",
         "beta_laser_deg = [-90, 90]",
         "",
-        *density_lines(things),
+        *density_lines(things, regions, answers.height_m),
         *(line for word, numbers in regions for line in region_lines(word, numbers, answers.height_m)),
         *_mask(answers, path.parent),
         *DECK,

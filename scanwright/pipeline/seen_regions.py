@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from scanwright.design.errors import TaskError, suggest
 from scanwright.design.files.faults import faults_in
 from scanwright.design.task.shapes import Region
-from scanwright.design.task.task import SMALLEST_BALL_DEG, Task
+from scanwright.design.task.task import SMALLEST_BALL_DEG, DensityRules, Task
 
 Numbers = tuple[float, ...]
 _REGION: TypeAdapter[Region] = TypeAdapter(Region)
@@ -26,6 +26,9 @@ SEEN: dict[str, tuple[str, Numbers]] = {
     "thing": ("thing:SIZE:DISTANCE, what it must not miss anywhere in the rest", (0.1, 3.0)),
 }
 """Word of a region -> its form, and the defaults of its numbers."""
+FLAT = 6  # balls across the angle from level to the far end of the ground
+FLATTEST_BALL_DEG = 0.5  # smaller balls hold few beams of usual lidars
+_USUAL_BALL_RAD = math.radians(DensityRules().ball_radius_deg)
 _SIGNED = {"FROM", "TO", "HEADING"}  # these numbers can be negative
 
 
@@ -69,14 +72,26 @@ def known_regions() -> str:
     return "; ".join(how for how, _ in SEEN.values())
 
 
-def density_lines(things: Sequence[Numbers]) -> list[str]:
-    """Return lines of a task file that set the ball radius to half the width of the smallest thing to see.
+def density_lines(things: Sequence[Numbers], regions: Sequence[tuple[str, Numbers]], height_m: float) -> list[str]:
+    """Return lines of a task file that set the ball radius: half the width of the smallest thing to see.
+
+    Without things it becomes a small share of the angle at which flat ground appears, since J counts ground within
+    the ball radius of a beam as seen. `height_m` is that of the scanner above the ground.
 
     Raises:
         TaskError: a size or a distance is not above 0, or the thing is too small for a ball.
     """
     if not things:
-        return []
+        far_m = max((numbers[1] for word, numbers in regions if word == "ground"), default=0.0)
+        if not 0 < height_m < far_m * math.tan(FLAT * _USUAL_BALL_RAD):
+            return []
+        angle_deg = math.degrees(math.atan2(height_m, far_m))
+        return [
+            f"[density]  # {far_m:g} m away the ground is {angle_deg:.2g} deg below level: a usual ball of "
+            f"{math.degrees(_USUAL_BALL_RAD):g} deg would count as seen what no beam reaches",
+            f"ball_radius_deg = {max(FLATTEST_BALL_DEG, angle_deg / FLAT):.2g}",
+            "",
+        ]
     size_m, distance_m = min(things, key=lambda each: each[0] / each[1] if each[1] > 0 else 0.0)
     if not (size_m > 0 and distance_m > 0):
         raise TaskError(f"see = 'thing:{size_m:g}:{distance_m:g}': size and distance must be above 0")

@@ -124,6 +124,34 @@ def test_the_spot_around_the_axis_is_told_apart_from_the_gaps_elsewhere():
     assert "around the axis" not in through.words()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_area_without_points_is_that_of_the_blind_cone(seed):
+    """A wall across the axis: the fan goes around a disc of it, and J counts a part of that as seen."""
+    rng = np.random.default_rng(seed)
+    cone_deg, distance_m, side_m = rng.uniform(3, 12), rng.uniform(2, 3), rng.uniform(1.6, 2.5)
+    wall = {"shape": "wall", "distance_m": distance_m, "width_m": side_m, "height_m": side_m / 2, "top_m": side_m}
+    task = load_task(
+        {
+            "name": "t",
+            "sensor": "UST-10LX",
+            "servo": "MX-64R",
+            "slip_ring": "UH1256-02-0610-06S",
+            "motion": {"period_s": 20},
+            "weight": [wall],
+        }
+    )
+    (found,) = on_planes(task, problem_of(task), np.radians((0.0, 90.0, 90.0 - cone_deg, 0.0)))
+    spacing_deg = 360 / (20 * 40)  # of lines, more than that of beams
+    disc_m2 = pi * (distance_m * np.tan(np.radians(cone_deg - spacing_deg))) ** 2
+    assert found.empty_share == pytest.approx(disc_m2 / side_m**2, abs=0.005)
+    warning = found.empty(radians(2.0))
+    assert (warning is not None) == (found.empty_share > 0.01)
+    assert warning is None or f"{100 * found.empty_share:.0f}% of the area of wall" in warning.message
+    (swept,) = on_planes(task, problem_of(task), np.radians((0.0, 90.0, 90.0, 0.0)))
+    assert swept.empty_share == 0
+    assert swept.empty(radians(2.0)) is None
+
+
 def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams):
     behind = {"shape": "band", "phi_deg": [0, 180]}
     task = loaded(GROUND, mask=[behind])
@@ -135,9 +163,9 @@ def test_what_is_masked_is_no_part_of_it_and_what_no_beam_reaches_is_said(beams)
     tried_m = emptiest(left, 2, [(x, y) for x in np.arange(1, 3.81, 0.05) for y in np.arange(-1, 0, 0.05)])
     assert 2 * tried_m <= half.twice_cm / 100 * (1 + 1e-9) <= (2 * tried_m + 0.1) * (1 + SLACK) * (1 + 1e-9)
     region = task.task.weight[0]
-    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)), np.empty((0, 4)), 4.0)
+    none = on_plane(region, np.array([[0.0, 0.0, 1.0]]), problem_of(loaded(GROUND)), np.empty((0, 4)), 0.01, 4.0)
     inf = float("inf")
-    assert none == PlaneFigures("ground 1 to 3.8 m ahead", 4.0, 0.0, 0, 0.0, AT_M, inf, inf, inf)
+    assert none == PlaneFigures("ground 1 to 3.8 m ahead", 4.0, 0.0, 0, 0.0, 1.0, AT_M, inf, inf, inf)
     assert none.words() == "ground 1 to 3.8 m ahead: no beam of a full scan ends there"
     assert on_planes(loaded({"shape": "all"}), problem_of(loaded({"shape": "all"})), np.zeros(4)) == ()
 

@@ -87,6 +87,14 @@ def test_what_was_asked_for_stands_in_the_file(command, here):
     assert (here / "FILE.toml").read_text() == text
 
 
+def test_flat_ground_gets_a_smaller_ball(command, here):
+    """J counts ground within the ball radius of a beam as seen: far away that may be a metre."""
+    for far_m, ball_deg in ((1, 2.0), (4, 1.1), (20, 0.5)):
+        assert command("new", "flat", *DOG[:4], "--height-m", "0.45", "--see", f"ground:0.5:{far_m}")[0] == 0
+        assert load_task(here / "flat.toml").task.density.ball_radius_deg == ball_deg
+        (here / "flat.toml").unlink()
+
+
 def test_every_thing_that_can_be_seen_and_a_robot_below(command, here):
     words = [word for each in SEEN for word in ("--see", each)]
     box = ["--robot", "box:0.6:0.3:0.3", "--ahead-m", "0.2"]
