@@ -8,12 +8,13 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr
 from pydantic_core import to_jsonable_python
 
+from scanwright.design.files.faults import USB_ID
 from scanwright.design.files.record import Record
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Box = tuple[Triple, Triple]
-UsbId = Annotated[str, Field(pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")]
+UsbId = Annotated[str, Field(pattern=USB_ID)]
 
 
 def absent(value: object) -> bool:

@@ -14,6 +14,12 @@ from scanwright.design.errors import suggest
 from scanwright.design.files.text_files import read_text
 
 MOST_REPORTED = 20  # faults of one file: about one screen
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
+USB_ID = "^[0-9a-f]{4}:[0-9a-f]{4}$"
+_PATTERNS = {
+    NAME: "1 to 64 letters, digits, - and _, the first a letter or a digit",
+    USB_ID: "vendor and product as two times four hexadecimal digits, such as '10c4:ea60'",
+}
 _LONGEST_STATEMENT = 1000  # lines: bounds the time that a file without an end of its statement takes
 
 
@@ -83,6 +89,8 @@ def _message(fault: Any) -> str:
     value = f" = {shown}" if len(shown) < 80 else ""
     if fault["type"] == "bool_type":
         return f"{value}: true or false, without quotes"
+    if fault["type"] == "string_pattern_mismatch":
+        return f"{value}: {_PATTERNS[fault['ctx']['pattern']]}"
     return f"{value}: {fault['msg'].removeprefix('Value error, ')}"
 
 

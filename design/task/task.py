@@ -24,7 +24,7 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.deck_holes import DeckHoles
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
-from scanwright.design.files.faults import Fault, faults_in, format_faults
+from scanwright.design.files.faults import NAME, Fault, faults_in, format_faults
 from scanwright.design.files.record import Record
 from scanwright.design.motion import Motion, Shortest, Sweep
 from scanwright.design.scanner import NO_MODULES, Modules, Scanner, scanner_of
@@ -101,7 +101,7 @@ class Limits(Record):
 class Task(Record):
     """One task file with every default written out."""
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$", description="name of the task and its build folder")
+    name: str = Field(pattern=NAME, description="name of the task and its build folder")
     sensor: str = Field(description="the 2D lidar, by its name in the catalogue")
     servo: str = Field(description="the servo, by its name in the catalogue")
     slip_ring: str | None = Field(default=None, description="the slip ring; a sweep needs none")

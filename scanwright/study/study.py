@@ -17,7 +17,7 @@ from scanwright.design.catalogue.products import Printer
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import TaskError, suggest
-from scanwright.design.files.faults import format_validation_error
+from scanwright.design.files.faults import NAME, format_validation_error
 from scanwright.design.files.record import Record
 from scanwright.design.motion import LONGEST_S, SHORTEST_S
 from scanwright.design.task.angle_ranges import AngleRanges
@@ -26,7 +26,6 @@ from scanwright.design.task.task import Limits, LoadedTask, load_task
 from scanwright.study.front import COLUMNS
 
 SHIPPED = Path(__file__).parent / "shipped"
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 NO_RING = "none"
 
 Period = Annotated[float, Field(strict=True, ge=SHORTEST_S, le=LONGEST_S)] | Literal["shortest"]
