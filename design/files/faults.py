@@ -70,7 +70,12 @@ def faults_in(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
             meant |= {(*path[:-1], key) for key in _keys(record) if near == f"; did you mean '{key}'?"}
             faults.setdefault(path, []).append(f": unknown key{near}")
         elif fault["type"] in ("union_tag_invalid", "union_tag_not_found"):
-            faults.setdefault((*path, fault["ctx"]["discriminator"].strip("'")), []).append(_message(fault))
+            message = _message(fault)
+            if fault["type"] == "union_tag_not_found":
+                key = next((part for part in reversed(fault["loc"]) if isinstance(part, str)), "")
+                tags = sorted({tag for each in _records_in(_keys(record).get(key)) for tag in _tags(each)})
+                message += f": one of {', '.join(map(repr, tags))}" if tags else ""
+            faults.setdefault((*path, fault["ctx"]["discriminator"].strip("'")), []).append(message)
         else:
             faults.setdefault(path, []).append(_message(fault))
     deepest = [path for path in faults if not any(_inside(other, path) for other in faults)]

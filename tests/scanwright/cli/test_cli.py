@@ -68,6 +68,8 @@ WRONG_TASKS = [
     (("[95, 150]", "[150, 95]"), ["weight.0", "theta_deg"]),
     (("[95, 150]", "[95, 190]"), ["weight.0", "theta_deg"]),
     (('shape = "band"', 'shape = "bond"'), ["bond", "'band'"]),
+    (('shape = "band"', ""), ["weight.0.shape", "required", "'band'"]),
+    (('name = "ground_ahead"', 'name = "a b"'), ["name = 'a b'", "letters, digits"]),
     (("period_s = 18.0", "period_s = 0"), ["motion.period_s = 0"]),
     (("period_s = 18.0", 'period_s = "18 s"'), ["motion.period_s", "18 s"]),
     (('mode = "spin"', 'mode = "wobble"'), ["motion.mode", "wobble"]),
