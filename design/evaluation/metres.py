@@ -74,7 +74,8 @@ class PlaneFigures:
         if self.gap_off_axis_cm < SPOT * self.gap_cm:
             gaps = f"gaps of {rounded(self.gap_off_axis_cm)} {at}, {rounded(self.gap_cm)} around the axis"
         twice = f"an object {rounded(self.twice_cm)} cm wide is hit twice even at the worst place"
-        return f"{self.region}: {part}{rounded(self.points_per_m2)} points per m2, {gaps}; {twice}"
+        empty = f", {100 * self.empty_share:.0f}% gets none" if self.empty_share > EMPTY else ""
+        return f"{self.region}: {part}{rounded(self.points_per_m2)} points per m2{empty}, {gaps}; {twice}"
 
     def empty(self, ball_rad: float) -> Finding | None:
         """Return a warning if a part of the area gets no points; directions within the ball radius count as seen."""

@@ -118,8 +118,7 @@ def _sees(answer: BuildAnswer) -> Card:
         headline = _capital(lost[0])
     elif cloud.hidden_regions:
         headline += ", except behind the robot"
-    warned = [each.message for each in (*cloud.empty_areas, *cloud.hidden_regions)]
-    warned = [words for words in warned if words not in lost[:1]]
+    warned = [each.message for each in cloud.hidden_regions if each.message not in lost[:1]]
     if cloud.missed_object is not None:
         headline += ", but small objects can be missed" if not lost else ""
         warned, lines = [cloud.missed_object.message.partition(":")[0], *warned], ""

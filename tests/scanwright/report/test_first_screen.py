@@ -84,6 +84,13 @@ def test_planes_are_stated_in_metres():
     loaded = ground_task()
     sees = cards(ANGLES, answer(loaded, ANGLES), None)[0]
     assert sees.text.startswith("Ground 0.5 to 3 m ahead: ") and "points per m2" in sees.text
+    built = answer(loaded, ANGLES)
+    (plane,) = built.cloud.planes
+    plane = replace(plane, empty_share=0.25)
+    cloud = replace(built.cloud, planes=(plane,), empty_areas=(plane.empty(0.02),))
+    sees = cards(ANGLES, replace(built, cloud=cloud), None)[0]
+    assert sees.headline == "25% of the area of ground 0.5 to 3 m ahead gets no points"
+    assert "points per m2, 25% gets none" in sees.text
 
 
 def test_every_motion_has_its_words():
