@@ -7,7 +7,7 @@ import numpy as np
 
 from scanwright.cad.assembly.shadow import bundles
 from scanwright.cad.checks.limits import at_most, note
-from scanwright.cad.checks.table import LINKAGE_HIDES_DEG
+from scanwright.cad.checks.table import LINKAGE_HIDES_SHARE
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.findings import Finding
@@ -38,7 +38,8 @@ def beam_checks(
     others = [triangles for name, triangles in triangles_m.items() if name not in carriers]
     beyond = own & ~_middle_hidden(scanner, np.concatenate(others))
     width, what = step * float(beyond.sum()), "beams hidden by the linkage alone"
-    return [*checks, at_most("beams_linkage", width, LINKAGE_HIDES_DEG, "deg", ALIGNMENT_LINKAGE, what)]
+    limit = LINKAGE_HIDES_SHARE * step * len(bearings)
+    return [*checks, at_most("beams_linkage", width, limit, "deg", ALIGNMENT_LINKAGE, what)]
 
 
 def _middle_hidden(scanner: Scanner, triangles_m: Array) -> Mask:
