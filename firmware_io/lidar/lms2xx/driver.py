@@ -39,8 +39,6 @@ class LmsLidar(LineDriver):
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop its stream; `model`: catalogue name, or None for the reported one."""
         self.address = address
-        self._bad_before = self._bad_scans = 0
-        self._splitter = protocol.LmsSplitter()
         self._lost_before = self._skipped = 0
         self._waiting: deque[TimedScan] = deque()
         self._count: TelegramCount | None = None
@@ -57,11 +55,6 @@ class LmsLidar(LineDriver):
     def dropped(self) -> int:
         """Missing turns between those read, by the elapsed time."""
         return self._lost_before + self._count.lost * self._interlaced if self._count else self._lost_before
-
-    @property
-    def bad_packets(self) -> int:
-        """Telegrams dropped."""
-        return self._bad_before + self._bad_scans + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
         if intensity:
@@ -85,9 +78,8 @@ class LmsLidar(LineDriver):
     def _turn(self, deadline_s: float) -> TimedScan | None:
         assert self._count is not None
         while not self._waiting:
-            telegrams, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, self._count.pause_s)
+            telegrams, arrival_ns = self._line.receive(deadline_s, self._count.pause_s)
             if not telegrams:
-                self._splitter.cut_in()
                 self._count.resume()
                 return None
             for reply in telegrams:
@@ -111,8 +103,7 @@ class LmsLidar(LineDriver):
 
     def _recognise(self, model: str | None, bauds: tuple[int, ...]) -> None:
         """Stop its stream at one of these baud rates and read its type; close the line if none answers."""
-        self._bad_before += self._splitter.bad
-        self._splitter = protocol.LmsSplitter()
+        self._line.split_by(protocol.LmsSplitter())
         with self._line.closed_on_error():
             for baud in bauds if self._line.serial is not None else (_FAST_BAUD,):
                 if self._line.serial is not None:
@@ -128,7 +119,7 @@ class LmsLidar(LineDriver):
                             break
                         continue
                     self._accept(reply.values[:-1].decode("ascii", "replace"), model)
-                    self._splitter.bad = 0  # a telegram was cut by opening the port
+                    self._line.forgive()
                     return
             raise DeviceTimeoutError(f"{self.address}: no SICK LMS 2xx answers; check power, cable and port")
 
@@ -163,7 +154,7 @@ class LmsLidar(LineDriver):
         self._line.send(request)
         deadline_s = time.monotonic() + timeout_s
         while True:
-            telegrams, _ = self._line.receive(self._splitter.feed, deadline_s)
+            telegrams: list[protocol.LmsTelegram] = self._line.receive(deadline_s)[0]
             for reply in telegrams:
                 if reply.command == command | protocol.ANSWER:
                     return reply
@@ -174,11 +165,11 @@ class LmsLidar(LineDriver):
         try:
             measured = protocol.scan(reply)
         except ProtocolError:
-            self._bad_scans += 1
+            self._bad_contents += 1
             return
         beams = self._lidar.last_step - self._lidar.first_step + 1
         if measured.range_m.size != beams:
-            self._bad_scans += 1
+            self._bad_contents += 1
             return
         if measured.status & 7 >= protocol.FATAL:
             fault = f"it reports a fault (status {measured.status:02X})"

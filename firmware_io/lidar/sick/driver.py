@@ -44,7 +44,6 @@ class SickLidar(LineDriver):
         self._stamp_at: StampAt | None = stamp_at
         self._stamps_last = stamp_at == "last_beam"
         self._measuring = False
-        self._bad_scans = 0
         self._requested_echo: int | None = None
         self._mean_filter_off = False
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
@@ -63,11 +62,6 @@ class SickLidar(LineDriver):
             self.serial_number = self._serial_number()
         self._lidar = load_catalogue().get(model or identity[0], Lidar)
         self._reset()
-
-    @property
-    def bad_packets(self) -> int:
-        """Telegrams dropped."""
-        return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
         """Return the reported operating hours, number of starts and filters."""
@@ -109,13 +103,13 @@ class SickLidar(LineDriver):
 
     def _turn(self, deadline_s: float) -> TimedScan:
         while True:
-            reply, arrival_ns = self._dialogue.next(deadline_s)
+            reply, arrival_ns = self._line.next(deadline_s)
             if (reply.word, reply.name) != (b"sSN", b"LMDscandata"):
                 continue
             try:
                 return self._timed(scan_data(reply), arrival_ns)
             except ProtocolError:
-                self._bad_scans += 1
+                self._bad_contents += 1
 
     def _halt(self) -> None:
         """Stop the telegrams, and the laser if `start` switched it on and it can be switched off."""
@@ -131,7 +125,8 @@ class SickLidar(LineDriver):
                 raise
 
     def _find(self) -> None:
-        self._dialogue.reopen()
+        self._line.reopen()
+        self._dialogue.begin()
         with self._line.closed_on_error():
             if self._serial_number() != self.serial_number:
                 raise DeviceError(f"{self._line.name}: it has another serial number")

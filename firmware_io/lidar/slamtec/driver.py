@@ -34,8 +34,6 @@ class SlamtecLidar(LineDriver):
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop its stream; `model`: catalogue name, or None for any."""
         self.address = address
-        self._bad_before = 0
-        self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
         self._turns = TurnQueue()
         self._turning = False
         self._pause_s = _PAUSE_S
@@ -47,11 +45,6 @@ class SlamtecLidar(LineDriver):
     def dropped(self) -> int:
         """Missing turns between those read."""
         return self._turns.dropped
-
-    @property
-    def bad_packets(self) -> int:
-        """Packets dropped."""
-        return self._bad_before + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
         status, code = self._dialogue.ask(protocol.HEALTH, 6, protocol.health)
@@ -70,8 +63,7 @@ class SlamtecLidar(LineDriver):
         byte_ns = self._mode.point_ns * protocol.POINTS[answer.kind] / protocol.SIZES[answer.kind]
         self._pause_s = max(_PAUSE_S, _BUFFER_BYTES * byte_ns / 1e9)
         self._turning = False
-        self._bad_before = self.bad_packets
-        self._splitter = protocol.SlamtecSplitter(self._mode.kind)
+        self._line.split_by(protocol.SlamtecSplitter(self._mode.kind))
         self._turns.restart(skip)
         self._line.drop_waiting()
         self._resume()
@@ -81,7 +73,7 @@ class SlamtecLidar(LineDriver):
 
     def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._count.arrivals)) is None:
-            received, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, self._pause_s)
+            received, arrival_ns = self._line.receive(deadline_s, self._pause_s)
             if not received:
                 self._resume()
                 return None
@@ -143,7 +135,6 @@ class SlamtecLidar(LineDriver):
 
     def _resume(self) -> None:
         """Start a new count and a new turn at the next packet."""
-        self._splitter.cut_in()
         self._turns.resume()
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
         self._last_ns = 0
