@@ -25,8 +25,7 @@ from scanwright.firmware_io.servo.find import find_servo, open_bus
 from scanwright.firmware_io.servo.fitness import mode_changes
 from scanwright.firmware_io.servo.guard import SILENCE_S, Guard
 from scanwright.firmware_io.servo.prepare import prepare, set_agreed
-from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
-from scanwright.firmware_io.servo.reading import state_of
+from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow, state_of
 
 _GENTLE_RAD_S = 0.5  # to the end of the range of an AX-12A, if it begins to hold in its dead sector
 

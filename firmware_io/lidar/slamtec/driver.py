@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import struct
 from contextlib import suppress
+from dataclasses import dataclass
+from typing import Literal
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
@@ -16,8 +18,29 @@ from scanwright.firmware_io.lidar.sensor_line import TURN_S, LineDriver
 from scanwright.firmware_io.lidar.slamtec import protocol
 from scanwright.firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
-from scanwright.firmware_io.lidar.slamtec.series import SERIES
 from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One series."""
+
+    models: tuple[str, ...]  # catalogue names, first that of a sensor whose model is not named
+    bauds: tuple[int, ...]  # A2M8: 115,200
+    motor: Literal["dtr", "pwm", "rpm", "scan"]  # signal or request that starts the motor
+
+
+# by the upper half of the model byte (rplidar_sdk 2.1)
+SERIES = {
+    1: Series(("RPLIDAR A1",), (115_200,), "dtr"),
+    2: Series(("RPLIDAR A2",), (256_000, 115_200), "pwm"),
+    3: Series(("RPLIDAR A3",), (256_000,), "pwm"),
+    4: Series(("RPLIDAR C1",), (460_800,), "scan"),
+    6: Series(("RPLIDAR S1",), (256_000,), "rpm"),
+    7: Series(("RPLIDAR S2", "RPLIDAR S2L"), (1_000_000,), "rpm"),
+    8: Series(("RPLIDAR S3",), (1_000_000, 460_800), "rpm"),  # 460,800: model 0x82
+}
+
 
 _START_S = 3.0  # longest wait for the first turn while the motor starts
 _TRIES = 3  # the first reply can be lost in the stream
