@@ -18,7 +18,6 @@ from contextlib import suppress
 from pathlib import Path
 from pkgutil import resolve_name
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Self
 
 from scanwright.design.errors import DeviceError, removal
@@ -83,7 +82,7 @@ class ServoEmulator:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -28,7 +28,10 @@ _PAUSE = 5  # telegrams that fit in the 4095 bytes of a terminal (Linux, n_tty.c
 
 
 class TelegramCount:
-    """Numbers telegrams since the stream began; `arrivals` converts their count to host time."""
+    """Numbers telegrams since the stream began; `arrivals` converts their count to host time.
+
+    It distinguishes late telegrams from lost ones.
+    """
 
     def __init__(self, period_ns: float, telegram_ns: int, patience: int) -> None:
         """`patience`: further telegrams after which a late one is numbered as following lost ones."""
