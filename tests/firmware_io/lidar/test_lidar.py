@@ -337,6 +337,30 @@ def test_a_reply_that_waits_for_a_late_host_counts(monkeypatch):
             line.receive(time.monotonic() - 10.0)
 
 
+def test_lost_packets_count_across_splitters_and_those_of_a_dropped_buffer_do_not(monkeypatch):
+    good = protocol.reply(b"QT", "00")
+    monkeypatch.setattr(sensor_line, "_SETTLE_S", 0.0)
+    monkeypatch.setattr(sensor_line, "open_stream", lambda _: AsleepStream(b""))
+    line = sensor_line.SensorLine("wire", protocol.LONGEST_REPLY)
+    line.stream.read = lambda _: line.pieces.pop(0) if line.pieces else b""
+    for lost in (1, 2):
+        line.split_by(protocol.Splitter())
+        line.pieces = [b"junk\n\n", good]
+        assert line.next(time.monotonic() + 10.0)[0].echo == b"QT"
+        assert line.bad == lost
+    line.forgive()
+    assert line.bad == 1  # of the first splitter
+    line.pieces = [b"QT\n00", b"", b""]
+    with pytest.raises(DeviceTimeoutError):
+        line.receive(time.monotonic() - 1.0)
+    line.drop_waiting()
+    line.pieces = [good]
+    assert line.next(time.monotonic() - 1.0)[0].echo == b"QT"  # not appended to the half of the dropped one
+    driver = sensor_line.LineDriver()
+    driver._line, driver._bad_contents = line, 2
+    assert driver.bad_packets == 3
+
+
 class Chatter:
     """A port on which garbage never ends."""
 
