@@ -17,7 +17,7 @@ from unittest.mock import patch
 
 from benchmarks.firmware_io.devices.damaged_lidars import LANGUAGES
 from scanwright.design.errors import DeviceError
-from scanwright.firmware_io.emulators.servo import dynamixel_packets, feetech_packets
+from scanwright.firmware_io.emulators.servo import dynamixel_packets
 from scanwright.firmware_io.servo.bus import bus, serial_line
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.packet_format import PacketFormat
@@ -150,7 +150,7 @@ SERVOS: dict[str, tuple[PacketFormat, Statuses]] = {
         PROTOCOL_2,
         lambda error, data: (dynamixel_packets.status("2.0", 1, error, data), plain(error, data)),
     ),
-    "servo STS": (STS, lambda error, data: (feetech_packets.status(1, error, data),)),
+    "servo STS": (STS, lambda error, data: (dynamixel_packets.status("1.0", 1, error, data),)),
 }
 
 

@@ -29,7 +29,7 @@ from scanwright.firmware_io.clouds.cloud import (
     pose_numbers,
     with_header,
 )
-from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts, survey
+from scanwright.firmware_io.clouds.parts import CloudSurvey, Parts, survey
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _PREFIX, _URI = "sw", "urn:scanwright:cloud:1"

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Float32, Float64, Int64
 from numba import njit
 from numpy import ndarray
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from scanwright.design.arrays import Array, Floats, Ints
 
@@ -27,7 +28,7 @@ def outliers(points_m: Float[ndarray, "n 3"], sigmas: float, neighbours: int = N
     k = min(neighbours, count - 1)
     if k < 1:
         return np.zeros(count, bool)
-    apart_m = np.concatenate([d[:, 1:].mean(axis=1) for d, _ in _nearest(points_m, k + 1)])
+    apart_m = np.concatenate([d[:, 1:].mean(axis=1) for _, d, _ in nearest(cKDTree(points_m), points_m, k + 1)])
     return apart_m > apart_m.mean() + sigmas * apart_m.std()
 
 
@@ -52,28 +53,24 @@ def normals(
     if len(points_m) < 3:
         return normals
     points = np.asarray(points_m, float)
-    begin = 0
-    for _, index in _nearest(points, min(neighbours + 1, len(points))):
-        here = slice(begin, begin + len(index))
+    for here, _, index in nearest(cKDTree(points), points, min(neighbours + 1, len(points))):
         near = points[index] - points[index].mean(axis=1, keepdims=True)
         _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
         normal: Floats = axes[:, :, 0]
         towards = np.broadcast_to(seen_from_m, points.shape)[here] - points[here]
         away = np.sum(normal * towards, axis=1) < 0
         normals[here] = np.where(away[:, None], -normal, normal)
-        begin += len(index)
     return normals
 
 
-def _nearest(
-    points_m: Float[ndarray, "n 3"], count: int
-) -> Iterator[tuple[Float64[ndarray, "m k"], Int64[ndarray, "m k"]]]:
-    """Yield distances and indices of the nearest points, including the point itself, (m, count) at a time."""
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(points_m)
-    for begin in range(0, len(points_m), _AT_ONCE):
-        yield tree.query(points_m[begin : begin + _AT_ONCE], count, workers=-1)
+def nearest(
+    tree: cKDTree, points: Float[ndarray, "n 3"], count: int, reach: float = np.inf
+) -> Iterator[tuple[slice, Float64[ndarray, "m k"], Int64[ndarray, "m k"]]]:
+    """Yield rows, and distances and indices of their nearest in the tree; inf and the tree's size without one."""
+    for begin in range(0, len(points), _AT_ONCE):
+        here = slice(begin, begin + _AT_ONCE)
+        off, index = tree.query(points[here], count, distance_upper_bound=reach, workers=-1)
+        yield here, off, index
 
 
 def voxel_of(points_m: Floats, edge_m: float, level: NDArray[np.uint8] | None = None) -> Ints:

@@ -17,7 +17,7 @@ from scanwright.design import frames
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import COLUMN_TYPES, Cloud, Column, colour_bytes, headlines, with_header
-from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts, survey
+from scanwright.firmware_io.clouds.parts import CloudSurvey, Parts, survey
 from scanwright.firmware_io.foreign import foreign
 
 _HEADER = struct.Struct("<94xHII")  # size of the header, byte of the first point, number of records before it

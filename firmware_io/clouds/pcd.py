@@ -30,7 +30,7 @@ from scanwright.firmware_io.clouds.cloud import (
     pose_matrix,
     pose_numbers,
 )
-from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
+from scanwright.firmware_io.clouds.parts import CloudSurvey, Parts
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.firmware_io.clouds.cloud import Cloud, as_type, cloud_from_rows, cloud_rows, headlines
-from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
+from scanwright.firmware_io.clouds.parts import CloudSurvey, Parts
 from scanwright.firmware_io.clouds.text import read_numbers
 from scanwright.firmware_io.foreign import foreign, of_file
 

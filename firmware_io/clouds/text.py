@@ -23,7 +23,7 @@ from scanwright.design.errors import RecordingError
 from scanwright.design.files.atomic_file import atomic_write
 from scanwright.design.files.text_files import read_text
 from scanwright.firmware_io.clouds.cloud import Cloud, Column, as_type, cloud_rows, headlines, with_header
-from scanwright.firmware_io.clouds.streams.parts import CloudSurvey, Parts
+from scanwright.firmware_io.clouds.parts import CloudSurvey, Parts
 from scanwright.firmware_io.foreign import foreign, of_file
 
 _DIGITS = {"<f4": "%.9g", "<f8": "%.17g"}  # the fewest for an exact round trip

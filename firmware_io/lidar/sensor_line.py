@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import Any, Protocol, Self
 
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, UnsafeError, UnsafeNote
@@ -27,11 +27,21 @@ _READ_S = 0.05  # longest timeout of one read, so that a much later return shows
 _SETTLE_S = 0.03  # adapters and sensors send the rest of their buffers within this
 _READS = 10_000  # without finding the port empty
 
-Packet = TypeVar("Packet")
+
+class PacketSplitter(Protocol):
+    """Splitter of a byte stream into packets; skips other bytes."""
+
+    bad: int  # packets lost
+
+    def feed(self, data: bytes, /) -> list[Any]:
+        """Return the packets that these bytes complete."""
+
+    def cut_in(self) -> None:
+        """Expect the middle of a packet next, and do not count it as bad."""
 
 
 class SensorLine:
-    """Open connection to one sensor.
+    """Open connection to one sensor; call `split_by` before `receive`.
 
     Attributes:
         address: serial port, or HOST:PORT.
@@ -41,6 +51,9 @@ class SensorLine:
 
     def __init__(self, address: str, longest: int) -> None:
         self.address, self.longest, self.received = address, longest, 0
+        self._bad_before = 0
+        self._splitter: PacketSplitter | None = None
+        self._waiting: deque[tuple[Any, int]] = deque()
         self._open(address)
 
     @property
@@ -53,18 +66,39 @@ class SensorLine:
         """The serial port; None for TCP."""
         return self.stream if isinstance(self.stream, SerialStream) else None
 
+    @property
+    def bad(self) -> int:
+        """Number of packets lost."""
+        return self._bad_before + (self._splitter.bad if self._splitter else 0)
+
+    def split_by(self, splitter: PacketSplitter) -> None:
+        """Drop received packets, and split the next bytes by another splitter."""
+        self._bad_before = self.bad
+        self._splitter = splitter
+        self._waiting.clear()
+
+    def forgive(self) -> None:
+        """Do not count the packets lost since `split_by`: opening the port cuts one."""
+        if self._splitter:
+            self._splitter.bad = 0
+
     def send(self, data: bytes) -> None:
-        """Send all bytes."""
+        """Drop received packets, and send all bytes."""
+        self._waiting.clear()
         with self.broken_line_as_error():
             self.stream.write(data)
 
-    def receive(
-        self, feed: Callable[[bytes], list[Packet]], deadline_s: float, pause_s: float = math.inf
-    ) -> tuple[list[Packet], int]:
+    def next(self, deadline_s: float) -> tuple[Any, int]:
+        """Return the next packet and its arrival; raises as `receive`."""
+        if not self._waiting:
+            packets, arrival_ns = self.receive(deadline_s)
+            self._waiting.extend((packet, arrival_ns) for packet in packets)
+        return self._waiting.popleft()
+
+    def receive(self, deadline_s: float, pause_s: float = math.inf) -> tuple[list[Any], int]:
         """Return the next complete packets and their arrival [ns, time.monotonic_ns].
 
         Args:
-            feed: splitter of the received bytes.
             deadline_s: on time.monotonic.
             pause_s: longest time between two reads. After a longer one, all waiting bytes are dropped and no packet is
                 returned.
@@ -73,6 +107,7 @@ class SensorLine:
             DeviceTimeoutError: no complete packet in time.
             DeviceError: the connection broke.
         """
+        assert self._splitter
         late_bytes = 0
         while True:
             over = time.monotonic() > deadline_s  # before the read, so bytes that waited in a pause still count
@@ -82,7 +117,7 @@ class SensorLine:
             if arrival_ns - read_ns > pause_s * 1e9:
                 self.drop_waiting()
                 return [], self._read_ns
-            packets = feed(received)
+            packets = self._splitter.feed(received)
             if packets:
                 return packets, arrival_ns
             late_bytes += len(received) if over else 0
@@ -94,6 +129,8 @@ class SensorLine:
         settled_s = time.monotonic() + _SETTLE_S
         for _ in range(_READS):
             if not self._read(settled_s - time.monotonic()) and time.monotonic() >= settled_s:
+                if self._splitter:
+                    self._splitter.cut_in()
                 return
         raise DeviceTimeoutError(f"{self.name}: it sends faster than this computer reads; end other programs")
 
@@ -157,6 +194,7 @@ class LineDriver:
     _warning = ""
     _clusters = False  # whether beams can share a value
     _until_s = math.inf  # end of the present attempt to reconnect
+    _bad_contents = 0  # packets with impossible content
 
     @property
     def model(self) -> str:
@@ -167,6 +205,11 @@ class LineDriver:
     def scan_rate_hz(self) -> float:
         """Turns per second, by the catalogue."""
         return self._lidar.scan_rate_hz
+
+    @property
+    def bad_packets(self) -> int:
+        """Packets dropped."""
+        return self._bad_contents + self._line.bad
 
     def condition(self) -> tuple[str, ...]:
         """Return no lines; a family that reports age or state overrides this."""
@@ -244,9 +287,7 @@ class LineDriver:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             self.stop()
         except DeviceError as unsafe:

@@ -6,23 +6,23 @@ appeared or disappeared. Unusable input raises RecordingError.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float64
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
 from scanwright.design.arrays import Floats, Vector
 from scanwright.design.errors import RecordingError
+from scanwright.firmware_io.clouds.filters import nearest
 
 _BEAMS = 10  # fewer can be on one side of a point, or miss a thin object: benchmarks/firmware_io/mapping/
 _REACH = 2.0  # times the median angle to the tenth beam, beyond which a place was not observed
 _SAMPLE = 2000  # beams for that median
 _NEIGHBOURS = 8  # of a point, for the majority
 _NEAR_M = 0.15  # largest distance of neighbours on one object
-_AT_ONCE = 1 << 16  # points, to bound the memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ def seen_through(positions: Sequence[Stand], beyond_m: float = 0.1) -> list[Bool
             if other != k:
                 left = np.flatnonzero(~moved[other])
                 towards, point_m = _directions(positions[other].points_m[left], eye_m)
-                for here, off, beam in _nearest(tree, towards, _BEAMS, reach):
+                for here, off, beam in nearest(tree, towards, _BEAMS, reach):
                     behind = ends_m[beam].min(axis=1) > point_m[here] + beyond_m
                     moved[other][left[here]] = np.isfinite(off).all(axis=1) & behind
     return [_as_neighbours(stand.points_m, mask) for stand, mask in zip(positions, moved, strict=True)]
@@ -83,16 +83,6 @@ def _as_neighbours(points_m: Float64[ndarray, "n 3"], moved: Bool[ndarray, " n"]
         return moved
     marked = np.zeros_like(moved)
     padded = np.append(moved, False)
-    for here, off, index in _nearest(cKDTree(points_m), points_m, _NEIGHBOURS + 1, _NEAR_M):
+    for here, off, index in nearest(cKDTree(points_m), points_m, _NEIGHBOURS + 1, _NEAR_M):
         marked[here] = 2 * padded[index].sum(axis=1) > np.isfinite(off).sum(axis=1)
     return marked
-
-
-def _nearest(
-    tree: cKDTree, points: Float64[ndarray, "n 3"], count: int, reach: float
-) -> Iterator[tuple[slice, Float64[ndarray, "m k"], Int64[ndarray, "m k"]]]:
-    """Yield rows, and distances and indices of their nearest in the tree; inf and the tree's size without one."""
-    for begin in range(0, len(points), _AT_ONCE):
-        here = slice(begin, begin + _AT_ONCE)
-        off, index = tree.query(points[here], count, distance_upper_bound=reach, workers=-1)
-        yield here, off, index

@@ -38,8 +38,7 @@ from scanwright.firmware_io.recording.mcap_chunks import (
     read_topics,
     rests_in_scans,
 )
-from scanwright.firmware_io.recording.message_batches import blocks_in, joints_in
-from scanwright.firmware_io.recording.ros_messages import Beams
+from scanwright.firmware_io.recording.ros_messages import Beams, blocks_in, joints_in
 from scanwright.firmware_io.samples import Block, JointLog, Scan, blocks
 
 SCAN_TOPIC = "/scan"

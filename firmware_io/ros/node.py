@@ -45,9 +45,8 @@ from scanwright.firmware_io.assembly.own_body import OwnBody
 from scanwright.firmware_io.assembly.streaming import Assembler, ScanPoints
 from scanwright.firmware_io.recording import ros_messages
 from scanwright.firmware_io.ros.drive import Interrupted
-from scanwright.firmware_io.ros.point_rows import in_rot, point_rows, turn_rows
+from scanwright.firmware_io.ros.point_rows import Turns, in_rot, point_rows, turn_rows
 from scanwright.firmware_io.ros.robot_frames import fixed_frames
-from scanwright.firmware_io.ros.turns import Turns
 from scanwright.firmware_io.samples import JointSample, Scan
 
 PointsFrame = Literal["world", "rot"]

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from types import TracebackType
 from typing import NoReturn, Self
 
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -25,8 +24,7 @@ from scanwright.firmware_io.servo.find import find_servo, open_bus
 from scanwright.firmware_io.servo.fitness import mode_changes
 from scanwright.firmware_io.servo.guard import SILENCE_S, Guard
 from scanwright.firmware_io.servo.prepare import prepare, set_agreed
-from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
-from scanwright.firmware_io.servo.reading import state_of
+from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow, state_of
 
 _GENTLE_RAD_S = 0.5  # to the end of the range of an AX-12A, if it begins to hold in its dead sector
 
@@ -69,7 +67,7 @@ class ServoDriver:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             self.close()
         except DeviceError as unsafe:

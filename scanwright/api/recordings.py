@@ -158,7 +158,7 @@ def _platform(recording: Path, options: AssembleOptions) -> tuple[Trajectory | N
     if trajectory is None:
         raise RecordingError("`imu` requires `poses`")
     from scanwright.firmware_io.poses.gyro import oriented
-    from scanwright.firmware_io.poses.gyro_files import imu_mount, load_gyro
+    from scanwright.firmware_io.poses.pose_files import imu_mount, load_gyro
 
     gyro = load_gyro(options.imu, recording)
     return oriented(trajectory, gyro, imu_mount(options.imu_rpy_deg, gyro, trajectory.platform, recording))

@@ -15,7 +15,7 @@ from scanwright.design.motion import Spin
 from scanwright.firmware_io.calibration import entropy
 from scanwright.firmware_io.emulators.scanner import emulated_scanner
 from scanwright.firmware_io.emulators.world import room
-from scanwright.firmware_io.recording.bag_export import export_bag
+from scanwright.firmware_io.recording.convert import export_bag
 
 FUNCTIONS = {name for name, value in vars(api).items() if isfunction(value)}
 OF_BUILDS = {"build", "make_parts", "check"}

@@ -24,7 +24,7 @@ _AT_ONCE = 1_000_000
 _CONVERT = """
 import resource, sys
 from pathlib import Path
-from scanwright.firmware_io.clouds.streams.stream import stream
+from scanwright.firmware_io.clouds.formats import stream
 written = stream(Path(sys.argv[1]), Path(sys.argv[2]), least_bytes=0)
 print(written.rows, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """

@@ -14,7 +14,7 @@ from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.motion import Spin
 from scanwright.firmware_io.clouds.cloud import Cloud
 from scanwright.firmware_io.clouds.formats import write_clouds
-from scanwright.firmware_io.recording.bag_export import export_bag
+from scanwright.firmware_io.recording.convert import export_bag
 from scanwright.firmware_io.recording.recording import recording_writer
 from scanwright.firmware_io.samples import Scan
 

@@ -16,13 +16,14 @@ import tty
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from pkgutil import resolve_name
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Self
 
+from scanwright.design.errors import DeviceError, removal
 from scanwright.firmware_io.emulators.servo.machine import ServoMachine, answers
-from scanwright.firmware_io.emulators.servo.models import machine_of
 from scanwright.firmware_io.emulators.servo_plant import Load
+from scanwright.firmware_io.servo.families import all_families, all_tables
 from scanwright.firmware_io.servo.fitness import set_up_counts
 
 _TICK_S = 0.02  # between two checks of its protection
@@ -81,7 +82,7 @@ class ServoEmulator:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -224,3 +225,15 @@ def _client_baud(master: int) -> float:
     if sys.platform == "linux":  # TCGETS2: the only request with non-standard rates
         return float(struct.unpack("=36x2I", fcntl.ioctl(master, 0x802C542A, bytes(44)))[1])
     return float(termios.tcgetattr(master)[5])
+
+
+def machine_of(model: str, protocol: str | None, load: Load, time_ns: int, angle_rad: float) -> ServoMachine:
+    """Return an emulated servo with power, or raise DeviceError; `protocol` None: the factory setting."""
+    for family in all_families().values():
+        for table in family.tables:
+            if table.model == model and protocol in (None, table.protocol):
+                made: ServoMachine = resolve_name(family.emulator)(table, load, time_ns, angle_rad)
+                return made
+    there = ", ".join(f"{table.model} with {table.protocol}" for table in all_tables())
+    name = model if protocol is None else f"{model} with {protocol}"
+    raise DeviceError(f"there is no emulator of a servo {name}; {removal(model) or f'there are: {there}'}")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from scanwright.firmware_io.emulators.servo import feetech_packets
+from scanwright.firmware_io.emulators.servo.dynamixel_packets import status, take
 from scanwright.firmware_io.emulators.servo.machine import BROADCAST, OVERLOAD, Request, ServoMachine
 from scanwright.firmware_io.emulators.servo.memory import TableItem, ro, rw
 from scanwright.firmware_io.emulators.servo_plant import Actuation, Load
@@ -62,7 +62,7 @@ class FeetechMachine(ServoMachine):
 
     def take(self, buffer: bytearray) -> Request | None:
         """As `ServoMachine.take`."""
-        return feetech_packets.take(buffer)
+        return take(buffer, "1.0")  # frame and sum are those of the Dynamixel
 
     def in_turn(self, request: Request) -> tuple[int, ...] | None:
         """As `ServoMachine.in_turn`."""
@@ -71,7 +71,7 @@ class FeetechMachine(ServoMachine):
     def statuses(self, request: Request, answers: Sequence[tuple[int, int, bytes]]) -> list[bytes]:
         """As `ServoMachine.statuses`."""
         del request
-        return [feetech_packets.status(*answer) for answer in answers]
+        return [status("1.0", *answer) for answer in answers]
 
     def answer(self, request: Request, now_ns: int) -> tuple[int, bytes] | None:
         """Execute a request; return status byte and data of the reply, None without a reply."""

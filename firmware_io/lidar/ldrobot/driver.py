@@ -72,8 +72,6 @@ class LdrobotLidar(LineDriver):
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it; without `model`, choose the first product of the catalogue whose rate of points fits."""
         self.address = address
-        self._bad_before = 0
-        self._splitter = protocol.LdrobotSplitter()
         self._turns = TurnQueue()
         self._line = SensorLine(address, 2 * protocol.SIZE)
         self._lidar = self._recognised(model)
@@ -83,11 +81,6 @@ class LdrobotLidar(LineDriver):
         """Missing turns between those read."""
         return self._turns.dropped
 
-    @property
-    def bad_packets(self) -> int:
-        """Packets dropped."""
-        return self._bad_before + self._splitter.bad
-
     def _begin(self, intensity: bool, skip: int) -> None:
         self._intensity = intensity
         self._turns.restart(skip)
@@ -96,12 +89,11 @@ class LdrobotLidar(LineDriver):
     def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._arrivals)) is None:
             pause_s = _PAUSE_S if self._clock.is_known else _FIRST_PAUSE_S
-            packets, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, pause_s)
+            packets, arrival_ns = self._line.receive(deadline_s, pause_s)
             if packets and self._arrivals.is_behind:
                 self._line.drop_waiting()
                 packets = []
             if not packets:
-                self._splitter.cut_in()
                 self._resume()
                 return None
             for packet in packets:
@@ -117,14 +109,13 @@ class LdrobotLidar(LineDriver):
         """Detect model and baud rate; close the line if nothing is received."""
         products = [product for product in load_catalogue() if isinstance(product, Lidar) and product.name in _BAUDS]
         named = [product for product in products if model in (None, product.name)]
-        self._bad_before = self.bad_packets
         with self._line.closed_on_error():
             for baud in dict.fromkeys(_BAUDS[product.name] for product in named):
                 if self._line.serial is not None:
                     self._line.serial.baud = baud
-                self._splitter = protocol.LdrobotSplitter()
+                self._line.split_by(protocol.LdrobotSplitter())
                 points_s = self._points_s()
-                self._splitter.bad = 0  # the first packet was cut by opening the port
+                self._line.forgive()
                 if points_s is None:
                     continue
                 by_speed = [(abs(math.log(points_s / _points_s(product))), product) for product in products]
@@ -143,7 +134,7 @@ class LdrobotLidar(LineDriver):
         rates: list[float] = []
         while len(rates) < _FIRST:
             try:
-                packets, _ = self._line.receive(self._splitter.feed, deadline_s)
+                packets, _ = self._line.receive(deadline_s)
             except DeviceTimeoutError:
                 return None
             rates += [packet.speed_deg_s / packet.step_deg for packet in packets if packet.step_deg > 0]
@@ -165,7 +156,7 @@ class LdrobotLidar(LineDriver):
         span_deg = packet.step_deg * protocol.POINTS
         most_deg = 1.5 * protocol.POINTS * packet.speed_deg_s / _points_s(self._lidar)
         if not 0 < span_deg <= most_deg:  # start and end are of different packets
-            self._bad_before += 1
+            self._bad_contents += 1
             return
         if arrival_ns - self._last_ns > _SILENCE_NS:
             self._resume()

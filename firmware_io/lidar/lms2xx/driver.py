@@ -6,6 +6,7 @@ sends no timestamps: telegrams are evenly spaced, and their count is the clock. 
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 
@@ -14,11 +15,75 @@ import numpy as np
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError, ProtocolError
+from scanwright.firmware_io.lidar.arrival_line import ArrivalLine
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.lms2xx import protocol
-from scanwright.firmware_io.lidar.lms2xx.telegram_count import TelegramCount
+from scanwright.firmware_io.lidar.lms2xx.protocol import LmsScan
 from scanwright.firmware_io.lidar.sensor_line import LineDriver, SensorLine
 from scanwright.firmware_io.samples import Scan
+
+_RATE_MAX = 1e-2  # of its motor [assumed]
+_GRAIN_NS = 3e5  # jitter of its telegrams [assumed]
+_PAUSE = 5  # telegrams that fit in the 4095 bytes of a terminal (Linux, n_tty.c), so none is lost
+
+
+class TelegramCount:
+    """Numbers telegrams since the stream began; `arrivals` converts their count to host time.
+
+    It distinguishes late telegrams from lost ones.
+    """
+
+    def __init__(self, period_ns: float, telegram_ns: int, patience: int) -> None:
+        """`patience`: further telegrams after which a late one is numbered as following lost ones."""
+        self.lost = 0  # missing telegrams between those received
+        self._period_ns, self._telegram_ns, self._patience = period_ns, telegram_ns, patience
+        self.pause_s = _PAUSE * max(period_ns, telegram_ns) / 1e9  # longest pause of the reader without `resume`
+        self._begin(0)
+
+    def resume(self) -> None:
+        """Restart at the next telegram, before which an unknown number was lost."""
+        self._begin(self.arrivals.arrives_ns(self._number * self._period_ns) if self._number else self._ended_ns)
+
+    def _begin(self, ended_ns: int) -> None:
+        """Start a new line; `ended_ns`: arrival of the last telegram before a loss, 0 without a loss."""
+        self.arrivals = ArrivalLine(smallest_delay_ns=self._telegram_ns, rate_max=_RATE_MAX, grain_ns=_GRAIN_NS)
+        self._pending: list[tuple[LmsScan, int]] = []
+        self._number, self._ended_ns = 0, ended_ns
+
+    def add(self, scan: LmsScan, arrival_ns: int) -> list[tuple[LmsScan, float, int]]:
+        """Return the scans numbered by now, each with the sensor time of its end [ns] and its arrival."""
+        self._pending.append((scan, arrival_ns))
+        numbers = self._numbers()
+        if numbers[-1] > self._number + len(numbers) and len(numbers) < self._patience:
+            return []
+        if not self._number and self._ended_ns:
+            self.lost += max(round((arrival_ns - self._ended_ns) / self._period_ns) - 1, 0)
+        known = []
+        for number, (pending, came_ns) in zip(numbers, self._pending, strict=True):
+            self.lost += number - self._number - 1
+            self._number = number
+            self.arrivals.add(number * self._period_ns, came_ns)
+            known.append((pending, number * self._period_ns, came_ns))
+        self._pending = []
+        return known
+
+    def _numbers(self) -> list[int]:
+        """Return the numbers of the pending telegrams; gaps are lost ones.
+
+        The line gives the number that fits an arrival. A late telegram with others close behind seems to follow lost
+        ones. No telegram is early, so the smallest number that a later one allows is right.
+        """
+        least = [self._number + 1 + k for k in range(len(self._pending))]
+        if not self._number:
+            return least
+        numbers: list[int] = []
+        above = math.inf
+        for at_least, (_, came_ns) in zip(reversed(least), reversed(self._pending), strict=True):
+            late_ns = came_ns - self._telegram_ns - self.arrivals.host_ns(at_least * self._period_ns)
+            above = min(above - 1, at_least + max(round(late_ns / self._period_ns), 0))
+            numbers.append(int(above))
+        return numbers[::-1]
+
 
 FAMILY = "lms2xx"
 
@@ -39,8 +104,6 @@ class LmsLidar(LineDriver):
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop its stream; `model`: catalogue name, or None for the reported one."""
         self.address = address
-        self._bad_before = self._bad_scans = 0
-        self._splitter = protocol.LmsSplitter()
         self._lost_before = self._skipped = 0
         self._waiting: deque[TimedScan] = deque()
         self._count: TelegramCount | None = None
@@ -57,11 +120,6 @@ class LmsLidar(LineDriver):
     def dropped(self) -> int:
         """Missing turns between those read, by the elapsed time."""
         return self._lost_before + self._count.lost * self._interlaced if self._count else self._lost_before
-
-    @property
-    def bad_packets(self) -> int:
-        """Telegrams dropped."""
-        return self._bad_before + self._bad_scans + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
         if intensity:
@@ -85,9 +143,8 @@ class LmsLidar(LineDriver):
     def _turn(self, deadline_s: float) -> TimedScan | None:
         assert self._count is not None
         while not self._waiting:
-            telegrams, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, self._count.pause_s)
+            telegrams, arrival_ns = self._line.receive(deadline_s, self._count.pause_s)
             if not telegrams:
-                self._splitter.cut_in()
                 self._count.resume()
                 return None
             for reply in telegrams:
@@ -111,8 +168,7 @@ class LmsLidar(LineDriver):
 
     def _recognise(self, model: str | None, bauds: tuple[int, ...]) -> None:
         """Stop its stream at one of these baud rates and read its type; close the line if none answers."""
-        self._bad_before += self._splitter.bad
-        self._splitter = protocol.LmsSplitter()
+        self._line.split_by(protocol.LmsSplitter())
         with self._line.closed_on_error():
             for baud in bauds if self._line.serial is not None else (_FAST_BAUD,):
                 if self._line.serial is not None:
@@ -128,7 +184,7 @@ class LmsLidar(LineDriver):
                             break
                         continue
                     self._accept(reply.values[:-1].decode("ascii", "replace"), model)
-                    self._splitter.bad = 0  # a telegram was cut by opening the port
+                    self._line.forgive()
                     return
             raise DeviceTimeoutError(f"{self.address}: no SICK LMS 2xx answers; check power, cable and port")
 
@@ -163,7 +219,7 @@ class LmsLidar(LineDriver):
         self._line.send(request)
         deadline_s = time.monotonic() + timeout_s
         while True:
-            telegrams, _ = self._line.receive(self._splitter.feed, deadline_s)
+            telegrams: list[protocol.LmsTelegram] = self._line.receive(deadline_s)[0]
             for reply in telegrams:
                 if reply.command == command | protocol.ANSWER:
                     return reply
@@ -174,11 +230,11 @@ class LmsLidar(LineDriver):
         try:
             measured = protocol.scan(reply)
         except ProtocolError:
-            self._bad_scans += 1
+            self._bad_contents += 1
             return
         beams = self._lidar.last_step - self._lidar.first_step + 1
         if measured.range_m.size != beams:
-            self._bad_scans += 1
+            self._bad_contents += 1
             return
         if measured.status & 7 >= protocol.FATAL:
             fault = f"it reports a fault (status {measured.status:02X})"

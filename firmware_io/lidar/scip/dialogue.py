@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 
@@ -23,19 +22,14 @@ class ScipDialogue:
 
     def __init__(self, address: str) -> None:
         self.line = SensorLine(address, protocol.LONGEST_REPLY)
-        self._bad_before = 0
-        self._begin()
+        self.begin()
 
-    @property
-    def bad(self) -> int:
-        """Replies dropped: wrong sums, cut or merged lines."""
-        return self._bad_before + self._splitter.bad
-
-    def reopen(self, address: str) -> None:
-        """Open the line again, at the same or another address."""
-        self._bad_before = self.bad
-        self.line.reopen(address)
-        self._begin()
+    def begin(self) -> None:
+        """Switch the laser off on an opened line; close it if no sensor answers."""
+        self.line.split_by(protocol.Splitter())
+        with self.line.closed_on_error():
+            self._quiet()
+        self.line.forgive()
 
     def ask(self, request: bytes, timeout_s: float | None = None) -> protocol.Reply:
         """Return the reply to a request, or raise DeviceTimeoutError."""
@@ -43,11 +37,10 @@ class ScipDialogue:
 
     def ask_timed(self, request: bytes, timeout_s: float | None = None) -> tuple[protocol.Reply, int]:
         """Return the reply to a request and its arrival; drops all replies before it. Raises as `ask`."""
-        self._waiting.clear()
         self.line.send(request + b"\n")
         deadline_s = time.monotonic() + (_REPLY_S if timeout_s is None else timeout_s)
         while True:
-            reply, arrival_ns = self.next(deadline_s)
+            reply, arrival_ns = self.line.next(deadline_s)
             if reply.echo == request and not measurement.is_scan(reply):
                 return reply, arrival_ns
 
@@ -56,13 +49,6 @@ class ScipDialogue:
         reply = self.ask(request)
         if reply.status not in statuses:
             raise DeviceError(f"{self.line.name}: {reply.echo.decode()}: status {reply.status}: {reply.meaning()}")
-
-    def next(self, deadline_s: float) -> tuple[protocol.Reply, int]:
-        """Return the next reply and its arrival; raises as `SensorLine.receive`."""
-        if not self._waiting:
-            replies, arrival_ns = self.line.receive(self._splitter.feed, deadline_s)
-            self._waiting.extend((reply, arrival_ns) for reply in replies)
-        return self._waiting.popleft()
 
     def speed_up(self, bytes_s: float, without_speed: Callable[[], Iterable[str]]) -> None:
         """Raise the baud rate for `bytes_s`, if sensor and adapter support it; not on the ports `without_speed`."""
@@ -84,13 +70,6 @@ class ScipDialogue:
                 self.insist(b"QT", "00")
                 continue
             self._quiet()
-
-    def _begin(self) -> None:
-        self._splitter = protocol.Splitter()
-        self._waiting: deque[tuple[protocol.Reply, int]] = deque()
-        with self.line.closed_on_error():
-            self._quiet()
-        self._splitter.bad = 0  # a reply was cut by opening the port
 
     def _quiet(self) -> None:
         """Switch the laser off, at any baud rate and in any version of SCIP."""

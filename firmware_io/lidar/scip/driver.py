@@ -17,8 +17,8 @@ from scanwright.firmware_io.lidar.device_clock import DeviceClock, Exchange, Sta
 from scanwright.firmware_io.lidar.lidar import StampAt, TimedScan
 from scanwright.firmware_io.lidar.scip import measurement, parameters, protocol
 from scanwright.firmware_io.lidar.scip.dialogue import ScipDialogue
-from scanwright.firmware_io.lidar.scip.raw_scan import RawScan, to_laser_scan
-from scanwright.firmware_io.lidar.sensor_line import TURN_S, LineDriver
+from scanwright.firmware_io.lidar.sensor_line import LineDriver
+from scanwright.firmware_io.samples import Scan
 
 _EXCHANGES = 60  # about a second
 # states without a fault, from captures and from firmware of the EW and UST
@@ -50,7 +50,6 @@ class ScipLidar(LineDriver):
         self.dropped = 0  # missing scans between those read, by their stamps
         self._search = search
         self._stamp_at = stamp_at
-        self._bad_scans = 0
         self._counter = StampCounter()
         self._request = b""
         self._stamp_ms = -1
@@ -72,11 +71,6 @@ class ScipLidar(LineDriver):
         """Reported turns per second."""
         return 1 / self.parameters.scan_period_s
 
-    @property
-    def bad_packets(self) -> int:
-        """Replies dropped: wrong sums, cut or merged lines."""
-        return self._bad_scans + self._dialogue.bad
-
     def information(self, command: str) -> dict[str, str]:
         """Return keys and texts of VV (version), PP (parameters) or II (state); drops scans meanwhile."""
         return protocol.information(self._dialogue.ask(command.encode()))
@@ -85,10 +79,6 @@ class ScipLidar(LineDriver):
         """Return its state if that is normal (STAT of II); other states are warnings of its scans."""
         status = self.information("II").get("STAT", "")
         return (f"status: {status}",) if _is_normal(status) else ()
-
-    def read_raw(self, timeout_s: float | None = None) -> RawScan:
-        """Return the next scan as sent, without host time; raises as `read`."""
-        return self._raw_by(time.monotonic() + (TURN_S if timeout_s is None else timeout_s))
 
     def _begin(self, intensity: bool, skip: int) -> None:
         window = replace(self.parameters.window, cluster=self._cluster, intensity=intensity)
@@ -102,22 +92,17 @@ class ScipLidar(LineDriver):
         self._dialogue.insist(self._request, "00")
 
     def _turn(self, deadline_s: float) -> TimedScan:
-        raw = self._raw_by(deadline_s)
-        moment = self._clock.update(raw.stamp_ms, raw.arrival_ns, raw.restarts)
-        return TimedScan(to_laser_scan(raw, self.parameters, moment.time_ns), raw.arrival_ns, moment.uncertainty_ns)
-
-    def _raw_by(self, deadline_s: float) -> RawScan:
         while True:
-            reply, arrival_ns = self._dialogue.next(deadline_s)
+            reply, arrival_ns = self._line.next(deadline_s)
             if reply.echo[:-2] != self._request[:-2] or reply.status == "00":
                 continue
             if reply.status.isdigit() and 50 <= int(reply.status) <= 97:
                 raise DeviceError(f"{self._line.name}: status {reply.status}: {reply.meaning()}")
             if measurement.is_scan(reply):
                 try:
-                    return self._raw(measurement.measurement(reply), arrival_ns)
+                    return self._timed(measurement.measurement(reply), arrival_ns)
                 except ProtocolError:
-                    self._bad_scans += 1
+                    self._bad_contents += 1
 
     def _halt(self) -> None:
         """Switch the laser off."""
@@ -132,7 +117,8 @@ class ScipLidar(LineDriver):
         errors = []
         for address in dict.fromkeys([self.address, *self._search()]):
             try:
-                self._dialogue.reopen(address)
+                self._line.reopen(address)
+                self._dialogue.begin()
                 with self._line.closed_on_error():
                     if self.information("VV").get("SERI") != self.serial_number:
                         raise DeviceError(f"{address}: another lidar answers")
@@ -177,20 +163,26 @@ class ScipLidar(LineDriver):
         if self.sync is not None:
             self._clock.synchronise(self.sync)
 
-    def _raw(self, measured: measurement.Measurement, arrival_ns: int) -> RawScan:
+    def _timed(self, measured: measurement.Measurement, arrival_ns: int) -> TimedScan:
         stamp_ms = self._counter.unwrap(measured.stamp_ms, arrival_ns)
         if 0 <= self._stamp_ms < stamp_ms:
             self.dropped += max(round((stamp_ms - self._stamp_ms) / self._period_ms) - 1, 0)
         self._stamp_ms = stamp_ms
-        return RawScan(
-            stamp_ms=stamp_ms,
-            restarts=self._counter.restarts,
-            arrival_ns=arrival_ns,
-            first_step=measured.window.first_step,
-            cluster=measured.window.cluster,
-            range_m=parameters.ranges_m(measured.value, self.parameters),
+        moment = self._clock.update(stamp_ms, arrival_ns, self._counter.restarts)
+        of, cluster = self.parameters, measured.window.cluster
+        middle = (cluster - 1) / 2
+        scan = Scan(
+            stamp_ns=moment.time_ns + round(middle * of.step_s * 1e9),
+            angle_min_rad=(measured.window.first_step + middle - of.front_step) * of.step_rad,
+            angle_increment_rad=cluster * of.step_rad,
+            time_increment_s=cluster * of.step_s,
+            scan_time_s=of.scan_period_s,
+            range_min_m=of.range_min_mm / 1e3,
+            range_max_m=of.range_max_mm / 1e3,
+            range_m=parameters.ranges_m(measured.value, of),
             intensity=measured.intensity.astype("float32"),
         )
+        return TimedScan(scan, arrival_ns, moment.uncertainty_ns)
 
 
 def _is_normal(status: str) -> bool:

@@ -139,6 +139,10 @@ class Splitter:
         self.bad = 0  # replies dropped
         self._pending = b""
 
+    def cut_in(self) -> None:
+        """Expect the middle of a reply next."""
+        self._pending = b""
+
     def feed(self, received: bytes) -> list[Reply]:
         """Return the replies that end in `received`, in order."""
         *blocks, self._pending = (self._pending + received).split(b"\n\n")

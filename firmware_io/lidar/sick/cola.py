@@ -152,6 +152,10 @@ class TelegramSplitter:
         self.rest = b""  # received bytes of an incomplete telegram
         self._lost = False
 
+    def cut_in(self) -> None:
+        """Expect the middle of a telegram next, and do not count it as bad."""
+        self.rest, self._lost = b"", True
+
     def feed(self, received: bytes) -> list[Telegram]:
         """Return the telegrams that these bytes complete."""
         self.rest += received

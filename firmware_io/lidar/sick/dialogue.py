@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -52,19 +51,7 @@ class ColaDialogue:
 
     def __init__(self, address: str) -> None:
         self.line = SensorLine(address, LONGEST)
-        self._bad_before = 0
-        self._begin()
-
-    @property
-    def bad(self) -> int:
-        """Telegrams dropped."""
-        return self._bad_before + self._splitter.bad
-
-    def reopen(self) -> None:
-        """Open the line again."""
-        self._bad_before = self.bad
-        self.line.reopen()
-        self._begin()
+        self.begin()
 
     def writer(self, command: str) -> Writer:
         """Begin a request; `command`: command type and name."""
@@ -99,32 +86,24 @@ class ColaDialogue:
         except ProtocolError as error:
             raise ProtocolError(f"{self.line.name}: {name}: {error}") from error
 
-    def next(self, deadline_s: float) -> tuple[Telegram, int]:
-        """Return the next telegram and its arrival; raises as `SensorLine.receive`."""
-        if not self._waiting:
-            telegrams, arrival_ns = self.line.receive(self._splitter.feed, deadline_s)
-            self._waiting.extend((reply, arrival_ns) for reply in telegrams)
-        return self._waiting.popleft()
-
     def _reply(self, request: Telegram, deadline_s: float) -> Telegram:
-        self._waiting.clear()
         self.line.send(framed(request))
         while True:
-            reply, _ = self.next(deadline_s)
+            reply: Telegram = self.line.next(deadline_s)[0]
             if reply.binary == request.binary and (
                 reply.word == b"sFA" or (reply.word, reply.name) == (_REPLIES[request.word], request.name)
             ):
                 return reply
 
-    def _begin(self) -> None:
-        self._splitter = TelegramSplitter()
-        self._waiting: deque[tuple[Telegram, int]] = deque()
+    def begin(self) -> None:
+        """Detect the dialect on an opened line; close it if no sensor answers."""
+        self.line.split_by(TelegramSplitter())
         with self.line.closed_on_error():
             for self._binary in (True, False):
                 try:
                     self.ask(self.writer("sEN LMDscandata").number("u8", 0))
                 except DeviceTimeoutError:
                     continue
-                self._splitter.bad = 0
+                self.line.forgive()
                 return
             raise DeviceTimeoutError(f"{self.line.address}: no SICK sensor answers; check power, cable and port")

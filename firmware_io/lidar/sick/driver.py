@@ -15,7 +15,6 @@ from scanwright.firmware_io.lidar.lidar import Echo, StampAt, TimedScan
 from scanwright.firmware_io.lidar.sensor_line import LineDriver
 from scanwright.firmware_io.lidar.sick.dialogue import POLL_S, ColaDialogue, RefusedError
 from scanwright.firmware_io.lidar.sick.scan_data import DIRT, DIRT_WARNING, FAULT, WRAP_US, ScanData, scan_data
-from scanwright.firmware_io.lidar.sick.scan_setting import set_rate
 from scanwright.firmware_io.lidar.sick.values import Kind
 from scanwright.firmware_io.samples import Scan
 
@@ -44,7 +43,6 @@ class SickLidar(LineDriver):
         self._stamp_at: StampAt | None = stamp_at
         self._stamps_last = stamp_at == "last_beam"
         self._measuring = False
-        self._bad_scans = 0
         self._requested_echo: int | None = None
         self._mean_filter_off = False
         self._stamps = StampCounter(WRAP_US, per_ms=1000)
@@ -63,11 +61,6 @@ class SickLidar(LineDriver):
             self.serial_number = self._serial_number()
         self._lidar = load_catalogue().get(model or identity[0], Lidar)
         self._reset()
-
-    @property
-    def bad_packets(self) -> int:
-        """Telegrams dropped."""
-        return self._bad_scans + self._dialogue.bad
 
     def condition(self) -> tuple[str, ...]:
         """Return the reported operating hours, number of starts and filters."""
@@ -109,13 +102,13 @@ class SickLidar(LineDriver):
 
     def _turn(self, deadline_s: float) -> TimedScan:
         while True:
-            reply, arrival_ns = self._dialogue.next(deadline_s)
+            reply, arrival_ns = self._line.next(deadline_s)
             if (reply.word, reply.name) != (b"sSN", b"LMDscandata"):
                 continue
             try:
                 return self._timed(scan_data(reply), arrival_ns)
             except ProtocolError:
-                self._bad_scans += 1
+                self._bad_contents += 1
 
     def _halt(self) -> None:
         """Stop the telegrams, and the laser if `start` switched it on and it can be switched off."""
@@ -131,7 +124,8 @@ class SickLidar(LineDriver):
                 raise
 
     def _find(self) -> None:
-        self._dialogue.reopen()
+        self._line.reopen()
+        self._dialogue.begin()
         with self._line.closed_on_error():
             if self._serial_number() != self.serial_number:
                 raise DeviceError(f"{self._line.name}: it has another serial number")
@@ -235,3 +229,31 @@ class SickLidar(LineDriver):
                 )
             self._stamps_last = True
         return after_us + duration_us if self._stamps_last else after_us
+
+
+# error codes of mLMPsetscancfg
+_SET_UP = {1: "its scan frequency", 2: "its resolution", 3: "its scan frequency and resolution", 4: "its scan area"}
+
+
+def set_rate(dialogue: ColaDialogue, lidar: Lidar) -> None:
+    """Set rate, resolution and field to those of the catalogue, if the sensor supports that."""
+    step = round(3_600_000 / lidar.steps_per_turn)
+    first = 900_000 + round((lidar.first_step - lidar.front_step) * 3_600_000 / lidar.steps_per_turn)
+    last = 900_000 + round((lidar.last_step - lidar.front_step) * 3_600_000 / lidar.steps_per_turn)
+    rate = round(lidar.scan_rate_hz * 100)
+    try:
+        now = dialogue.ask(dialogue.writer("sRN LMPscancfg"))
+    except RefusedError as refused:
+        if refused.unknown:
+            return
+        raise
+    rate_now, _, step_now = (dialogue.checked("LMPscancfg", now.number, kind) for kind in ("u32", "u16", "u32"))
+    if rate_now == rate and abs(step_now - step) <= 1:
+        return
+    out = dialogue.writer("sMN mLMPsetscancfg").number("u32", rate).number("u16", 1).number("u32", step)
+    reply = dialogue.ask(out.number("i32", first).number("i32", last))
+    if code := dialogue.checked("mLMPsetscancfg", reply.number, "u8"):
+        raise DeviceError(
+            f"{dialogue.line.name}: {lidar.scan_rate_hz:g} Hz in steps of {step / 1e4:g} deg: it rejects "
+            f"{_SET_UP.get(code, f'with code {code}')}; is it a {lidar.name}?"
+        )

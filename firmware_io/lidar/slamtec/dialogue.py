@@ -22,8 +22,6 @@ class SlamtecDialogue:
 
     def __init__(self, address: str) -> None:
         self.line = SensorLine(address, 2 * max(protocol.SIZES.values()))
-        self._replies = protocol.ReplySplitter()
-        self._waiting: list[tuple[protocol.Descriptor, bytes]] = []
 
     def ask(self, command: int, kind: int, read: Callable[[bytes], Answer], payload: bytes = b"") -> Answer:
         """Send a request and decode the first reply of type `kind` by `read`."""
@@ -36,16 +34,14 @@ class SlamtecDialogue:
 
     def request(self, command: int, payload: bytes = b"") -> None:
         """Drop waiting replies and send a request."""
-        self._replies = protocol.ReplySplitter()
-        self._waiting = []
+        self.line.split_by(protocol.ReplySplitter())
         self.line.send(protocol.request(command, payload))
 
     def reply(self, deadline_s: float | None = None) -> tuple[protocol.Descriptor, bytes]:
         """Return the next descriptor and its data; raises as `SensorLine.receive`."""
-        if not self._waiting:
-            deadline_s = time.monotonic() + _REPLY_S if deadline_s is None else deadline_s
-            self._waiting, _ = self.line.receive(self._replies.feed, deadline_s)
-        return self._waiting.pop(0)
+        reply: tuple[protocol.Descriptor, bytes]
+        reply, _ = self.line.next(time.monotonic() + _REPLY_S if deadline_s is None else deadline_s)
+        return reply
 
 
 @dataclass(frozen=True, slots=True)

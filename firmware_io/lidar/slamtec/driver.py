@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import struct
 from contextlib import suppress
+from dataclasses import dataclass
+from typing import Literal
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
@@ -16,8 +18,29 @@ from scanwright.firmware_io.lidar.sensor_line import TURN_S, LineDriver
 from scanwright.firmware_io.lidar.slamtec import protocol
 from scanwright.firmware_io.lidar.slamtec.dialogue import SlamtecDialogue, typical_mode
 from scanwright.firmware_io.lidar.slamtec.point_count import PointCount
-from scanwright.firmware_io.lidar.slamtec.series import SERIES
 from scanwright.firmware_io.lidar.turn import TurnQueue, timed_scan
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One series."""
+
+    models: tuple[str, ...]  # catalogue names, first that of a sensor whose model is not named
+    bauds: tuple[int, ...]  # A2M8: 115,200
+    motor: Literal["dtr", "pwm", "rpm", "scan"]  # signal or request that starts the motor
+
+
+# by the upper half of the model byte (rplidar_sdk 2.1)
+SERIES = {
+    1: Series(("RPLIDAR A1",), (115_200,), "dtr"),
+    2: Series(("RPLIDAR A2",), (256_000, 115_200), "pwm"),
+    3: Series(("RPLIDAR A3",), (256_000,), "pwm"),
+    4: Series(("RPLIDAR C1",), (460_800,), "scan"),
+    6: Series(("RPLIDAR S1",), (256_000,), "rpm"),
+    7: Series(("RPLIDAR S2", "RPLIDAR S2L"), (1_000_000,), "rpm"),
+    8: Series(("RPLIDAR S3",), (1_000_000, 460_800), "rpm"),  # 460,800: model 0x82
+}
+
 
 _START_S = 3.0  # longest wait for the first turn while the motor starts
 _TRIES = 3  # the first reply can be lost in the stream
@@ -34,8 +57,6 @@ class SlamtecLidar(LineDriver):
     def __init__(self, address: str, model: str | None = None, _stamp_at: StampAt | None = None) -> None:
         """Open it and stop its stream; `model`: catalogue name, or None for any."""
         self.address = address
-        self._bad_before = 0
-        self._splitter = protocol.SlamtecSplitter(protocol.CAPSULES)
         self._turns = TurnQueue()
         self._turning = False
         self._pause_s = _PAUSE_S
@@ -47,11 +68,6 @@ class SlamtecLidar(LineDriver):
     def dropped(self) -> int:
         """Missing turns between those read."""
         return self._turns.dropped
-
-    @property
-    def bad_packets(self) -> int:
-        """Packets dropped."""
-        return self._bad_before + self._splitter.bad
 
     def _begin(self, intensity: bool, skip: int) -> None:
         status, code = self._dialogue.ask(protocol.HEALTH, 6, protocol.health)
@@ -70,8 +86,7 @@ class SlamtecLidar(LineDriver):
         byte_ns = self._mode.point_ns * protocol.POINTS[answer.kind] / protocol.SIZES[answer.kind]
         self._pause_s = max(_PAUSE_S, _BUFFER_BYTES * byte_ns / 1e9)
         self._turning = False
-        self._bad_before = self.bad_packets
-        self._splitter = protocol.SlamtecSplitter(self._mode.kind)
+        self._line.split_by(protocol.SlamtecSplitter(self._mode.kind))
         self._turns.restart(skip)
         self._line.drop_waiting()
         self._resume()
@@ -81,7 +96,7 @@ class SlamtecLidar(LineDriver):
 
     def _turn(self, deadline_s: float) -> TimedScan | None:
         while (turn := self._turns.next(self._count.arrivals)) is None:
-            received, arrival_ns = self._line.receive(self._splitter.feed, deadline_s, self._pause_s)
+            received, arrival_ns = self._line.receive(deadline_s, self._pause_s)
             if not received:
                 self._resume()
                 return None
@@ -143,7 +158,6 @@ class SlamtecLidar(LineDriver):
 
     def _resume(self) -> None:
         """Start a new count and a new turn at the next packet."""
-        self._splitter.cut_in()
         self._turns.resume()
         self._count = PointCount(self._mode.kind, self._mode.point_ns, self._baud)
         self._last_ns = 0

@@ -206,6 +206,11 @@ class ReplySplitter:
     """Splitter of the bytes before a stream into replies; skips other bytes."""
 
     def __init__(self) -> None:
+        self.bad = 0  # bytes of a stream are no lost replies
+        self.cut_in()
+
+    def cut_in(self) -> None:
+        """Expect the middle of a reply next."""
         self._rest = b""
 
     def feed(self, data: bytes) -> list[tuple[Descriptor, bytes]]:

@@ -9,9 +9,8 @@ import pytest
 from scanwright.design import frames
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.clouds.cloud import Cloud
-from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
-from scanwright.firmware_io.clouds.streams.parts import survey
-from scanwright.firmware_io.clouds.streams.stream import stream
+from scanwright.firmware_io.clouds.formats import read_clouds, stream, write_clouds
+from scanwright.firmware_io.clouds.parts import survey
 from scanwright.firmware_io.recording import convert as converting
 
 FORMATS = ("ply", "pcd", "las", "laz", "e57", "xyz")

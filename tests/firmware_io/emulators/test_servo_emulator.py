@@ -22,9 +22,8 @@ from virtual_bus import VirtualServo
 from scanwright.design.errors import DeviceError, DeviceFaultError, DeviceTimeoutError
 from scanwright.firmware_io import serial_port
 from scanwright.firmware_io.emulators.servo.dynamixel_packets import crc16, packet_2, status, take
-from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator
+from scanwright.firmware_io.emulators.servo.emulator import ServoEmulator, machine_of
 from scanwright.firmware_io.emulators.servo.machine import answers
-from scanwright.firmware_io.emulators.servo.models import machine_of
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo import servo as servo_driver
 from scanwright.firmware_io.servo.bus.registers import Register

@@ -16,7 +16,6 @@ from scanwright.firmware_io.lidar import byte_stream, sensor_line
 from scanwright.firmware_io.lidar.byte_stream import SerialStream
 from scanwright.firmware_io.lidar.scip import dialogue, protocol
 from scanwright.firmware_io.lidar.scip.driver import ScipLidar
-from scanwright.firmware_io.lidar.scip.raw_scan import to_laser_scan
 
 SEEN_M = np.linspace(0.6, 5.2, 1081)
 
@@ -41,11 +40,13 @@ def test_scans_come_as_they_were_seen(way, model, beams):
         assert lidar.parameters == emulator.machine.identity.parameters
         intensity = emulator.machine.identity.intensity
         lidar.start(intensity=intensity)
-        scans = [lidar.read_raw() for _ in range(4)]
-        for raw in scans:
-            check(raw, beams)
-            assert raw.intensity.tolist() == (list(range(beams)) if intensity else [])
-        steps_ms = np.diff([raw.stamp_ms for raw in scans])
+        stamps_ms = []
+        for _ in range(4):
+            scan = lidar.read().scan
+            check(scan, beams)
+            assert scan.intensity.tolist() == (list(range(beams)) if intensity else [])
+            stamps_ms.append(lidar._stamp_ms)
+        steps_ms = np.diff(stamps_ms)
         period_ms = lidar.parameters.scan_period_s * 1002  # the motor's error is a default of the emulator
         assert np.all(np.abs(steps_ms - period_ms) <= 1)
         assert (lidar.dropped, lidar.bad_packets) == (0, 0)
@@ -62,24 +63,23 @@ def test_the_sensor_may_be_in_any_state(state):
             Path(emulator.port).write_bytes(b"MD0000")
         with ScipLidar(emulator.port) as lidar:
             lidar.start()
-            check(lidar.read_raw(), 1081)
+            check(lidar.read().scan, 1081)
             assert lidar.bad_packets == 0
 
 
 def test_clusters_and_skips():
     with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start(cluster=5, skip=1)
-        first, second = lidar.read_raw(), lidar.read_raw()
-        assert second.stamp_ms - first.stamp_ms in (50, 51)
+        scan, first_ms = lidar.read().scan, lidar._stamp_ms
+        lidar.read()
+        assert lidar._stamp_ms - first_ms in (50, 51)
         assert lidar.dropped == 0
         valid = np.where(np.isinf(look(SEEN_M)[0]), 99, look(SEEN_M)[0])
         expected = [valid[k : k + 5].min() for k in range(0, 1081, 5)]
-        np.testing.assert_allclose(first.range_m, expected, atol=6e-4)
-        scan, whole = to_laser_scan(first, lidar.parameters, 10**9), lidar.parameters.window.size
-        assert scan.range_m.size == 217 == -(-whole // 5)
+        np.testing.assert_allclose(scan.range_m, expected, atol=6e-4)
+        assert scan.range_m.size == 217 == -(-lidar.parameters.window.size // 5)
         # The middle one of five steps: two steps after the first.
         assert scan.angle_min_rad == pytest.approx(np.radians(-135 + 2 * 0.25))
-        assert scan.stamp_ns == pytest.approx(10**9 + 2 * 0.025 / 1440 * 1e9, abs=1)
         assert scan.bearing_rad[108] == pytest.approx(np.radians((108 * 5 + 2 - 540) * 0.25))
         assert np.diff(scan.time_ns)[0] == pytest.approx(5 * 0.025 / 1440 * 1e9, abs=1)
 
@@ -102,7 +102,8 @@ def test_first_beams_get_their_true_times(model, intensity):
         errors_ns, wrapped = [], False
         for _ in range(12):
             told_ns = lidar.read().scan.stamp_ns
-            wrapped |= lidar.read_raw().stamp_ms >= 1 << 24
+            lidar.read()
+            wrapped |= lidar._stamp_ms >= 1 << 24
             errors_ns.append(min(abs(told_ns - time_ns) for time_ns in true_ns))  # a busy emulator leaves turns out
         assert wrapped
         # Within what the synchronisation allows: a busy machine answers late, and no scan here comes early.
@@ -112,11 +113,11 @@ def test_first_beams_get_their_true_times(model, intensity):
 def test_bad_packets_are_counted_and_never_handed_out():
     with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start(intensity=True)
-        lidar.read_raw()
+        lidar.read()
         emulator.garble(3)
         emulator.cut(3)
         for _ in range(40):  # on a busy computer some packets were under way before
-            check(lidar.read_raw(), 1081)
+            check(lidar.read().scan, 1081)
             if lidar.bad_packets >= 6:
                 break
         assert 6 <= lidar.bad_packets <= 9  # a lost end takes the next one with it
@@ -127,22 +128,22 @@ def test_bad_packets_are_counted_and_never_handed_out():
 def test_an_unplugged_sensor_is_told_and_comes_back(way):
     with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(getattr(emulator, way)) as lidar:
         lidar.start(intensity=True)
-        lidar.read_raw()
+        lidar.read()
         emulator.unplug()
         with pytest.raises(DeviceError, match="plug") as told:
             for _ in range(10):
-                lidar.read_raw()
+                lidar.read()
         assert str(told.value).count("\n") == 0
         assert not isinstance(told.value, DeviceTimeoutError)
         with pytest.raises(DeviceError, match=r"00903971 did not come back in 0\.1 s"):
             lidar.reconnect(0.1)
         with pytest.raises(DeviceError, match="plug it in again"):
-            lidar.read_raw()
+            lidar.read()
         emulator.plug()
         lidar.reconnect(30.0)
-        raw = lidar.read_raw()
-        check(raw, 1081)
-        assert (raw.restarts, raw.intensity.size) == (1, 1081)
+        scan = lidar.read().scan
+        check(scan, 1081)
+        assert (lidar._counter.restarts, scan.intensity.size) == (1, 1081)
 
 
 def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
@@ -158,12 +159,12 @@ def test_a_sensor_is_found_by_its_serial_number_and_not_by_its_port(tmp_path):
             ours.unplug()
             with pytest.raises(DeviceError):
                 for _ in range(10):
-                    lidar.read_raw()
+                    lidar.read()
             name.unlink()
             name.symlink_to(other.port)  # another sensor took its place
             ours.plug()
             lidar.reconnect(30.0)
-            check(lidar.read_raw(), 1081)
+            check(lidar.read().scan, 1081)
             assert (lidar.address, lidar.serial_number) == (ours.port, "00903971")
             assert not other.machine.laser
 
@@ -172,16 +173,15 @@ def test_a_sensor_that_lost_its_power_is_silent_then_starts_anew():
     with hokuyo_emulator("UTM-30LX", look, clock_ms=1_000_000) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start()
         lidar.read()
-        before = lidar.read_raw()
+        before_ms = lidar._stamp_ms
         emulator.power_cycle()
         with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
             for _ in range(5):
-                lidar.read_raw(0.1)
+                lidar.read(0.1)
         lidar.reconnect(30.0)
-        raw = lidar.read_raw()
-        assert raw.stamp_ms < 60_000 < before.stamp_ms
-        assert raw.restarts == before.restarts + 1
         timed = lidar.read()
+        assert lidar._stamp_ms < 60_000 < before_ms
+        assert lidar._counter.restarts == 1
         late_ns = timed.arrival_ns - timed.scan.stamp_ns
         assert 0 < late_ns < 5_000_000_000
 
@@ -192,7 +192,7 @@ def test_a_fault_of_the_sensor_is_told_and_the_laser_is_put_out():
             lidar.start()
             answer = emulator.machine.next_scan
             emulator.machine.next_scan = lambda: answer()[:0] + protocol.reply(lidar._request, "55")
-            lidar.read_raw()
+            lidar.read()
         assert not emulator.machine.laser
 
 
@@ -272,14 +272,10 @@ def test_a_sensor_at_another_speed_is_found_and_sped_up(monkeypatch, fastest):
     monkeypatch.setattr(SlowPort, "fastest", fastest)
     monkeypatch.setattr(dialogue, "_REPLY_S", 0.1)
     with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
-        assert lidar._dialogue.line.stream.listens == lidar._dialogue.line.stream.baud == 115_200
+        assert lidar._line.stream.listens == lidar._line.stream.baud == 115_200
         lidar.start()
-        assert (
-            lidar._dialogue.line.stream.listens
-            == lidar._dialogue.line.stream.baud
-            == (250_000 if fastest == 750_000 else 115_200)
-        )
-        check(lidar.read_raw(), 682)
+        assert lidar._line.stream.listens == lidar._line.stream.baud == (250_000 if fastest == 750_000 else 115_200)
+        check(lidar.read().scan, 682)
 
 
 class BadLine(LossyPort):
@@ -294,8 +290,8 @@ def test_a_line_that_is_not_good_for_more_speed_keeps_its_speed(monkeypatch):
     monkeypatch.setattr(dialogue, "_REPLY_S", 5.0)
     with hokuyo_emulator("URG-04LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         lidar.start()
-        assert lidar._dialogue.line.stream.baud == 115_200
-        check(lidar.read_raw(), 682)
+        assert lidar._line.stream.baud == 115_200
+        check(lidar.read().scan, 682)
 
 
 def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypatch):
@@ -311,7 +307,7 @@ def test_the_clock_of_a_firmware_that_tells_it_wrongly_is_not_asked_for(monkeypa
     with hokuyo_emulator("UTM-30LX", look) as emulator, ScipLidar(emulator.port) as lidar:
         assert lidar.sync is None
         lidar.start()
-        check(lidar.read_raw(), 1081)
+        check(lidar.read().scan, 1081)
     assert b"PP" in asked and b"TM0" not in asked
 
 
@@ -331,12 +327,38 @@ def test_a_reply_that_waits_for_a_late_host_counts(monkeypatch):
     told = protocol.reply(b"PP", "00", protocol.text_lines([("MODL", "x" * 500)]))
     monkeypatch.setattr(sensor_line, "open_stream", lambda _: AsleepStream(told))
     line = sensor_line.SensorLine("wire", protocol.LONGEST_REPLY)
-    (found,), _ = line.receive(protocol.Splitter().feed, time.monotonic() - 10.0)
+    line.split_by(protocol.Splitter())
+    (found,), _ = line.receive(time.monotonic() - 10.0)
     assert found.echo == b"PP"
     for waiting in (b"", b"x" * 100_000):
         line.stream = AsleepStream(waiting)
+        line.split_by(protocol.Splitter())
         with pytest.raises(DeviceTimeoutError, match="nothing came in time"):
-            line.receive(protocol.Splitter().feed, time.monotonic() - 10.0)
+            line.receive(time.monotonic() - 10.0)
+
+
+def test_lost_packets_count_across_splitters_and_those_of_a_dropped_buffer_do_not(monkeypatch):
+    good = protocol.reply(b"QT", "00")
+    monkeypatch.setattr(sensor_line, "_SETTLE_S", 0.0)
+    monkeypatch.setattr(sensor_line, "open_stream", lambda _: AsleepStream(b""))
+    line = sensor_line.SensorLine("wire", protocol.LONGEST_REPLY)
+    line.stream.read = lambda _: line.pieces.pop(0) if line.pieces else b""
+    for lost in (1, 2):
+        line.split_by(protocol.Splitter())
+        line.pieces = [b"junk\n\n", good]
+        assert line.next(time.monotonic() + 10.0)[0].echo == b"QT"
+        assert line.bad == lost
+    line.forgive()
+    assert line.bad == 1  # of the first splitter
+    line.pieces = [b"QT\n00", b"", b""]
+    with pytest.raises(DeviceTimeoutError):
+        line.receive(time.monotonic() - 1.0)
+    line.drop_waiting()
+    line.pieces = [good]
+    assert line.next(time.monotonic() - 1.0)[0].echo == b"QT"  # not appended to the half of the dropped one
+    driver = sensor_line.LineDriver()
+    driver._line, driver._bad_contents = line, 2
+    assert driver.bad_packets == 3
 
 
 class Chatter:

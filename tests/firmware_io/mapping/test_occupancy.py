@@ -11,8 +11,7 @@ from scipy.ndimage import binary_dilation
 from scanwright.design.errors import RecordingError
 from scanwright.design.scene.ray_caster import build_scene, cast
 from scanwright.firmware_io.emulators.world import furnished_room
-from scanwright.firmware_io.mapping.floor import find_floor
-from scanwright.firmware_io.mapping.map_files import write_map
+from scanwright.firmware_io.mapping.map_files import find_floor, write_map
 from scanwright.firmware_io.mapping.occupancy import FREE, OCCUPIED, UNKNOWN, Heights, occupancy_grid
 
 CELL_M = 0.05

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from scanwright.design.errors import RecordingError
 from scanwright.firmware_io.poses.gyro import Gyro, oriented
-from scanwright.firmware_io.poses.gyro_files import imu_mount, load_gyro
+from scanwright.firmware_io.poses.pose_files import imu_mount, load_gyro
 from scanwright.firmware_io.poses.trajectory import Trajectory
 
 START = 1_700_000_000_000_000_000

@@ -11,7 +11,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from scanwright.firmware_io.recording import ros_messages
-from scanwright.firmware_io.recording.message_batches import blocks_in, joints_in
+from scanwright.firmware_io.recording.ros_messages import blocks_in, joints_in
 from scanwright.firmware_io.samples import Scan
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -19,10 +19,9 @@ from scanwright.design.progress import no_progress
 from scanwright.firmware_io.clouds.cloud import Cloud, pose_matrix
 from scanwright.firmware_io.clouds.formats import read_clouds, write_clouds
 from scanwright.firmware_io.registration.cube_map import cells_of, depth_map, solid_angles_sr
-from scanwright.firmware_io.registration.graph import Edge, solve_graph
 from scanwright.firmware_io.registration.pairwise import align
 from scanwright.firmware_io.registration.poses import read_poses, write_poses
-from scanwright.firmware_io.registration.register import register
+from scanwright.firmware_io.registration.register import Edge, register, solve_graph
 from scanwright.firmware_io.registration.sensor_view import make_view
 from scanwright.firmware_io.registration.start import find_start
 from scanwright.firmware_io.registration.thin import beam_step_rad, line_gaps_rad, merge, thin, voxel_means

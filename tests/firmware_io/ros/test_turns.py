@@ -6,9 +6,8 @@ import pytest
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.firmware_io.assembly.streaming import ScanPoints
 from scanwright.firmware_io.assembly.turns import turn_starts
-from scanwright.firmware_io.ros import turns
-from scanwright.firmware_io.ros.point_rows import in_rot, turn_rows
-from scanwright.firmware_io.ros.turns import Turns
+from scanwright.firmware_io.ros import point_rows
+from scanwright.firmware_io.ros.point_rows import Turns, in_rot, turn_rows
 from scanwright.firmware_io.samples import JointLog, Scan
 
 STEP_NS = 25_000_000
@@ -72,7 +71,7 @@ def test_turns_of_a_sweep_end_where_the_axis_turns_back():
 
 
 def test_an_axis_that_stands_gives_its_scans_out_all_the_same(monkeypatch):
-    monkeypatch.setattr(turns, "MOST_BEAMS", 30)
+    monkeypatch.setattr(point_rows, "MOST_BEAMS", 30)
     found = gathered(np.where(np.arange(45) == 20, np.nan, 0.3))
     assert [len(turn) for turn in found] == [10, 10, 10, 10, 5]
 

@@ -3,21 +3,19 @@
 import random
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import DeviceError, DeviceTimeoutError, ProtocolError
-from scanwright.firmware_io.emulators.servo import feetech_packets
+from scanwright.firmware_io.emulators.servo import dynamixel_packets
+from scanwright.firmware_io.emulators.servo.emulator import machine_of
 from scanwright.firmware_io.emulators.servo.machine import answers
-from scanwright.firmware_io.emulators.servo.models import machine_of
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo.bus import bus as servo_bus
 from scanwright.firmware_io.servo.bus import serial_line
 from scanwright.firmware_io.servo.bus.bus import ServoBus
 from scanwright.firmware_io.servo.bus.registers import Register
-from scanwright.firmware_io.servo.feetech.packets import STS, from_header
+from scanwright.firmware_io.servo.feetech.packets import STS
 from scanwright.firmware_io.servo.feetech.tables import TABLES
 
 (STS3215,) = TABLES
@@ -139,7 +137,7 @@ def bus(monkeypatch):
 
 
 def whole(data, error=0, servo_id=1):
-    return feetech_packets.status(servo_id, error, data)
+    return dynamixel_packets.status("1.0", servo_id, error, data)
 
 
 @pytest.mark.parametrize(
@@ -163,16 +161,6 @@ def test_every_bad_answer_is_a_typed_error(bus, said, kind, words):
 def test_the_status_byte_tells_of_the_servo_and_refuses_nothing(bus):
     answer = bus(whole(b"\1\2", error=32)).read(1, Register(56, 2))
     assert (answer.data, answer.conditions) == (b"\1\2", 32)
-
-
-@given(
-    noise=st.lists(st.sampled_from([0xFF, 0xFE, 0x00, 0x01, 0x02]), max_size=12).map(bytes), data=st.binary(max_size=9)
-)
-def test_a_status_is_found_behind_noise(noise, data):
-    wire = whole(data)
-    left = from_header(noise + wire)
-    assert left.endswith(wire) or noise[-1:] == b"\xff" or b"\xff\xff" in noise
-    assert from_header(wire) == wire
 
 
 def test_mutated_answers_are_right_or_typed_errors(bus):

@@ -6,8 +6,7 @@ import pytest
 
 from scanwright.firmware_io.servo.bus.bus import ServoAnswer
 from scanwright.firmware_io.servo.families import all_tables
-from scanwright.firmware_io.servo.progress import TurnOrder
-from scanwright.firmware_io.servo.reading import state_of
+from scanwright.firmware_io.servo.progress import TurnOrder, state_of
 
 STEP_RAD = 2 * math.pi / 4096
 FAMILIES = {  # position on the wire, angle in steps from the centre, counter-clockwise

@@ -26,8 +26,7 @@ from scanwright.firmware_io.servo.bus.registers import RPM, Register
 from scanwright.firmware_io.servo.dynamixel.packets import PROTOCOL_1, PROTOCOL_2
 from scanwright.firmware_io.servo.dynamixel.tables import TABLES
 from scanwright.firmware_io.servo.find import find_servo
-from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow
-from scanwright.firmware_io.servo.reading import nearest_turn
+from scanwright.firmware_io.servo.progress import ServoState, Stall, TurnOrder, follow, nearest_turn
 from scanwright.firmware_io.servo.servo import open_servo
 
 REGISTERS = [

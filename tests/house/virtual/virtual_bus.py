@@ -5,8 +5,8 @@ from collections import deque
 
 from virtual_time import OnClock
 
+from scanwright.firmware_io.emulators.servo.emulator import machine_of
 from scanwright.firmware_io.emulators.servo.machine import answers
-from scanwright.firmware_io.emulators.servo.models import machine_of
 from scanwright.firmware_io.emulators.servo_plant import Load
 from scanwright.firmware_io.servo import guard, servo
 from scanwright.firmware_io.servo.bus import serial_line

@@ -1,1 +1,0 @@
-"""Conversion of clouds in parts, in bounded memory."""
