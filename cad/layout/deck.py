@@ -39,8 +39,8 @@ USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes 
 PAD_HALF = 26.0  # of the strut on the foot
 STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 HOLE_MARGIN = 10.0  # of the foot around a hole
-FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
-FOOT_DROPS = tuple(6.0 * k for k in range(11))
+FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)  # along world x and y
+FOOT_DROPS = tuple(6.0 * k for k in range(11))  # from the back plate, beyond the least height
 FREE = 5.0  # above the foot, for everything except the mount
 SWEEP_MARGIN = 3.0  # around the turning lidar
 
