@@ -39,6 +39,17 @@ SCREWS = {
         Screw("M8", 8.0, 13.0, 8.0, 6.8, 13.0, 6.8),
     )
 }
+# of a hexagon key: radius over its corners with clearance, and length of its long arm (ISO 2936)
+KEYS_MM = {
+    "M1.6": (1.2, 46.5),
+    "M2": (1.2, 46.5),
+    "M2.5": (1.4, 52.0),
+    "M3": (1.6, 58.5),
+    "M4": (1.9, 66.0),
+    "M5": (2.4, 74.0),
+    "M6": (3.0, 85.0),
+    "M8": (3.6, 96.0),
+}
 TRIPOD_SCREW = Screw("1/4-20 UNC", 6.35, 9.53, 6.35, 5.1, 11.11, 5.74, nut_standard="ASME B18.2.2")
 """Of tripods (ISO 1222), with the head of a cap screw of its size; core and nut of ASME B1.1 and B18.2.2."""
 

@@ -15,22 +15,12 @@ from scanwright.cad.assembly.scenes import StepScene, scenes_of
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import FIXED_CABLES, LIDAR_CABLE, ROTOR_LEADS
+from scanwright.cad.screws import KEYS_MM
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.frames import Rz
 from scanwright.design.scene import ray_caster
 
-# of a hexagon key: radius over its corners with clearance, and length of its long arm (ISO 2936)
-KEYS_MM = {
-    "M1.6": (1.2, 46.5),
-    "M2": (1.2, 46.5),
-    "M2.5": (1.4, 52.0),
-    "M3": (1.6, 58.5),
-    "M4": (1.9, 66.0),
-    "M5": (2.4, 74.0),
-    "M6": (3.0, 85.0),
-    "M8": (3.6, 96.0),
-}
 BY_HAND_MM = (3.0, 0.0)  # a screw of another size has a knob
 RAYS = 12  # around the one along the screw's axis
 OVER_HEAD_MM = 0.2

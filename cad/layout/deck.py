@@ -7,16 +7,19 @@ rotation frame at gamma = 0, mm, unless its name contains world.
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from scanwright.cad import outlines
 from scanwright.cad.layout.drive import DriveLayout, Mounted
+from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import DECK_MM, Joint, triple, upright_axes
 from scanwright.cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
 from scanwright.cad.layout.names import BASE_MOUNT, DECK
 from scanwright.cad.layout.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
-from scanwright.cad.screws import SCREWS, Screw
+from scanwright.cad.screws import KEYS_MM, SCREWS, Screw
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.deck_holes import Circle, Rectangle
@@ -36,7 +39,8 @@ USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes 
 PAD_HALF = 26.0  # of the strut on the foot
 STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 HOLE_MARGIN = 10.0  # of the foot around a hole
-FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)
+FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)  # along world x and y
+FOOT_DROPS = tuple(6.0 * k for k in range(11))  # from the back plate, beyond the least height
 FREE = 5.0  # above the foot, for everything except the mount
 SWEEP_MARGIN = 3.0  # around the turning lidar
 
@@ -88,9 +92,10 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     else:
         rotor_radius = drive.envelope.radius(drive.stack.sub_plate)
         height = _height_of_back(rotor_radius, mounted, normal, back, half)
-        centre = back - height * normal + _foot_shift(scanner, mounted, deck_holes, back, normal, R[0], height)
-    axes, depth = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0), mounted.thread_mm
-    joints = (Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, axes, grip_mm=DECK_MM, thread_mm=depth),)
+        axes = np.stack([along, np.cross(normal, along), normal], axis=1)
+        centre = _foot_centre(screw, mounted, deck_holes, back - height * normal, axes, _plate_corners(back, half))
+    upwards, depth = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0), mounted.thread_mm
+    joints = (Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, upwards, grip_mm=DECK_MM, thread_mm=depth),)
     foot = _foot(pattern, screw)
     offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
@@ -160,49 +165,60 @@ def _height_of_back(
     rotor_radius: float, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
 ) -> float:
     """Return the height of the back plate's centre above the deck that keeps everything FREE above the foot."""
-    plate = [
-        (sx * half[0], back[1] + sy * half[1], back[2] - depth)
-        for sx in (1, -1)
-        for sy in (1, -1)
-        for depth in (0.0, BACK_THICKNESS)
-    ]
-    below = [float(-(np.array(point) @ normal)) for point in (*mounted.corners, *plate)]
+    below = [float(-(point @ normal)) for point in (*mounted.corners, *_plate_corners(back, half))]
     sideways = float(np.hypot(normal[0], normal[1]))
     below += [around * sideways - z * float(normal[2]) for around, z in mounted.discs]
     below.append(rotor_radius + SWEEP_MARGIN)
     return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
 
 
-def _foot_shift(
-    scanner: Scanner,
+def _plate_corners(back: Array, half: tuple[float, float]) -> Array:
+    """Return the corners of the back plate, shape (8, 3)."""
+    x, y = half
+    return back + box_corners(((-x, -y, -BACK_THICKNESS), (x, y, 0.0)))
+
+
+def _foot_centre(
+    screw: Screw,
     mounted: Mounted,
     deck_holes: tuple[tuple[float, float], ...],
-    back: Array,
-    normal: Array,
-    along: Array,
-    height: float,
+    below: Array,
+    axes: Array,
+    plate: Array,
 ) -> Array:
-    """Return the least shift of the foot that keeps the drivers of the case screws off the deck screws.
+    """Return the centre of the foot nearest to `below` where every driver passes; `below` if there is none.
 
-    The drivers come from behind along z, through the strut and sometimes the foot.
+    The drivers of the load's screws come from behind along z, through the strut and sometimes the foot: they miss the
+    deck's screws. The keys of these come along the deck's normal: they miss the load, the back plate and the strut.
     """
-    screw = SCREWS[(scanner.deck or USUAL).screw]
     apart = mounted.screw.driver_radius + screw.driver_radius
-    left = np.cross(normal, along)
-    shifts = sorted(((a, b) for a in FOOT_SHIFTS for b in FOOT_SHIFTS), key=lambda s: s[0] ** 2 + s[1] ** 2)
-    depths = np.linspace(0.0, FOOT_THICKNESS + screw.head_height, 11)
+    radius, length = KEYS_MM[screw.name]
+    heads = FOOT_THICKNESS + screw.head_height
+    depths = np.linspace(0.0, heads, 11)
+    holes = np.array([(u, v, 0.0) for u, v in deck_holes])
+    pad = box_corners(((-PAD_HALF, -PAD_HALF, 0.0), (PAD_HALF, PAD_HALF, FOOT_THICKNESS))) @ axes.T
+    load = [ConvexHull(corners).equations for corners in mounted.bodies]
 
-    def clearance(shift: tuple[float, float]) -> float:
-        centre = back - height * normal + shift[0] * along + shift[1] * left
-        screws = [centre + u * along + v * left + depth * normal for u, v in deck_holes for depth in depths]
-        return min(
-            float(np.hypot(point[0] - x, point[1] - y)) if point[2] < back[2] else apart
-            for point in screws
-            for x, y in mounted.holes
-        )
+    def passes(centre: Array) -> bool:
+        screws = (centre + holes @ axes.T)[:, None] + depths[:, None] * axes[:, 2]
+        across = np.linalg.norm(screws[:, :, None, :2] - np.array(mounted.holes), axis=3)
+        if (across[screws[..., 2] < plate[:, 2].max()] < apart).any():
+            return False
+        strut = ConvexHull(np.concatenate([plate, centre + pad])).equations
+        return not any(_meets(each, screws[:, -1], axes[:, 2], length, radius) for each in (*load, strut))
 
-    a, b = next((shift for shift in shifts if clearance(shift) >= apart), (0.0, 0.0))
-    return a * along + b * left
+    moves = sorted(product(FOOT_SHIFTS, FOOT_SHIFTS, FOOT_DROPS), key=lambda move: sum(each**2 for each in move))
+    centres = (below + axes @ [a, b, -drop] for a, b, drop in moves)
+    return next((centre for centre in centres if passes(centre)), below)
+
+
+def _meets(planes: Array, starts: Array, along: Array, length: float, radius: float) -> bool:
+    """Return whether a key from any of the starts (n, 3) comes nearer to a convex shape than its radius."""
+    slope = np.tile(planes[:, :3] @ along, (len(starts), 1))
+    slope[np.abs(slope) < 1e-9] = 1e-9
+    at = (radius - starts @ planes[:, :3].T - planes[:, 3]) / slope
+    enters, leaves = np.where(slope < 0, at, 0.0).max(axis=1), np.where(slope > 0, at, length).min(axis=1)
+    return bool((enters < leaves).any())
 
 
 def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, float]:

@@ -127,6 +127,7 @@ class Mounted:
     holes: tuple[tuple[float, float], ...]  # x and y of the four
     fixing: Fixing  # of the screws: a nut behind the holes, or their thread
     corners: Array  # of boxes around all that does not turn, shape (n, 3)
+    bodies: tuple[Array, ...]  # corners of convex shapes of all that is on the mount when it is screwed to the deck
     # radius and height of other circles about the axis that must stay clear of the deck
     discs: tuple[tuple[float, float], ...]
     on_flat_deck: bool  # whether it may be screwed to a flat deck without a mount if the axis is upright

@@ -23,7 +23,7 @@ from scanwright.cad.layout.belt.stack import (
     case_corners,
     drive_corners,
 )
-from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, tower_foot_of
+from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, shelf_corners, tower_corners, tower_foot_of
 from scanwright.cad.layout.drive import (
     Body,
     Bundle,
@@ -35,7 +35,7 @@ from scanwright.cad.layout.drive import (
     Station,
     StatorExit,
 )
-from scanwright.cad.layout.envelope import Envelope
+from scanwright.cad.layout.envelope import Envelope, box_corners
 from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import Thread
@@ -168,6 +168,8 @@ def _stations(stack: BeltStack, ring: SlipRing) -> Iterator[Station]:
 
 def _mounted(stack: BeltStack, thread: Thread) -> Mounted:
     foot = [(x, y, stack.tower_bottom) for x in (-FOOT_HALF, FOOT_HALF) for y in (-FOOT_HALF, FOOT_HALF)]
+    rim = stack.rim_radius
+    pulleys = box_corners(((-rim, -rim, stack.teeth_low), (stack.centre + rim, rim, stack.pulley_top)))
     return Mounted(
         onto=names.BEARING_TOWER,
         rear=stack.tower_bottom,
@@ -176,6 +178,7 @@ def _mounted(stack: BeltStack, thread: Thread) -> Mounted:
         holes=tuple((a * FOOT_HOLE, b * FOOT_HOLE) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))),
         fixing="nut",
         corners=np.concatenate([drive_corners(stack), np.array(foot)]),
+        bodies=(*tower_corners(stack), shelf_corners(stack), case_corners(stack), pulleys @ stack.turn().T),
         discs=((stack.wide_radius, stack.tower_bottom), (stack.wide_radius, stack.tower_top)),
         on_flat_deck=False,
         thread_mm=FOOT - 1.0 if thread.trap is None else UNDER_FOOT_NUT,

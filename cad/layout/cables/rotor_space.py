@@ -4,14 +4,15 @@ Rotation frame at gamma = 0, mm.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
 from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
-from scanwright.cad.layout.envelope import Box, box_corners
+from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.envelope import Box, around_axis, box_corners
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.catalogue.lidar import Lidar
@@ -85,7 +86,7 @@ def rotor_space_of(place: Placement, avoid: Iterable[Shape]) -> RotorSpace:
     boxes = (envelope.body, envelope.plate(sub_plate), envelope.under(sub_plate), *_stubs(lidar))
     bearings = lidar.bearings_rad()
     return RotorSpace(
-        shapes=(*(shape_of(box_corners(box) @ R.T) for box in boxes), *avoid),
+        shapes=(*(shape_of(box_corners(box) @ R.T) for box in boxes), *_round(place), *avoid),
         channels=envelope.cables,
         R_rot_laser=R,
         bearings_rad=(float(bearings.min()), float(bearings.max())),
@@ -94,6 +95,14 @@ def rotor_space_of(place: Placement, avoid: Iterable[Shape]) -> RotorSpace:
         deck=place.deck,
         others=(np.zeros((0, 3)), 0.0),
     )
+
+
+def _round(place: Placement) -> Iterator[Shape]:
+    """Yield the shaft below the hub, and the rotor of a ring around it."""
+    stack, direct, ring = place.stack, place.drive.of(DirectStack), place.scanner.slip_ring
+    yield shape_of(around_axis(stack.shaft_diameter / 2, place.drive.floor, stack.shoulder))
+    if direct is not None and ring is not None and ring.rotor is not None:
+        yield shape_of(around_axis(ring.rotor.diameter_mm / 2, direct.ring_top, direct.ring_top + ring.rotor.length_mm))
 
 
 def _stubs(lidar: Lidar) -> list[Box]:

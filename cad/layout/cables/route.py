@@ -80,7 +80,7 @@ def short_path(
     beyond = len(first) + len(lattice)
     chain = PathGraph(space, half, radius, points).chain(
         {i: (end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(first)},
-        {i: (-end.direction, end.lengths[tip] - end.used) for i, (end, tip) in enumerate(last, start=beyond)},
+        dict(enumerate(last, start=beyond)),
     )
     if not chain:
         return None
@@ -108,11 +108,13 @@ def _clear(space: CableSpace, end: Ending, tip: int, half: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Ends:
-    """The stiff pieces that begin at the last points: number of the first of these, directions (k, 3), lengths (k,)."""
+    """The stiff pieces that begin at the last points: number of the first of these, and data of each."""
 
     first: int
-    directions: Array
-    left: Array
+    directions: Array  # towards the device, shape (k, 3)
+    left: Array  # length available for an arc, shape (k,)
+    corners: Array  # at the device, shape (k, 3)
+    clamped: Array  # distance from there that may be near the device, shape (k,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,15 +127,16 @@ class PathGraph:
     points: Array  # first those at the ring, last those at the lidar
     _joined: dict[int, tuple[NDArray[np.int64], Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
-    def chain(self, starts: dict[int, Stiff], goals: dict[int, Stiff]) -> list[int]:
+    def chain(self, starts: dict[int, Stiff], goals: dict[int, tuple[Ending, int]]) -> list[int]:
         """Return the points of a short chain of pieces from a start to a goal; empty if there is none.
 
         Args:
             starts: first points, the direction of the stiff piece that ends there, and its length left for an arc.
-            goals: last points, and the same of the stiff piece that begins there.
+            goals: last points, the stiff end that begins there, and the number of its length.
         """
         left = GREED * np.linalg.norm(self.points[:, None] - self.points[list(goals)], axis=2).min(axis=1)
-        ends = _Ends(min(goals), *(np.array(each) for each in zip(*goals.values(), strict=True)))
+        last = [(-end.direction, end.lengths[n] - end.used, end.corners[-1], end.clamped) for end, n in goals.values()]
+        ends = _Ends(min(goals), *(np.array(each) for each in zip(*last, strict=True)))
         # a piece is known by its two points; before the first one is the stiff end
         shortest: dict[int, Array] = {}  # of all chains so far that end with each piece from a point
         came: dict[tuple[int, int], tuple[int, int]] = {}
@@ -176,7 +179,17 @@ class PathGraph:
         chosen = np.flatnonzero(fits)
         inside = self.points[here] + _on_arcs(self.radius, direction, along[chosen])
         free = self.space.free(inside.reshape(-1, 3), self.half, GAP).reshape(len(inside), -1).all(axis=0)
-        return chosen[free]
+        chosen = chosen[free]
+        return chosen[np.array([self._arrives(along[k], int(others[k]), ends) for k in chosen], dtype=bool)]
+
+    def _arrives(self, along: Array, there: int, ends: _Ends) -> bool:
+        """Return whether a piece ends at no last point, or the arc there is free outside its device."""
+        end = there - ends.first
+        if end < 0:
+            return True
+        arc = self.points[there] + _on_arcs(self.radius, along, ends.directions[end, None])[:, 0]
+        outside = np.linalg.norm(arc - ends.corners[end], axis=1) > ends.clamped[end]
+        return bool((self.space.free(arc, self.half, GAP) | ~outside).all())
 
     def _pieces_at(self, here: int) -> tuple[NDArray[np.int64], Array, Array]:
         """Return points reached by a free straight piece, directions (m, 3) and lengths (m,)."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
+from scanwright.cad.layout.envelope import Box
 from scanwright.cad.layout.joints import fixing_in
 from scanwright.cad.layout.names import SERVO_FRAME
 from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
@@ -70,6 +71,14 @@ class ServoFrame:
         """Distance of the servo's screws from the edge over which the servo tips off the plate."""
         y = sum(y for _, y in self.holes) / len(self.holes)
         return min(abs(end - y) for end in self.ends_y)
+
+    def boxes(self) -> tuple[Box, Box]:
+        """Return the boxes around its sides with the plate, and around its feet."""
+        (y0, y1), side, low = self.ends_y, self.half_x + self.leg, self.low
+        return (
+            ((-side, y0, low), (side, y1, self.high)),
+            ((-self.reach_x, y0, low), (self.reach_x, y1, low + FOOT)),
+        )
 
     def legs(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
         """Return the boxes of the four legs with their feet, as low and high corners."""

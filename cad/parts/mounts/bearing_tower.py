@@ -9,7 +9,6 @@ the linkage's hub.
 """
 
 import math
-from collections.abc import Iterator
 from functools import partial
 
 import cadquery as cq
@@ -31,9 +30,15 @@ from scanwright.cad.layout.belt.stack import (
     TRAVEL,
     BeltStack,
 )
-from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_FOOT_NUT, UNDER_HEAD, disc_azimuths
-from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.envelope import around_axis, box_corners
+from scanwright.cad.layout.belt.tower import (
+    DISC_SCREW,
+    SCREW_DEPTH,
+    UNDER_FOOT_NUT,
+    UNDER_HEAD,
+    disc_azimuths,
+    tower_corners,
+)
+from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
@@ -78,16 +83,8 @@ def tower_spec(place: Placement) -> PartSpec | None:
         shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
         shapes={"printer.fit_clearance_mm": "every bore and seat"},
         joints=(joint,),
-        avoid=tuple(_around(stack)),
+        avoid=tuple(map(shape_of, tower_corners(stack))),
     )
-
-
-def _around(stack: BeltStack) -> Iterator[Shape]:
-    """Yield the tower and its foot."""
-    yield shape_of(around_axis(stack.wide_radius, stack.tower_bottom, stack.tower_top))
-    flares = max(0.0, math.sqrt(2) * FOOT_HALF - stack.wide_radius)  # the cone on the foot, at 45 deg
-    foot = stack.tower_bottom + FOOT + flares
-    yield shape_of(box_corners(((-FOOT_HALF, -FOOT_HALF, stack.tower_bottom), (FOOT_HALF, FOOT_HALF, foot))))
 
 
 def _nuts_words(foot: Thread, printer: Printer) -> tuple[str, ...]:

@@ -8,15 +8,14 @@ import math
 from functools import partial
 
 import cadquery as cq
-import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.belt.plate import UNDER_HEAD
-from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack, drive_corners
-from scanwright.cad.layout.cables.obstacles import Shape, shape_of
+from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack
+from scanwright.cad.layout.belt.tower import shelf_corners
+from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.drive import Ears
-from scanwright.cad.layout.envelope import box_corners
-from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_axes, screws, triple, upright_axes
+from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO_CASE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.mounts.bearing_cage import head_recess
@@ -60,16 +59,8 @@ def plate_spec(place: Placement) -> PartSpec | None:
                 slot_mm=(slot, slot + 2 * TRAVEL),
             ),
         ),
-        avoid=(_around(stack),),
+        avoid=(shape_of(shelf_corners(stack)),),
     )
-
-
-def _around(stack: BeltStack) -> Shape:
-    """Return the plate and arms of the tower, with the pulley on the horn."""
-    corners = drive_corners(stack)
-    low = np.where(np.arange(3) == 2, stack.tower_top - SHELF, corners.min(axis=0))
-    high = np.where(np.arange(3) == 2, stack.tower_top + PLATE, corners.max(axis=0))
-    return shape_of(box_corners((triple(low), triple(high))))
 
 
 def drive_plate(stack: BeltStack, p: Ears, slot: float) -> cq.Solid:

@@ -10,7 +10,9 @@ from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
 from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
 from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.cables.rotor_space import rotor_space_of
+from scanwright.cad.layout.cables.route import Ending, short_path
 from scanwright.cad.layout.direct.cage import BearingCage
+from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
@@ -27,7 +29,7 @@ SETTINGS = {  # servo on the axis, upright and lying lidar; with a bearing; a ho
 }
 
 
-def layout_for(setting, **of_ring):
+def scanner_of_setting(setting):
     (alpha_rot, beta_rot, alpha, beta), lidar, ring = SETTINGS[setting]
     angles = AngleSet(
         task="test",
@@ -36,7 +38,11 @@ def layout_for(setting, **of_ring):
         servo="MX-64R",
         slip_ring=ring,
     )
-    scanner = scanner_of(angles, "fdm-0.4", load_catalogue())
+    return scanner_of(angles, "fdm-0.4", load_catalogue())
+
+
+def layout_for(setting, **of_ring):
+    scanner = scanner_of_setting(setting)
     return laid_out(replace(scanner, slip_ring=scanner.slip_ring.model_copy(update=of_ring)))
 
 
@@ -61,6 +67,53 @@ def test_a_path_keeps_its_radius_and_is_as_long_as_its_points():
 def test_what_is_too_short_for_its_radius_has_no_path():
     with pytest.raises(ValueError, match=r"4\.00 mm too near"):
         Path(((0, 0, 0), (0, 0, 10), (10, 0, 10), (10, 0, 30)), 7.0).pieces()
+
+
+class Balls:
+    """Random small balls to avoid, around the end of a cable."""
+
+    def __init__(self, draw):
+        self.middles = draw.normal((0.0, 0.0, 50.0), 15.0, (60, 3))
+        self.radii = draw.uniform(0.5, 1.5, 60)
+
+    def free(self, points, half, gap):
+        apart = np.linalg.norm(points[:, None] - self.middles, axis=2) - self.radii
+        return (apart > half + gap).all(axis=1)
+
+
+def test_a_short_path_is_free_from_end_to_end_arcs_at_its_ends_included():
+    draw, found = np.random.default_rng(0), 0
+    for _ in range(15):
+        space, lattice = Balls(draw), draw.uniform(-70, 70, (250, 3))
+        outwards = draw.normal(size=(2, 3))
+        outwards /= np.linalg.norm(outwards, axis=1)[:, None]
+        ends = [
+            Ending(at[None], out, (10.0, 14.0, 20.0, 28.0), 0.0, 3.0)
+            for at, out in zip(([0.0, 0.0, -50.0], [0.0, 0.0, 50.0]) * np.ones((2, 1)), outwards, strict=True)
+        ]
+        path = short_path(space, ends[:1], ends[1:], 2.0, 12.0, lattice)
+        if path is None:
+            continue
+        found += 1
+        points = path.points(0.5)
+        outside = np.linalg.norm(points[:, None] - [end.corners[0] for end in ends], axis=2).min(axis=1) > 3.5
+        assert space.free(points[outside], 2.0, 0.0).all()
+    assert found > 3
+
+
+@pytest.mark.parametrize("setting", ["upright", "belt"])
+def test_a_lead_may_be_neither_in_the_shaft_nor_in_the_rotor_of_its_ring(setting):
+    place = placement_of(scanner_of_setting(setting))
+    room, stack, draw = rotor_space_of(place, ()), place.stack, np.random.default_rng(3)
+    turn = draw.uniform(0, 2 * np.pi, 50)
+    ring = place.scanner.slip_ring
+    around = [(stack.shaft_diameter / 2, place.drive.floor + 3, stack.shoulder)]
+    if ring.bore_mm > 0:
+        around.append((ring.rotor.diameter_mm / 2, stack.ring_top, stack.leads_low))
+    for radius, low, high in around:
+        if low < high:
+            points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), draw.uniform(low, high, 50)])
+            assert not room.free(points, 1.0, 0.1).any()
 
 
 @pytest.mark.parametrize("setting", SETTINGS)

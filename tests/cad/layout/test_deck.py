@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from quick_tests import samples
 
+from scanwright.cad.checks.access import driver_rays
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.deck import deck_of
+from scanwright.cad.layout.direct.frame import ServoFrame
 from scanwright.cad.layout.placement import drive_of, placement_of
+from scanwright.cad.parts.all_parts import parts_of
 from scanwright.cad.parts.mounts.base_mount import base_mount
+from scanwright.cad.screws import KEYS_MM
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.deck_holes import Circle, Rectangle
@@ -27,13 +31,13 @@ period_s = 18.0
 """
 
 
-def scanner_for(alpha_rot, beta_rot, deck):
+def scanner_for(alpha_rot, beta_rot, deck, servo="MX-64R", ring="SNU11-P0210"):
     angles = AngleSet(
         task="holes",
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=20, beta_laser=-40),
         sensor="UTM-30LX",
-        servo="MX-64R",
-        slip_ring="SNU11-P0210",
+        servo=servo,
+        slip_ring=ring,
     )
     return scanner_of(angles, "fdm-0.4", load_catalogue(), deck)
 
@@ -68,6 +72,34 @@ def test_the_mount_has_the_holes_of_the_deck_around_the_world_origin(deck, count
         np.testing.assert_allclose(np.linalg.norm(rim - hole, axis=1), radius, atol=0.01)
         assert reach[reach > radius + 0.5].min() > 2 * radius  # material around it
     assert stack == drive_of(scanner_for(alpha_rot, beta_rot, None)).stack  # nothing above the mount changes
+
+
+@pytest.mark.parametrize("servo", ["XM430-W350", "XM540-W270", "MX-64R"])
+def test_the_key_of_every_deck_screw_passes_what_is_on_the_mount(servo):
+    """Random tilted axes, with and without a belt: the boxes of case and frame, the tower's tube and foot, in plain."""
+    draw = np.random.default_rng(7)
+    for _ in range(20):
+        ring = None if draw.random() < 0.5 else "SRC022A-6"
+        scanner = scanner_for(*draw.uniform((-180, -80), (180, 80)), None, servo=servo, ring=ring)
+        place = placement_of(scanner)
+        stack, drive = place.stack, place.drive
+        joint = next(joint for part in parts_of(place) for joint in getattr(part, "joints", ()) if joint.onto == "deck")
+        starts, back = driver_rays(joint)
+        x, y, z = (starts + np.linspace(0, KEYS_MM["M4"][1], 200)[:, None, None, None] * back).T
+        if ring is None:
+            low, high = scanner.servo.case_min_mm, scanner.servo.case_max_mm
+            boxes = [((low[0], high[0]), (low[1], high[1]), (stack.horn + low[2], stack.horn + high[2]))]
+            if (frame := drive.of(ServoFrame)) is not None:
+                side = frame.half_x + frame.leg
+                boxes.append(((-side, side), frame.ends_y, (frame.low, frame.high)))
+                boxes.append(((-frame.reach_x, frame.reach_x), frame.ends_y, (frame.low, frame.low + 6)))
+            for (x0, x1), (y0, y1), (z0, z1) in boxes:
+                assert not ((x0 < x) & (x < x1) & (y0 < y) & (y < y1) & (z0 < z) & (z < z1)).any()
+        else:
+            tube = (np.hypot(x, y) < stack.tower_radius) & (stack.tower_bottom < z) & (z < stack.tower_top)
+            chamber = (np.hypot(x, y) < stack.wide_radius) & (stack.tower_bottom < z) & (z < stack.lower_bottom)
+            foot = (np.maximum(abs(x), abs(y)) < 32) & (abs(x) + abs(y) < 56) & (abs(z - stack.tower_bottom - 5) < 5)
+            assert not (tube | chamber | foot).any()
 
 
 def test_a_hole_under_the_strut_is_refused_with_the_bound():
