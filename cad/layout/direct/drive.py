@@ -21,7 +21,7 @@ from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, 
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station
-from scanwright.cad.layout.envelope import Envelope, box_corners
+from scanwright.cad.layout.envelope import Envelope, around_axis, box_corners
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
 from scanwright.cad.screws import SCREWS
@@ -172,6 +172,8 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
         around, top = stack.cage_outer + CAGE_HEADS, stack.cage_top
     discs = ((around, stack.horn), (around, top))
     case = box_corners(((xs[0], ys[0], stack.horn + zs[0]), (xs[1], ys[1], stack.horn)))  # with its horn
+    boss = servo.horn_boss_diameter_mm / 2, servo.horn_boss_height_mm
+    bodies = (case,) if min(boss) <= 0 else (case, around_axis(boss[0], stack.horn, stack.horn + boss[1]))
     if frame is not None:
         x, z = frame.reach_x, (frame.low, frame.high)
         return Mounted(
@@ -182,7 +184,7 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
             holes=frame.feet,
             fixing="nut",
             corners=np.array([(sign * x, y, height) for sign in (-1, 1) for y in frame.ends_y for height in z]),
-            bodies=(case, *map(box_corners, frame.boxes())),
+            bodies=(*bodies, *map(box_corners, frame.boxes())),
             discs=discs,
             on_flat_deck=True,
             thread_mm=FOOT,
@@ -195,7 +197,7 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
         holes=corner_holes(servo.rear.places),
         fixing=fixing_of(servo.rear),
         corners=np.array([(x, y, stack.horn + z) for x in xs for y in ys for z in zs]),
-        bodies=(case,),
+        bodies=bodies,
         discs=discs,
         on_flat_deck=True,
         thread_mm=servo.rear.depth_mm,
