@@ -183,6 +183,7 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     ray = [*((np.array([380, 210]) - (450, 280)) / (280 / np.tan(client.camera.fov / 2))), 1.0]
     ray = viser.transforms.SO3(client.camera.wxyz).as_matrix() @ ray
     assert axis @ studio.view.room.beyond(np.array(client.camera.position), ray) > np.cos(np.radians(0.3))
+    studio.controls.density.value = False  # what is not drawn costs no time
     tab(page, "Angles")
     page.get_by_role("button", name="Optimise").click()
     page.get_by_text("searching the equivalent mount").wait_for()
@@ -194,7 +195,6 @@ def test_a_person_finds_paints_keeps_and_saves(studio, browser, folder, command)
     assert studio.facts.J < studio.judge.exact(Setting(before)).J - 0.01
     page.keyboard.press("b")
     until(lambda: not studio.controls.painting.value)
-    studio.controls.density.value = False  # what is not drawn costs no time
 
     # side by side, and back
     page.get_by_role("button", name="Keep this setting").click()
