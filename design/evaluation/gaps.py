@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
-from scipy.spatial import ConvexHull
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull, QhullError
 
 from scanwright.design.arrays import Array, Plane, Setting, Vector
 from scanwright.design.density.beams import beam_directions_rot, line_spacing, polar_and_azimuth
@@ -25,6 +26,7 @@ from scanwright.design.objective.quadrature import polar_rule
 from scanwright.design.sphere.directions import weighted_samples
 
 DIRECTIONS = 20_000  # of the region, for a sweep and for the widest gap
+FLAT = 1e-6  # distance of the centre from a facet that is rounding
 WIDE = 3.0
 """Gaps wider than this times the spacing of lines or beams are reported: empty discs in a regular pattern reach the
 square root of 2, and twice that at the end of a turn."""
@@ -74,10 +76,23 @@ def gaps(problem: Problem, angles_rad: Setting) -> Gaps:
 
 
 def empty_cap(scan: Float[ndarray, "n 3"]) -> BlindCone:
-    """Return the largest cap without a beam of a simulated scan: no beam lies beyond the facets of the convex hull."""
-    planes = ConvexHull(scan).equations
-    widest = int(planes[:, 3].argmax())
-    return BlindCone(triple(planes[widest, :3]), float(np.degrees(np.arccos(np.clip(-planes[widest, 3], -1, 1)))))
+    """Return the largest cap without a beam of a simulated scan: no beam lies beyond the facets of the convex hull.
+
+    If the centre is not inside the hull, the cap is opposite to the point of the hull that is nearest to the centre.
+    """
+    try:
+        hull = ConvexHull(scan)
+    except QhullError:  # all beams in one plane, of a fan that turns in its own plane
+        hull = ConvexHull(scan, qhull_options="QJ")
+    widest = int(hull.equations[:, 3].argmax())
+    axis, cosine = hull.equations[widest, :3], -hull.equations[widest, 3]
+    if cosine < FLAT:
+        corners = scan[hull.vertices]
+        shares, _ = nnls(np.vstack([corners.T, np.full(len(corners), 100.0)]), np.array([0.0, 0.0, 0.0, 100.0]))
+        nearest = shares @ corners / shares.sum()
+        if np.linalg.norm(nearest) > FLAT:
+            axis, cosine = -nearest / np.linalg.norm(nearest), -np.linalg.norm(nearest)
+    return BlindCone(triple(axis), float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
 
 
 def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]) -> Finding | None:

@@ -33,11 +33,26 @@ from scanwright.firmware_io.samples import Scan
 from scanwright.firmware_io.emulators.lidar_line import LidarLine
 
 
+class Lines:
+    bad = 0
+
+    def __init__(self):
+        self.rest = b""
+
+    def feed(self, data, /):
+        *whole, self.rest = (self.rest + data).split(b"\\n")
+        return [line for line in whole if len(line.split()) == 4]
+
+    def cut_in(self):
+        pass
+
+
 class Acme(LineDriver):
     serial_number, firmware, model, scan_rate_hz, dropped, bad_packets = "1", "2", "ACME", 10.0, 0, 0
 
     def __init__(self, address, model, stamp_at):
-        self.address, self.rest, self._line = address, b"", SensorLine(address, 100)
+        self.address, self._line = address, SensorLine(address, 100)
+        self._line.split_by(Lines())
 
     def condition(self):
         return ()
@@ -49,7 +64,7 @@ class Acme(LineDriver):
         pass
 
     def read(self, timeout_s=None):
-        lines, arrival_ns = self._line.receive(self.lines, time.monotonic() + (timeout_s or 5))
+        lines, arrival_ns = self._line.receive(time.monotonic() + (timeout_s or 5))
         range_m = np.array(lines[-1].split(), np.float32) / 1000
         scan = Scan(
             stamp_ns=arrival_ns - 100_000_000, angle_min_rad=0.0, angle_increment_rad=-np.pi / 2,
@@ -57,10 +72,6 @@ class Acme(LineDriver):
             range_m=range_m, intensity=range_m[:0],
         )
         return TimedScan(scan, arrival_ns, 1_000_000)
-
-    def lines(self, data):
-        *whole, self.rest = (self.rest + data).split(b"\\n")
-        return [line for line in whole if len(line.split()) == 4]
 
 
 class Machine:

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from scanwright.design.density.ball_count import ball_count
 from scanwright.design.density.beams import ScanLines, beam_directions_rot, scan_lines
 from scanwright.design.errors import TaskError
-from scanwright.design.evaluation.gaps import _in_field_of_view, gaps, interlaced_period_s
+from scanwright.design.evaluation.gaps import _in_field_of_view, empty_cap, gaps, interlaced_period_s
 from scanwright.design.frames import R_world_rot
 from scanwright.design.objective.problem import problem_of
 from scanwright.design.search.shortest_period import shortest_period_s
@@ -127,6 +127,23 @@ def test_the_shortest_period_by_simulation(ground, least):
 
     assert lowest(scan_lines(period, 40.0)) >= least
     assert lowest(scan_lines(period * 0.9, 40.0)) < least
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_largest_empty_cap_by_trying_directions(seed):
+    """Beams all around, on one side, and in one plane: a full circle of a cone, and a part of it."""
+    rng = np.random.default_rng(seed)
+    tried = spiral(50_000)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    around, up = np.linspace(0, rng.uniform(0.5, 6.2), 200), rng.choice([0.0, 0.3, -0.8])
+    arc = np.stack([np.cos(around) * np.cos(up), np.sin(around) * np.cos(up), np.full(200, np.sin(up))], axis=1)
+    for beams in (rng.normal(size=(300, 3)), 0.4 * rng.normal(size=(200, 3)) + [1, 0, 0], arc @ turn):
+        scan = beams / np.linalg.norm(beams, axis=1, keepdims=True)
+        cap = empty_cap(scan)
+        nearest = np.degrees(np.arccos(np.clip((scan @ np.array(cap.axis_world)).max(), -1, 1)))
+        assert cap.half_angle_deg == pytest.approx(nearest, abs=1e-3)
+        widest = np.degrees(np.arccos(np.clip((tried @ scan.T).max(axis=1).min(), -1, 1)))
+        assert widest - 1e-3 <= cap.half_angle_deg <= widest + 1.5
 
 
 def test_a_blind_region_has_no_shortest_period(uniform):
