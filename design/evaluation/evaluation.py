@@ -189,9 +189,8 @@ class Evaluation:
                 f"surfaces       {middle:,.0f} points per m2 in the region (median by area), {low:,.1f} the lowest"
             )
         if self.shortest_s is not None:
-            lines.append(
-                f"period         {self.shortest_s:g} s a turn: the shortest that keeps the limits, at most longest_s"
-            )
+            why = "the shortest that keeps the limits, longest_s if none does"
+            lines.append(f"period         {self.shortest_s:g} s a turn: {why}")
         if self.interlaced_s is not None:
             lines.append(
                 f"interlaced     with {self.interlaced_s:g} s a turn: the next turn's lines fall between these"

@@ -87,12 +87,24 @@ def empty_cap(scan: Float[ndarray, "n 3"]) -> BlindCone:
     widest = int(hull.equations[:, 3].argmax())
     axis, cosine = hull.equations[widest, :3], -hull.equations[widest, 3]
     if cosine < FLAT:
-        corners = scan[hull.vertices]
-        shares, _ = nnls(np.vstack([corners.T, np.full(len(corners), 100.0)]), np.array([0.0, 0.0, 0.0, 100.0]))
-        nearest = shares @ corners / shares.sum()
+        nearest = _nearest_of_hull(scan[hull.vertices])
         if np.linalg.norm(nearest) > FLAT:
             axis, cosine = -nearest / np.linalg.norm(nearest), -np.linalg.norm(nearest)
     return BlindCone(triple(axis), float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))))
+
+
+def _nearest_of_hull(corners: Float[ndarray, "n 3"]) -> Vector:
+    """Return the point of the convex hull that is nearest to the origin; the corners in use are added one by one."""
+    kept = [0]
+    while True:
+        used = corners[kept]
+        shares, _ = nnls(np.vstack([used.T, np.full(len(used), 100.0)]), np.array([0.0, 0.0, 0.0, 100.0]))
+        nearest: Vector = shares @ used / shares.sum()
+        ahead = corners @ nearest
+        following = int(ahead.argmin())
+        if following in kept or ahead[following] >= nearest @ nearest - 1e-12:
+            return nearest
+        kept.append(following)
 
 
 def wide_gap(problem: Problem, angles_rad: Setting, beams: Float[ndarray, "n 3"]) -> Finding | None:

@@ -95,7 +95,7 @@ def _message(fault: Any) -> str:
     if fault["type"] == "bool_type":
         return f"{value}: true or false, without quotes"
     if fault["type"] == "string_pattern_mismatch":
-        return f"{value}: {_PATTERNS[fault['ctx']['pattern']]}"
+        return f"{value}: {_PATTERNS.get(fault['ctx']['pattern'], fault['msg'])}"
     return f"{value}: {fault['msg'].removeprefix('Value error, ')}"
 
 
