@@ -428,6 +428,7 @@ def test_the_page_cannot_be_had_without_its_token(studio, browser):
     page = browser.open(gate.address.split("?")[0], width=400, height=300)
     assert "refused: no token" in page.inner_text("body")
     assert page.locator("canvas").count() == 0
+    page.context.close()  # so that no request of it, such as for an icon, is refused later
     browser.complaints.clear()  # the browser's own word on the 403
 
 
