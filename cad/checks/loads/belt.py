@@ -3,11 +3,10 @@
 import math
 
 from scanwright.cad.checks.limits import at_most, horn_check, note, tidy
-from scanwright.cad.checks.table import SHOCK_G
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
 from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg
+from scanwright.cad.layout.loads import FAR_MM, SHOCK_G, Weight, noise_deg
 from scanwright.cad.layout.names import BEARING, BELT
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.findings import Finding, Severity

@@ -8,12 +8,11 @@ import math
 from dataclasses import replace
 
 from scanwright.cad.checks.limits import at_most, figures, horn_check, rated
-from scanwright.cad.checks.table import SHOCK_G
 from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
 from scanwright.cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.loads import FAR_MM, Weight, noise_deg, rated_moment_nm
+from scanwright.cad.layout.loads import FAR_MM, SHOCK_G, Weight, noise_deg, rated_moment_nm
 from scanwright.cad.layout.names import BEARING, SERVO, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
 from scanwright.design.findings import Finding

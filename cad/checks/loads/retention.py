@@ -16,12 +16,12 @@ import numpy as np
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.masses import lidar_body
 from scanwright.cad.checks.limits import at_least, tidy
-from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
+from scanwright.cad.checks.table import LEAST_MARGIN
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.loads import Weight
+from scanwright.cad.layout.loads import SHOCK_G, Weight
 from scanwright.cad.layout.names import (
     BEARING_CAGE,
     DECK,

@@ -20,7 +20,7 @@ from scanwright.cad.layout.direct.lead_exits import lead_exits, stator_exit
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station
+from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station, servo_limit
 from scanwright.cad.layout.envelope import Envelope, around_axis, box_corners
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
@@ -87,6 +87,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         no_hub_tie="",
         stator_exit=None if scanner.slip_ring is None else stator_exit(scanner, stack, cage),
         bears=partial(_bears, scanner, stack),
+        limits=(servo_limit(scanner.servo),),
         built=BUILT,
         left_out=tuple(_left_out(scanner, stack, frame)),
         plain=framed is None,
