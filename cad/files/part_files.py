@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartReport:
-    """One made part: volume and mass, box in the rotation frame."""
+    """One made part: volume and mass without its label, box in the rotation frame."""
 
     name: str
     volume_mm3: float
