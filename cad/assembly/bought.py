@@ -13,7 +13,7 @@ import numpy as np
 
 from scanwright.cad import solids
 from scanwright.cad.assembly import bought_shapes as draw
-from scanwright.cad.assembly.tube import LEAD_CHORDS, cable_solid, lead_solid
+from scanwright.cad.assembly.bought_shapes import LEAD_CHORDS, cable_solid, lead_solid
 from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.stack import BeltStack

@@ -1,4 +1,4 @@
-"""Shapes of bought products with the dimensions of the catalogue. Millimetres.
+"""Shapes of bought products with the dimensions of the catalogue, and of cables along their paths. Millimetres.
 
 The lidar is in its body frame (origin on the base at the optical axis, x to the front, z up), the servo has its horn's
 axis as z; ring, bearing and belt are in the rotation frame at gamma = 0. Teeth of the belt and balls are not drawn.
@@ -8,11 +8,15 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import solids
+from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
+from scanwright.cad.layout.cables.fixed import FixedCable
+from scanwright.cad.layout.cables.leads import JOINT_LENGTH, TUBE_WALL, RotorLead
+from scanwright.cad.layout.cables.path import Path
 from scanwright.cad.layout.envelope import lidar_thread_mm
 from scanwright.cad.layout.joints import horn_centres
-from scanwright.cad.layout.names import BELT, RING_STATOR
+from scanwright.cad.layout.names import BELT, RING_STATOR, ROTOR_LEAD
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import building
 from scanwright.design.arrays import Array
@@ -20,6 +24,7 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.products import Bearing
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
+from scanwright.design.errors import BuildError
 
 CAP_INSET = 1.5
 CHORDS = 0.02  # overlap of the facets of a round seat and its hole: no fit is as wide
@@ -27,6 +32,52 @@ EAR_RECESS = 3.6  # radius of the recess around a case hole
 BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
 THROUGH = 0.25  # of a plain hole around its screw
 STUB = 0.4  # between the stub of a capsule's rotor and its body
+LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not as round as a bore
+
+
+def lead_solid(lead: RotorLead) -> cq.Solid:
+    """Return the wires between ring and lidar with the shrink tube over their joint.
+
+    Raises:
+        BuildError: the kernel does not make one valid solid of it, with a closed mesh.
+    """
+    assert lead.path is not None
+    with building(ROTOR_LEAD, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
+        tube: cq.Shape = _tube_along(lead.path, lead.diameter / 2)
+        if lead.joint is not None:
+            along = lead.joint.along
+            start = lead.joint.middle - JOINT_LENGTH / 2 * along
+            tube = tube.fuse(solids.cylinder(lead.diameter / 2 + TUBE_WALL, start, along, JOINT_LENGTH))
+        return _closed(ROTOR_LEAD, checked(tube))
+
+
+def cable_solid(cable: FixedCable) -> cq.Solid:
+    """Return a cable that does not turn.
+
+    Raises:
+        BuildError: the kernel does not make one valid solid of it, with a closed mesh.
+    """
+    assert cable.path is not None
+    with building(cable.name, "tube along its path", "diameter", f"{cable.diameter:g} mm") as checked:
+        return _closed(cable.name, checked(_tube_along(cable.path, cable.diameter / 2)))
+
+
+def _closed(name: str, solid: cq.Solid) -> cq.Solid:
+    if not mesh_of(solid, *LEAD_CHORDS).is_closed():
+        raise BuildError(f"{name}: mesh: tolerance = {LEAD_CHORDS[0]} mm: the surface is not closed")
+    return solid
+
+
+def _tube_along(path: Path, half: float) -> cq.Shape:
+    corners = np.array(path.corners, dtype=float)
+    edges = []
+    for piece in path.pieces():
+        start, middle, end = (solids.vector(point) for point in (piece.start, piece.middle, piece.end))
+        line = cq.Edge.makeLine(start, end) if piece.straight else cq.Edge.makeThreePointArc(start, middle, end)
+        edges.append(line)
+    wire = cq.Wire.assembleEdges(edges)
+    ring = cq.Wire.makeCircle(half, solids.vector(corners[0]), solids.vector(corners[1] - corners[0]))
+    return cq.Solid.sweep(ring, [], wire)
 
 
 def lidar_body(lidar: Lidar) -> cq.Solid:

@@ -51,7 +51,7 @@ def _balanced(assembly: Assembly) -> Assembly:
     bar = layout.counterweight
     assert not isinstance(bar, LeftOut)
     if len(assembly.carriers()) == sum(part.seat is not None for part in assembly.parts.values()):
-        bar = bar.balancing(rotor_moment(layout.scanner, assembly))  # all other parts are there
+        bar = bar.balancing(rotor_moment(assembly))  # all other parts are there
     spec = bar_spec(layout, bar)
     parts, made = assembly.parts | {spec.name: spec}, assembly.made | {spec.name: spec.make()}
     return replace(assembly, parts=parts, made=made)

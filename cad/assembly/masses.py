@@ -22,21 +22,20 @@ Motor, mirror and most boards are around its axis; plugs and windows, a tenth of
 """
 
 
-def link_bodies(scanner: Scanner, assembly: Assembly) -> dict[str, Inertial]:
+def link_bodies(assembly: Assembly) -> dict[str, Inertial]:
     """Return the mass properties of the URDF's links: servo and rot in the rotation frame, laser in the laser frame.
 
     Bought parts are homogeneous boxes, of which a share may turn; cables are lines.
     """
     masses = assembly.layout.drive.masses
     fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
-    fixed += [inertia.of_box((1 - each.turning) * mass_g, box.low, box.high) for each, mass_g, box in masses]
+    fixed += [inertia.of_box((1 - each.turning) * mass_g, *box) for each, mass_g, box in masses]
     fixed += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.cables if lead.path]
     turning = [assembly.inertial(name) for name in assembly.turning_parts()]
-    turning += [
-        inertia.of_box(each.turning * mass_g, box.low, box.high) for each, mass_g, box in masses if each.turning > 0
-    ]
+    turning += [inertia.of_box(each.turning * mass_g, *box) for each, mass_g, box in masses if each.turning > 0]
     turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.leads if lead.path]
-    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": lidar_body(scanner.lidar)}
+    lidar = lidar_body(assembly.layout.scanner.lidar)
+    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": lidar}
 
 
 def lidar_body(lidar: Lidar) -> Inertial:
@@ -63,7 +62,7 @@ def off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
     return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
 
 
-def rotor_moment(scanner: Scanner, assembly: Assembly) -> Array:
+def rotor_moment(assembly: Assembly) -> Array:
     """Return the mass times distance from the axis of all that turns, shape (2,) [g mm]."""
-    rotor = rotor_of(scanner, link_bodies(scanner, assembly))
+    rotor = rotor_of(assembly.layout.scanner, link_bodies(assembly))
     return np.asarray(1e6 * rotor.mass_kg * rotor.centre_m[:2])

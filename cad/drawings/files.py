@@ -10,8 +10,7 @@ from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
-from scanwright.cad.parts.part_spec import Process
-from scanwright.cad.parts.tolerances import OnSheet
+from scanwright.cad.parts.part_spec import OnSheet, Process
 from scanwright.design.catalogue.measuring import measure_first
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.scanner import Scanner

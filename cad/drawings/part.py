@@ -10,7 +10,7 @@ import numpy as np
 from scanwright.cad.drawings.patterns import Pattern, on_axis, patterns_of, slots_of, with_threads
 from scanwright.cad.geometry.holes import Round, rounds_of
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.part_spec import OnSheet, ToleratedDiameter
 from scanwright.design.arrays import Array
 
 STRAIGHT = 1e-4  # two directions closer than this are parallel

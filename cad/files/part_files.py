@@ -64,7 +64,7 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
     progress("loading the CAD kernel")
     from scanwright.cad.assembly.assembly import alone, as_tree
     from scanwright.cad.assembly.masses import link_bodies
-    from scanwright.cad.checks.remarks import remarks_of
+    from scanwright.cad.checks.products import remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
     from scanwright.cad.geometry.mesh import checked, stl_bytes
@@ -96,7 +96,7 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
         reports.append(PartReport(name, round(volume, 3), round(mass_g, 3), box, len(mesh.faces)))
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
-    bodies = link_bodies(scanner, assembly)
+    bodies = link_bodies(assembly)
     meshes = {"servo": assembly.fixed_parts(), "rot": assembly.turning_parts()}
     files["scanner.urdf"] = urdf_text(scanner, assembly.layout.drive, bodies, meshes).encode("utf-8")
     write_files(folder, files)
@@ -104,7 +104,7 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
         assembly=assembly,
         meshes=meshes_of_parts,
         parts=tuple(reports),
-        findings=tuple(remarks_of(scanner, assembly)),
+        findings=tuple(remarks_of(assembly)),
         left_out=(*layout.left_out, *labels.left_out),
         files=tuple(sorted(files)),
     )

@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.cad.assembly.print_settings import slicer_settings
-from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.products import without_traps
 from scanwright.cad.drawings.devices.template import template_pdf
 from scanwright.cad.files.bom import bom_text, items_of
-from scanwright.cad.files.glb_scenes import scene_files
+from scanwright.cad.files.glb import scene_files
 from scanwright.cad.files.manual.instructions import step_files
 from scanwright.cad.files.part_files import PartsResult, write_files
-from scanwright.cad.files.plates import plate_files, plates_of
-from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.files.plates import plate_files, plates_of, threemf_bytes
 from scanwright.cad.files.wiring import wiring_files
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose

@@ -15,11 +15,10 @@ from scipy.spatial import ConvexHull
 from scanwright.cad import outlines
 from scanwright.cad.layout.drive import DriveLayout, Mounted
 from scanwright.cad.layout.envelope import box_corners
-from scanwright.cad.layout.joints import DECK_MM, Joint, triple, upright_axes
-from scanwright.cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
+from scanwright.cad.layout.joints import DECK_MM, Joint, shank_mm, triple, upright_axes
 from scanwright.cad.layout.names import BASE_MOUNT, DECK
 from scanwright.cad.layout.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
-from scanwright.cad.screws import KEYS_MM, SCREWS, Screw
+from scanwright.cad.screws import KEYS_MM, SCREWS, TRIPOD_SCREW, Screw, Thread, thread_in_part
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.deck_holes import Circle, Rectangle
@@ -43,6 +42,32 @@ FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)  # along world x and y
 FOOT_DROPS = tuple(6.0 * k for k in range(11))  # from the back plate, beyond the least height
 FREE = 5.0  # above the foot, for everything except the mount
 SWEEP_MARGIN = 3.0  # around the turning lidar
+LEAST_TRIPOD = 8.0  # thickness: the nut and a floor under it
+TRIPOD_FLOOR = 2.0  # under the tripod's nut: its screw protrudes little
+OVER_NUTS = 2.8  # of the mount's screws
+TRIPOD_PROTRUDES = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; longer ones fit
+TRIPOD_HEEL = 19.0  # half the width of the narrowest plate of a tripod's head: assumed
+
+
+@dataclass(frozen=True, slots=True)
+class TripodFoot:
+    """The plate under the mount's foot; `mount` and `tripod` are the threads of their screws.
+
+    The nut of the tripod's screw is in a pocket that is open towards the mount, on a thin floor that tripod and nut
+    clamp: no thread is in plastic.
+    """
+
+    thickness: float
+    mount: Thread
+    tripod: Thread
+
+
+def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
+    """Return the plate below a thickness of the mount, so thick that no screw of the mount protrudes."""
+    longest = shank_mm(screw, above, "trap", OVER_NUTS)
+    mount = thread_in_part(screw, printer, carries=True)
+    thickness = max(LEAST_TRIPOD, longest - above) if mount.trap is not None else LEAST_TRIPOD
+    return TripodFoot(thickness, mount, thread_in_part(TRIPOD_SCREW, printer, carries=True))
 
 
 @dataclass(frozen=True, slots=True)

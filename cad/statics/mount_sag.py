@@ -12,9 +12,8 @@ from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.statics import elastic
-from scanwright.cad.statics.rigid import rigid, shared
 from scanwright.cad.statics.sag import POISSON
-from scanwright.cad.statics.spring import Spring, spring_of, wrenches
+from scanwright.cad.statics.spring import Spring, rigid_motion, shared_by, spring_of, wrenches
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
@@ -68,11 +67,11 @@ def _on_grid(
     lever = R.T @ (carried.centre_m * 1000 - centre)
     loads = elastic.weight(model, density * 1e-6 * down)
     force = carried.mass_kg * down
-    loads += elastic.pull(model, at, shared(seats, force, np.cross(lever, force, axisb=0, axisc=0)))
+    loads += elastic.pull(model, at, shared_by(seats, force, np.cross(lever, force, axisb=0, axisc=0)))
     origin = -R.T @ centre  # of the rotation frame
     both = np.concatenate([loads, wrenches(model, at, seats, origin)], axis=2)
     moved = elastic.solve(model, modulus, POISSON, clamped, len(washers) * STEP**2, both)
-    rotation = rigid(seats, elastic.moved(model, at, moved[:, :, :1]))[1][:, 0]
+    rotation = rigid_motion(seats, elastic.moved(model, at, moved[:, :, :1]))[1][:, 0]
     return R @ rotation, spring_of(model, density, (at, seats, moved[:, :, 1:]), R, origin)
 
 

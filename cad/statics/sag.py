@@ -16,8 +16,7 @@ from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.hub import SPIGOT, Hub
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
-from scanwright.cad.statics.rigid import rigid, shared
-from scanwright.cad.statics.spring import Spring, spring_of, wrenches
+from scanwright.cad.statics.spring import Spring, rigid_motion, shared_by, spring_of, wrenches
 from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
@@ -86,10 +85,10 @@ def _on_grid(
     loads = elastic.weight(model, density * 1e-6 * down)
     lever = lidar.centre_m * 1000
     force = lidar.mass_kg * down
-    loads += elastic.pull(model, at, shared(points[on_seat], force, np.cross(lever, force, axisb=0, axisc=0)))
+    loads += elastic.pull(model, at, shared_by(points[on_seat], force, np.cross(lever, force, axisb=0, axisc=0)))
     both = np.concatenate([loads, wrenches(model, at, points[on_seat], np.zeros(3))], axis=2)
     moved = elastic.solve(model, modulus, POISSON, clamped, spigot_mm2, both)
-    shift, rotation = rigid(points[on_seat], elastic.moved(model, at, moved[:, :, :3]))
+    shift, rotation = rigid_motion(points[on_seat], elastic.moved(model, at, moved[:, :, :3]))
     spring = spring_of(model, density, (at, points[on_seat], moved[:, :, 3:]), R, np.zeros(3))
     return R @ rotation, R @ shift / 1000, spring
 

@@ -10,10 +10,31 @@ import numpy as np
 
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
-from scanwright.cad.statics.rigid import rigid, shared
 from scanwright.design.arrays import Array
 
 MOMENT_FIRST, FORCE_LAST = np.eye(6)[:3], np.eye(6)[3:]  # of six unit loads, shape (3, 6)
+
+
+def shared_by(points: Array, force: Array, moment: Array) -> Array:
+    """Return forces on points (p, 3, cases) as a rigid seat shares forces and moments about the origin (3, cases)."""
+    middle = points.mean(axis=0)
+    arms = points - middle
+    turn = np.linalg.solve(_second_moments(arms), moment - np.cross(middle, force, axisb=0, axisc=0))
+    return force / len(points) + np.cross(turn.T[None], arms[:, None], axis=2).transpose(0, 2, 1)
+
+
+def rigid_motion(points: Array, moved: Array) -> tuple[Array, Array]:
+    """Return the displacement of the origin and rotation (3, cases) that fit the moved points best."""
+    middle = points.mean(axis=0)
+    arms = points - middle
+    turned = np.cross(arms[:, None], moved.transpose(0, 2, 1), axis=2).sum(axis=0).T
+    rotation = np.linalg.solve(_second_moments(arms), turned)
+    return moved.mean(axis=0) + np.cross(rotation, -middle, axisa=0, axisc=0), rotation
+
+
+def _second_moments(arms: Array) -> Array:
+    """Return the second moments of unit masses, shape (3, 3)."""
+    return np.asarray((arms**2).sum() * np.eye(3) - arms.T @ arms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +66,7 @@ def of_shaft(bend: ShaftBend, end_mm: float) -> Spring:
 def wrenches(model: elastic.Model, at: elastic.Places, points: Array, origin: Array) -> Array:
     """Return the loads of 1 N m and 1 N about an origin on a rigid seat of points (p, 3) [mm], shape (n, 3, 6)."""
     moments = 1000 * MOMENT_FIRST + np.cross(origin, FORCE_LAST, axisb=0, axisc=0)
-    return elastic.pull(model, at, shared(points, FORCE_LAST, moments))
+    return elastic.pull(model, at, shared_by(points, FORCE_LAST, moments))
 
 
 def spring_of(
@@ -62,7 +83,7 @@ def spring_of(
         origin: of the rotation frame, in the grid's frame [mm], shape (3,).
     """
     at, points, moved = seat
-    shift, rotation = rigid(points, elastic.moved(model, at, moved))
+    shift, rotation = rigid_motion(points, elastic.moved(model, at, moved))
     shift = (shift + np.cross(rotation, origin, axisa=0, axisc=0)) / 1000
     compliance = np.concatenate([rotation, shift])
     kg, middles, shares = elastic.lumps(model, density_g_cm3)

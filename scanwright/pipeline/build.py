@@ -261,17 +261,17 @@ def _write_and_check(
     shutil.rmtree(work / "parts", ignore_errors=True)
     _, scanner, assembly = attempt
     written = begin(_written, scanner, assembly, work, progress)
-    checked = begin(_checked, scanner, assembly, progress)
+    checked = begin(_checked, assembly, progress)
     parts = written()
     write_files(work, checked())
     return parts, errors_in(read_checks(work / "checks.json"))
 
 
-def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
+def _checked(assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
     """Return the files of the checks and the self-occlusion."""
     from scanwright.cad.checks.run import check_files
 
-    return check_files(scanner, assembly.open(), progress)
+    return check_files(assembly.open(), progress)
 
 
 def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progress: Progress) -> PartsMade:

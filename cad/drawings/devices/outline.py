@@ -8,7 +8,8 @@ from functools import singledispatch
 import numpy as np
 
 from scanwright.cad.drawings.patterns import number
-from scanwright.cad.layout.drive import Cuboid, Point, Rod
+from scanwright.cad.layout.drive import Point, Rod
+from scanwright.cad.layout.envelope import Box
 from scanwright.cad.layout.joints import triple
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.holes import Hole
@@ -36,7 +37,7 @@ class Spot:
 class DeviceOutline:
     """A device to draw."""
 
-    solids: tuple[Cuboid | Rod, ...]  # its bodies
+    solids: tuple[Box | Rod, ...]  # its bodies
     spots: tuple[Spot, ...] = ()  # its holes
     heights: tuple[float, ...] = ()  # other heights that get a dimension, such as that of the optical centre
     unverified: tuple[str, ...] = ()  # fields of the sketch that are not verified
@@ -67,12 +68,11 @@ def outline_of(product: Product) -> DeviceOutline:
 def _lidar(product: Lidar) -> DeviceOutline:
     x, y, z = product.body_mm
     window = Rod(product.window_radius_mm, *product.window_z_mm)
-    body = Cuboid((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
-    ears = [Cuboid(low, high) for low, high in product.ears_mm or ()]
+    body = ((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
     fields = ("body_mm", "ears_mm", "window_z_mm", "window_radius_mm", "holes", "optical_height_mm")
     unverified = _open(product, fields)
     spots = spots_of(product.holes, "?" if "holes" in unverified else "")
-    return DeviceOutline((body, *ears, window), spots, (product.optical_height_mm,), unverified)
+    return DeviceOutline((body, *(product.ears_mm or ()), window), spots, (product.optical_height_mm,), unverified)
 
 
 @outline_of.register
@@ -88,7 +88,7 @@ def _servo(product: Servo) -> DeviceOutline:
     words = f"{product.horn_screw} TAPPED, {number(product.horn_thread_depth_mm)} DEEP ON Ø{number(2 * circle)}{mark}"
     radius = SCREWS[product.horn_screw].nominal / 2
     on_horn = [Spot((-circle * math.sin(t), circle * math.cos(t), 0.0), (0.0, 0.0, 1.0), radius, words) for t in turns]
-    solids: list[Cuboid | Rod] = [Cuboid(product.case_min_mm, product.case_max_mm), horn]
+    solids: list[Box | Rod] = [(product.case_min_mm, product.case_max_mm), horn]
     spots = (*on_horn, *spots_of(product.holes, "?" if "holes" in unverified else ""))
     return DeviceOutline((*solids, *([boss] if boss.radius else [])), spots, (), unverified)
 

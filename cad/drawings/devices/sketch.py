@@ -12,7 +12,7 @@ from scanwright.cad.drawings.patterns import counted, number
 from scanwright.cad.drawings.pen import Pen, Point, document_at
 from scanwright.cad.drawings.sheet import Sheet
 from scanwright.cad.drawings.write import drawn_on, svg_bytes
-from scanwright.cad.layout.drive import Cuboid, Rod
+from scanwright.cad.layout.drive import Rod
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.product_base import Product
 
@@ -60,7 +60,7 @@ def sketch_svg(product: Product) -> bytes:
         notes.append(f"Not verified, measure yours: {', '.join(outline.unverified)}.")
     heights = [*outline.heights]
     for solid in outline.solids:
-        heights += (solid.low, solid.high) if isinstance(solid, Rod) else (solid.low[2], solid.high[2])
+        heights += (solid.low, solid.high) if isinstance(solid, Rod) else (solid[0][2], solid[1][2])
     views = views_of(outline.spots, lambda right, up: _polygons(outline, right, up), heights)
     for solid in outline.solids:
         if isinstance(solid, Rod):
@@ -148,11 +148,11 @@ def _draw(pen: Pen, view: SketchView) -> None:
 def _polygons(outline: DeviceOutline, right: Array, up: Array) -> list[Array]:
     """Return the outlines of bodies in a view; from below a box covers the cylinders on it."""
     towards = float(np.cross(right, up)[2])
-    boxed = any(isinstance(solid, Cuboid) for solid in outline.solids)
+    boxed = not all(isinstance(solid, Rod) for solid in outline.solids)
     polygons = []
     for solid in outline.solids:
-        if isinstance(solid, Cuboid):
-            corners = np.array([[np.asarray(c) @ right, np.asarray(c) @ up] for c in (solid.low, solid.high)])
+        if not isinstance(solid, Rod):
+            corners = np.array(solid) @ np.stack([right, up], axis=1)
         elif abs(towards) < ALONG:
             corners = np.array([[-solid.radius, solid.low], [solid.radius, solid.high]])
         else:

@@ -44,8 +44,7 @@ from scanwright.cad.layout.joints import (
 )
 from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
-from scanwright.cad.parts.tolerances import OnSheet, printed_seat
+from scanwright.cad.parts.part_spec import ON_CASE, OnSheet, PartSpec, Row, Step, printed_seat
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo

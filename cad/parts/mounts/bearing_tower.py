@@ -42,8 +42,7 @@ from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import PartSpec, Step
-from scanwright.cad.parts.tolerances import OnSheet, printed_seat
+from scanwright.cad.parts.part_spec import OnSheet, PartSpec, Step, printed_seat
 from scanwright.cad.screws import Thread, Trap, passing_hole, thread_in_part, trap_of
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer

@@ -16,8 +16,17 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.direct.adapter import ARM, ARM_GAP, ARM_HALF_WIDTH, PLATE, UNDER_ROOF
-from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage
+from scanwright.cad.layout.direct.cage import (
+    ARM,
+    ARM_GAP,
+    ARM_HALF_WIDTH,
+    FOOT_RADIUS,
+    FORK,
+    SEAT_GAP,
+    UNDER_HEAD,
+    UNDER_ROOF,
+    BearingCage,
+)
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import box_corners
@@ -66,7 +75,7 @@ def _around(servo: Servo, stack: DirectStack, fork: Ears) -> Iterator[Shape]:
     front = stack.horn + fork.front + SEAT_GAP
     outer = max(stack.ring_radius + ARM_GAP + ARM, fork.half_x)
     yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
-    yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + PLATE))))
+    yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + FORK))))
 
 
 def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) -> cq.Solid:
@@ -74,7 +83,7 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
     inner = stack.ring_radius + ARM_GAP
     outer, root = inner + ARM, inner - 4.0
     if cage is None:
-        body, top = _fork(stack, ears, outer), stack.horn + ears.front + SEAT_GAP + PLATE
+        body, top = _fork(stack, ears, outer), stack.horn + ears.front + SEAT_GAP + FORK
     else:
         body, top = cage_base(cage), cage.foot
     high_end = stack.ring_bottom + min(30.0, stack.ring_length - (5.0 if cage is None else UNDER_ROOF))
@@ -104,7 +113,7 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
 def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
     """Return the plate on the servo, open at +y."""
     low, seats = stack.horn + p.front + SEAT_GAP, stack.horn + p.seats
-    top = low + PLATE
+    top = low + FORK
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5

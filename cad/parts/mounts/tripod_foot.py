@@ -1,6 +1,6 @@
 """Tripod foot: a plate under the mount, with a nut 1/4-20 UNC for a tripod's screw.
 
-Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/modules/tripod_foot.py`. It is below the
+Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/deck.py`. It is below the
 mount's foot and has its outline. The tripod's nut is in a pocket that the mount closes; those of the mount's screws in
 pockets from below.
 """
@@ -13,9 +13,16 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.deck import (
+    FOOT_THICKNESS,
+    OVER_NUTS,
+    TRIPOD_FLOOR,
+    TRIPOD_HEEL,
+    TRIPOD_PROTRUDES,
+    Deck,
+    TripodFoot,
+)
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
-from scanwright.cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, PROTRUDES, TripodFoot
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import PartSpec, Step
@@ -66,10 +73,10 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
         TRIPOD_SCREW,
         placed_axes(upright_axes([(0.0, 0.0)], -p.thickness - DECK_MM, 1.0), R, deck.centre),
         grip_mm=DECK_MM,
-        thread_mm=p.thickness if p.tripod.trap is None else FLOOR,
+        thread_mm=p.thickness if p.tripod.trap is None else TRIPOD_FLOOR,
         thread=p.tripod,
-        protrudes_mm=PROTRUDES,
-        heel_mm=HEEL,
+        protrudes_mm=TRIPOD_PROTRUDES,
+        heel_mm=TRIPOD_HEEL,
     )
 
 
@@ -79,7 +86,7 @@ def tripod_foot(deck: Deck, p: TripodFoot) -> cq.Solid:
         plate = solids.prism(outlines.octagon(*deck.foot), -p.thickness, 0.0)
         cuts = [solids.upright(p.tripod.hole / 2, -p.thickness - 1.0, 1.0)]
         if p.tripod.trap is not None:
-            cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), FLOOR - p.thickness, 1.0))
+            cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), TRIPOD_FLOOR - p.thickness, 1.0))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(p.mount.hole / 2, -p.thickness - 1.0, 1.0, x, y))
             if p.mount.trap is not None:

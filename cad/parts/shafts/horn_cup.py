@@ -16,9 +16,8 @@ from scanwright.cad.layout.joints import horn_centres, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, SERVO_HORN
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import BEFORE_NUT, AlignmentLinkage
-from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, to_centre
+from scanwright.cad.parts.part_spec import HORN, OnSheet, PartSpec, Step, spigot_in_hub, to_centre
 from scanwright.cad.parts.shafts.servo_shaft import on_horn
-from scanwright.cad.parts.tolerances import OnSheet, spigot_in_hub
 from scanwright.cad.screws import SCREWS, Trap, passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer

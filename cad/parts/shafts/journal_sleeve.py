@@ -16,8 +16,7 @@ from scanwright.cad.layout.hub import BEARING_STEP, JOURNAL_WALL
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
-from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Row, Step
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.part_spec import TURNED_FROM, OnSheet, PartSpec, Row, Step, ToleratedDiameter
 from scanwright.cad.solids import building
 
 SLIDES = 0.02  # in the inner ring: the lower end of g6

@@ -15,9 +15,16 @@ from scanwright.cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltSt
 from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import SEATED, TURNED_FROM, PartSpec, Step
+from scanwright.cad.parts.part_spec import (
+    SEATED,
+    TURNED_FROM,
+    OnSheet,
+    PartSpec,
+    Step,
+    ToleratedDiameter,
+    spigot_in_hub,
+)
 from scanwright.cad.parts.shafts.servo_shaft import cross_holes, cross_words
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.solids import building
 
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder

@@ -18,8 +18,8 @@ import numpy as np
 from scanwright.cad import solids
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
-from scanwright.cad.layout.belt.plate import pulley_foot_radius
 from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.belt.tower import pulley_foot_radius
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import (
     Joint,
@@ -31,8 +31,7 @@ from scanwright.cad.layout.joints import (
     screws,
 )
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
-from scanwright.cad.parts.tolerances import OnSheet, no_wider
+from scanwright.cad.parts.part_spec import HORN, OnSheet, PartSpec, Step, no_wider
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer

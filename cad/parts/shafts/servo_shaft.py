@@ -19,8 +19,18 @@ from scanwright.cad.layout.joints import Joint, horn_centres, horn_joint, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SERVO_HORN, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import CROSS_AT, CROSS_SCREW
-from scanwright.cad.parts.part_spec import HORN, SEATED, TURNED_FROM, PartSpec, Row, Step, to_centre
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
+from scanwright.cad.parts.part_spec import (
+    HORN,
+    SEATED,
+    TURNED_FROM,
+    OnSheet,
+    PartSpec,
+    Row,
+    Step,
+    ToleratedDiameter,
+    spigot_in_hub,
+    to_centre,
+)
 from scanwright.cad.screws import SCREWS, passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer

@@ -26,11 +26,11 @@ from scanwright.cad.drawings.part import part_of
 from scanwright.cad.drawings.patterns import number, patterns_of
 from scanwright.cad.drawings.pen import CAPITAL, DIAMETER, TURN_RAD, Pen, document_at
 from scanwright.cad.drawings.project import Arc, project
-from scanwright.cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
+from scanwright.cad.drawings.views import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.part_spec import OnSheet, ToleratedDiameter
 from scanwright.cad.solids import box, cylinder, upright
 from scanwright.design.errors import BuildError
 

@@ -15,10 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.cad.slicer import PROGRAM, sliced
 from scanwright.cad.assembly.print_settings import print_words, slicer_settings
-from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.files.plates import threemf_bytes
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
-from scanwright.cad.labels.glyphs import GLYPHS, text_width
+from scanwright.cad.labels.lettering import GLYPHS, text_width
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Printer
 

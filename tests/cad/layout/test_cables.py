@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scanners import avoided
 
-from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
-from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
+from scanwright.cad.layout.cables.leads import LENGTH, STEP, WALL, joint_of, leads_of, outlet_mm, rotor_space_of
 from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.rotor_space import rotor_space_of
 from scanwright.cad.layout.cables.route import Ending, short_path
 from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.layout.placement import placement_of

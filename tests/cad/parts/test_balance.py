@@ -83,10 +83,10 @@ def test_leads_weigh_what_their_wires_do(made):
     mass = WIRES * sum(mesh.volume for mesh in wires)
     moment = WIRES * sum(mesh.volume * mesh.center_mass[:2] for mesh in wires)
     bare = replace(assembly, layout=replace(assembly.layout, leads=()))
-    with_leads, without = (rotor_of(scanner, link_bodies(scanner, each)) for each in (assembly, bare))
+    with_leads, without = (rotor_of(scanner, link_bodies(each)) for each in (assembly, bare))
     # the shrink tube over a joint is no wire
     assert 1000 * (with_leads.mass_kg - without.mass_kg) == pytest.approx(mass, rel=0.06) and mass > 1
-    np.testing.assert_allclose(rotor_moment(scanner, assembly) - rotor_moment(scanner, bare), moment, atol=8)
+    np.testing.assert_allclose(rotor_moment(assembly) - rotor_moment(bare), moment, atol=8)
     lead, solid = assembly.layout.leads[laid[0] - 1], assembly.bought[f"rotor_lead_{laid[0]}"]
     line, tube = of_line(lead.mass_g, lead.path.points(SAMPLE)), of_solid(solid, 1000 * WIRES)
     np.testing.assert_allclose(line.inertia_kg_m2, tube.inertia_kg_m2, atol=0.06 * np.abs(tube.inertia_kg_m2).max())

@@ -15,7 +15,7 @@ from scanners import CAPSULE, digest_of, mount_offset_mm, scanner_at
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.checks.printing import thin_walls
-from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.products import without_traps
 from scanwright.cad.checks.run import run_checks
 from scanwright.cad.drawings.files import drawing_of
 from scanwright.cad.drawings.write import Words, drawn_on
@@ -57,7 +57,7 @@ def made(parts_of):
     scanner = scanner_for()
     assembly = parts_of(scanner)
     meshes = {n: trimesh.Trimesh(m.vertices, m.faces, process=False) for n, m in assembly.meshes().items()}
-    checks, shadow = run_checks(scanner, assembly, lambda _: None)
+    checks, shadow = run_checks(assembly, lambda _: None)
     found = {(check.code, check.subject): check for check in checks}
     return SimpleNamespace(
         scanner=scanner, assembly=assembly, stack=assembly.layout.stack, meshes=meshes, checks=found, shadow=shadow
@@ -388,7 +388,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
 def test_the_frame_chain_names_the_servo_beside_the_axis(made):
     from scanwright.cad.assembly.masses import link_bodies
 
-    drive, bodies = made.assembly.layout.drive, link_bodies(made.scanner, made.assembly)
+    drive, bodies = made.assembly.layout.drive, link_bodies(made.assembly)
     servo, rot = bodies["servo"], bodies["rot"]
     text = urdf_text(made.scanner, drive, bodies, {"servo": [], "rot": []})
     horn = drive.stack.servo_origin()

@@ -9,7 +9,7 @@ from scanners import TILTED, bare_linkage, scanner_at
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.assembly.scenes import scenes_of
-from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.products import without_traps
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.holes import rounds_of

@@ -43,7 +43,7 @@ def test_its_list_adds_up_to_less_than_300_dollars_where_one_asks_around(bought)
 
 
 def test_no_check_fails_and_no_part_is_in_the_fan(low_cost):
-    checks, _ = run_checks(low_cost.scanner, low_cost.assembly, no_progress)
+    checks, _ = run_checks(low_cost.assembly, no_progress)
     assert [check.message for check in checks if check.severity == "error"] == []
     hidden = [check.value for check in checks if check.code.startswith("beams_")]
     assert hidden and max(hidden) == 0
