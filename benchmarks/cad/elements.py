@@ -22,9 +22,8 @@ from pathlib import Path
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, link_bodies, rotor_of
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies, rotor_of
 from scanwright.cad.checks.loads.deflection import LEAST_ERROR, carried
 from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT

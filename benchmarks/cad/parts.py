@@ -27,9 +27,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cad import slicer
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, link_bodies
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies
 from scanwright.cad.assembly.print_settings import slicer_settings
 from scanwright.cad.checks.run import run_checks
 from scanwright.cad.files.plates import threemf_bytes

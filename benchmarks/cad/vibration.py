@@ -18,9 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cad.elements import CALCULIX, HEAD_MM, Tetrahedra, tetrahedra
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, link_bodies
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies
 from scanwright.cad.checks.loads.deflection import ERROR, deflection_checks, mount_checks, row_of_scanner
 from scanwright.cad.geometry.inertia import Inertial, together
 from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_nm_per_rad

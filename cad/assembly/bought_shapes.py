@@ -13,7 +13,7 @@ from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.belt.tower import flange_centres
 from scanwright.cad.layout.cables.fixed import FixedCable
 from scanwright.cad.layout.cables.leads import JOINT_LENGTH, TUBE_WALL, RotorLead
-from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.layout.cables.route import Path
 from scanwright.cad.layout.envelope import lidar_thread_mm
 from scanwright.cad.layout.joints import horn_centres
 from scanwright.cad.layout.names import BELT, RING_STATOR, ROTOR_LEAD

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, rotor_moment
 from scanwright.cad.assembly.bought import BodySpec, bought_of
-from scanwright.cad.assembly.masses import rotor_moment
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.names import BASE_MOUNT, COUNTERWEIGHT, TRIPOD_FOOT
 from scanwright.cad.parts.all_parts import laid_out, parts_of

@@ -4,13 +4,12 @@ import math
 from dataclasses import replace
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.drawings.part import Part, azimuth_deg, part_of, planes_across
-from scanwright.cad.drawings.patterns import number
+from scanwright.cad.drawings.patterns import Part, azimuth_deg, number, part_of, planes_across
 from scanwright.cad.drawings.sheet import Sheet, Title, sheet_of
 from scanwright.cad.drawings.write import drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
-from scanwright.cad.parts.part_spec import OnSheet, Process
+from scanwright.cad.parts.part_spec import PartSpec, Process
 from scanwright.design.catalogue.measuring import measure_first
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.scanner import Scanner
@@ -19,13 +18,11 @@ MADE: dict[Process, str] = {"printed": "as printed, sanded or reamed to it", "tu
 AT_M = FAR_MM / 1000  # distance up to which a wrong angle is judged
 
 
-def drawing_files(
-    scanner: Scanner, assembly: Assembly, masses_g: dict[str, float], config_hash: str
-) -> dict[str, bytes]:
-    """Draw every made part; arguments as for `bom.items_of`."""
+def drawing_files(assembly: Assembly, masses_g: dict[str, float]) -> dict[str, bytes]:
+    """Draw every made part; `masses_g` are of the made parts."""
     files: dict[str, bytes] = {}
     for name in assembly.made:
-        sheet = drawing_of(name, scanner, assembly, masses_g[name], config_hash)
+        sheet = drawing_of(name, assembly, masses_g[name])
         shown = list(drawn_on(sheet))
         files[f"drawings/{name}.pdf"] = pdf_bytes([(sheet, shown)])
         files[f"drawings/{name}.svg"] = svg_bytes(sheet, shown)
@@ -33,31 +30,31 @@ def drawing_files(
     return files
 
 
-def drawing_of(name: str, scanner: Scanner, assembly: Assembly, mass_g: float, config_hash: str) -> Sheet:
+def drawing_of(name: str, assembly: Assembly, mass_g: float) -> Sheet:
     """Return the sheet of one part."""
-    spec = assembly.parts[name]
+    spec, scanner, digest = assembly.parts[name], assembly.layout.scanner, assembly.layout.digest
     lidar_axis = None if spec.seat is None else assembly.layout.stack.R()[:, 2]
-    part = part_of(name, assembly.made[name], lidar_axis, spec.sheet, assembly.layout.joints)
+    part = part_of(spec, assembly.made[name], lidar_axis, assembly.layout.joints)
     material = f"{spec.material}, turned" if spec.process == "turned" else spec.material
     cells = (
         ("part", name),
         ("task", scanner.angles.task),
-        ("drawing number", drawing_number(config_hash, name, assembly)),
+        ("drawing number", drawing_number(name, assembly)),
         ("material", material or f"{scanner.printer.name}, solid"),
         ("mass", f"{mass_g:.1f} g"),
-        ("configuration", config_hash),
+        ("configuration", digest),
         ("general tolerances", "ISO 2768-mK" if spec.metal else "ISO 2768-cL"),
         ("made by", "scanwright"),
     )
-    notes = _notes(scanner, part, spec.sheet, MADE[spec.process], _making(spec.process, scanner.printer, part))
+    notes = _notes(scanner, part, spec)
     products = products_of(scanner, assembly.layout.drive)
     notes += [words for product in products if (words := measure_first(product, *spec.values_of(product)))]
-    return sheet_of(part, Title(cells, tuple(notes)), f"{name} {config_hash}")
+    return sheet_of(part, Title(cells, tuple(notes)), f"{name} {digest}")
 
 
-def drawing_number(config_hash: str, part: str, assembly: Assembly) -> str:
+def drawing_number(part: str, assembly: Assembly) -> str:
     """Return the number of a made part: configuration and place in the assembly."""
-    return f"{config_hash}-{list(assembly.made).index(part) + 1}"
+    return f"{assembly.layout.digest}-{list(assembly.made).index(part) + 1}"
 
 
 def _making(process: Process, printer: Printer, part: Part) -> list[str]:
@@ -73,19 +70,19 @@ def _making(process: Process, printer: Printer, part: Part) -> list[str]:
     ]
 
 
-def _notes(scanner: Scanner, part: Part, on_sheet: OnSheet, how: str, making: list[str]) -> list[str]:
+def _notes(scanner: Scanner, part: Part, spec: PartSpec) -> list[str]:
     angles = scanner.angles.angles_deg
     box = part.solid.BoundingBox()
     axis, zero = "rotation axis", "Z 0 is"
-    if any(on_sheet.axis):
-        axis, zero = "axis of the servo's horn", "Their zero is X {}, Y {}, Z".format(*map(number, on_sheet.axis))
+    if any(spec.axis):
+        axis, zero = "axis of the servo's horn", "Their zero is X {}, Y {}, Z".format(*map(number, spec.axis))
     notes = [
         f"Millimetres. Ordinates run from the {axis} (X, Y) and the lowest point (Z), azimuths from +Y.",
         f"{zero} {number(part.datum)} in the rotation frame of the STEP file (0: optical centre; +Y: index marks).",
         f"Envelope {number(box.xlen)} x {number(box.ylen)} x {number(box.zlen)} along X, Y, Z.",
-        *on_sheet.notes,
-        *(f"Ø{number(fit.diameter)} {fit.tolerance}: {fit.why}, {how}." for fit in part.fits),
-        *making,
+        *spec.notes,
+        *(f"Ø{number(fit.diameter)} {fit.tolerance}: {fit.why}, {MADE[spec.process]}." for fit in part.fits),
+        *_making(spec.process, scanner.printer, part),
     ]
     inclined = [p for p in part.patterns if len(p.holes) >= 3 and abs(p.direction[2]) < 1 - 1e-6]
     for pattern in inclined[:1]:

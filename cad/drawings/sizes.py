@@ -16,8 +16,16 @@ from scanwright.cad.drawings.dimensions import (
     ordinates,
     text_box,
 )
-from scanwright.cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from scanwright.cad.drawings.patterns import Pattern, number
+from scanwright.cad.drawings.patterns import (
+    SIDE_MM2,
+    STRAIGHT,
+    Part,
+    Pattern,
+    azimuth_deg,
+    number,
+    parallel,
+    planes_across,
+)
 from scanwright.cad.drawings.pen import TEXT_MM, Layer, Pen, Point
 from scanwright.cad.drawings.project import Arc, Curve
 from scanwright.cad.drawings.views import View, Z, has_view, outwards_of, shows_angle

@@ -16,8 +16,16 @@ import numpy as np
 import shapely
 
 from scanwright.cad import solids
-from scanwright.cad.drawings.part import STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from scanwright.cad.drawings.patterns import Pattern, along_pattern, number
+from scanwright.cad.drawings.patterns import (
+    STRAIGHT,
+    Part,
+    Pattern,
+    along_pattern,
+    azimuth_deg,
+    number,
+    parallel,
+    planes_across,
+)
 from scanwright.cad.drawings.pen import Point
 from scanwright.cad.drawings.project import Curve, project
 from scanwright.design.arrays import Array, Vector

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
+from scanwright.cad.assembly.scenes import tied_at
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.drawings.files import drawing_number
 from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
@@ -60,18 +60,11 @@ class BomItem:
 COLUMNS = [field.name for field in fields(BomItem)][:-1]
 
 
-def items_of(
-    scanner: Scanner,
-    assembly: Assembly,
-    joints: Sequence[Joint],
-    masses_g: dict[str, float],
-    config_hash: str,
-    plates: Sequence[Sequence[str]] = (),
-) -> list[BomItem]:
+def items_of(assembly: Assembly, masses_g: dict[str, float], plates: Sequence[Sequence[str]] = ()) -> list[BomItem]:
     """Return all rows, the total last; `masses_g` are of the made parts, `plates` the parts printed together."""
-    items = []
+    items, scanner, joints = [], assembly.layout.scanner, assembly.layout.joints
     for name in assembly.made:
-        part, number = assembly.parts[name], drawing_number(config_hash, name, assembly)
+        part, number = assembly.parts[name], drawing_number(name, assembly)
         how = f"{scanner.printer.name}, {print_words(scanner.printer)}, from print/{name}.3mf"
         if part.metal:
             how = f"{', '.join(filter(None, (part.material, part.work)))}, after parts/{name}.step"
@@ -84,7 +77,7 @@ def items_of(
     items += _wiring(scanner)
     items += _ties(assembly)
     items += _electrics(scanner)
-    items += _small_things(assembly, joints)
+    items += _small_things(assembly)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
@@ -254,8 +247,9 @@ def _electrics(scanner: Scanner) -> Iterator[BomItem]:
         yield BomItem("wiring", part, number, quantity, source=WIRING_TEXT, note=note, estimate=estimate)
 
 
-def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomItem]:
+def _small_things(assembly: Assembly) -> Iterator[BomItem]:
     """Yield small things of the parts, consumables, and tools."""
+    joints = assembly.layout.joints
     rows = dict.fromkeys(row for name in assembly.made for row in assembly.parts[name].rows)
     needs = [BomItem(row.kind, row.part, source=row.source, note=row.note, estimate=row.estimate) for row in rows]
     yield from (need for need in needs if need.kind != "tool")

@@ -62,8 +62,7 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
         BuildError: a part has no closed mesh, or the angle set states another place of the optical centre.
     """
     progress("loading the CAD kernel")
-    from scanwright.cad.assembly.assembly import alone, as_tree
-    from scanwright.cad.assembly.masses import link_bodies
+    from scanwright.cad.assembly.assembly import alone, as_tree, link_bodies
     from scanwright.cad.checks.products import remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
@@ -81,7 +80,7 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
     reports = []
     meshes_of_parts: dict[str, TriMesh] = {}
     progress("engraving the labels")
-    labels = labelled_parts(scanner, assembly, digest)
+    labels = labelled_parts(assembly)
     made = assembly.made | labels.parts
     for number, (name, solid) in enumerate(made.items()):
         progress(f"meshing and writing {name}", number / len(made))

@@ -14,7 +14,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 from PIL import ImageDraw, ImageFont
 
-from scanwright.cad.files.manual.painter import Piece, painted, png_bytes
+from scanwright.cad.files.manual.pictures import Piece, painted, png_bytes
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.design.scene.parallel_view import view_of
 from scanwright.design.scene.ray_caster import build_scene

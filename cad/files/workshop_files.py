@@ -16,8 +16,8 @@ from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
 from scanwright.cad.labels.fit_coupon import fit_coupon
 from scanwright.cad.labels.test_plate import make_test_plate
+from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
-from scanwright.cad.layout.screw_patterns import screw_patterns
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.progress import Progress
@@ -35,7 +35,7 @@ class Exports:
 
 def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: Progress) -> Exports:
     """Write all of them into a build folder; `made` is the result of `part_files.build_parts`."""
-    assembly, masses = made.assembly, made.masses_g()
+    assembly = made.assembly
     digest, joints = assembly.layout.digest, assembly.layout.joints
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"
     progress("writing print files")
@@ -59,9 +59,9 @@ def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: 
     files |= scene_files(scanner, assembly, made.meshes, digest)
     progress("writing bom.csv, wiring.svg and assembly.md with its pictures")
     named = [list(plate) for plate in plates]
-    items = items_of(scanner, assembly, joints, masses, digest, named)
+    items = items_of(assembly, made.masses_g(), named)
     files["bom.csv"] = bom_text(items).encode("utf-8")
-    files |= step_files(scanner, assembly, made.meshes, joints, named, digest)
+    files |= step_files(assembly, made.meshes, named)
     files |= wiring_files(scanner, digest)
     write_files(folder, files)
     findings = without_traps(scanner.printer, joints)

@@ -15,8 +15,7 @@ import numpy as np
 import shapely
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.labels.engrave import engrave, groove_of
-from scanwright.cad.labels.flats import Flat, flat_at
+from scanwright.cad.labels.engrave import Flat, engrave, flat_at, groove_of
 from scanwright.cad.labels.lettering import letters, text_width
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.names import FIT_COUPON

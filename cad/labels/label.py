@@ -17,8 +17,7 @@ from scanwright.cad import solids
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry.holes import Piercing
 from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
-from scanwright.cad.labels.engrave import Groove, engrave, groove_of
-from scanwright.cad.labels.flats import Flat, flat_at, flats_of
+from scanwright.cad.labels.engrave import Flat, Groove, engrave, flat_at, flats_of, groove_of
 from scanwright.cad.labels.lettering import Lettering, Place
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
@@ -114,9 +113,10 @@ class Ground:
         return not any(self.piercing.between(start + 0.05 * into, start + deep) for start in flat.at(points))
 
 
-def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
+def labelled_parts(assembly: Assembly) -> Labelled:
     """Engrave every printed part that has enough area."""
-    before, done, groove = free_distance(assembly), Labelled(), groove_of(scanner.printer)
+    layout, before, done = assembly.layout, free_distance(assembly), Labelled()
+    scanner, groove = layout.scanner, groove_of(layout.scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
         if part.metal:
@@ -128,7 +128,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
                 why = "a hole of the seat is in its place; the V in the edge also marks the front"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         ground = Ground(flats_of(solid, FACES, LEAST_MM2), Piercing(solid), groove, scanner.printer.min_wall_mm, front)
-        label = label_on(ground, label_texts(scanner, part, config_hash), before)
+        label = label_on(ground, label_texts(scanner, part, layout.digest), before)
         if label is None:
             why = "no free flat face is large enough"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))

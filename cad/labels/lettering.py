@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 import shapely.affinity
 
-from scanwright.cad.labels.flats import Flat
+from scanwright.cad.labels.engrave import Flat
 from scanwright.design.arrays import Array
 
 LEADING = 1.65  # from line to line, of the height

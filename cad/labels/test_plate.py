@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from scanwright.cad import solids
+from scanwright.cad.layout.joints import ScrewPattern
 from scanwright.cad.layout.names import LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TEST_PLATE
-from scanwright.cad.layout.screw_patterns import ScrewPattern
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.scanner import Scanner

@@ -11,8 +11,7 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from scanwright.cad.drawings.devices.outline import AXES, spots_of
-from scanwright.cad.drawings.devices.sketch import sketch_of, views_of
+from scanwright.cad.drawings.devices.sketch import AXES, sketch_of, spots_of, views_of
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.measure.proposal import Proposal, propose, toml_text
 from scanwright.design.arrays import Array

@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scanwright.cad.measure.bores import Bore, bores_of, likely_screws
-from scanwright.cad.measure.walls import Wall, walls_of
+from scanwright.cad.measure.bores import Bore, Wall, bores_of, likely_screws, walls_of
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.catalogue import KINDS
 from scanwright.design.catalogue.holes import Hole

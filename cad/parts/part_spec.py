@@ -42,15 +42,6 @@ class ToleratedDiameter:
     why: str  # its purpose
 
 
-@dataclass(frozen=True, slots=True)
-class OnSheet:
-    """Data of one part's sheet beyond its shape."""
-
-    fits: tuple[ToleratedDiameter, ...] = ()  # of its cylinders
-    notes: tuple[str, ...] = ()  # lines of text
-    axis: tuple[float, float] = (0.0, 0.0)  # of its ordinates, in the plane z = 0 of the rotation frame
-
-
 def printed_seat(bearing: Bearing, fit: float) -> ToleratedDiameter:
     """Return the diameter of a bearing's seat in a printed part, drawn half of the sliding fit wider."""
     why = f"seat of {bearing.name}, from size for size to a sliding fit"
@@ -118,7 +109,10 @@ class PartSpec:
     material: str = ""  # if it is not printed
     work: str = ""  # further work
     why_metal: str = ""  # why it is not printed
-    sheet: OnSheet = field(default_factory=OnSheet)  # further data of its drawing
+    fits: tuple[ToleratedDiameter, ...] = ()  # of its cylinders, for its drawing
+    notes: tuple[str, ...] = ()  # lines of text of its drawing
+    # of the ordinates of its drawing, in the plane z = 0 of the rotation frame
+    axis: tuple[float, float] = (0.0, 0.0)
     shaped_by: tuple[str, ...] = ()  # fields of products, as "kind.field", that shape it
     # fields that shape something else, with its description; they precede `shaped_by` of any part
     shapes: Mapping[str, str] = field(default_factory=dict)

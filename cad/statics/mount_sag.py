@@ -12,9 +12,9 @@ from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.statics import elastic
+from scanwright.cad.statics.elastic import Grid, filled
 from scanwright.cad.statics.sag import POISSON
 from scanwright.cad.statics.spring import Spring, rigid_motion, shared_by, spring_of, wrenches
-from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 

@@ -16,8 +16,8 @@ from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.hub import SPIGOT, Hub
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
+from scanwright.cad.statics.elastic import Grid, filled
 from scanwright.cad.statics.spring import Spring, rigid_motion, shared_by, spring_of, wrenches
-from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 

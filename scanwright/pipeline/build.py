@@ -290,13 +290,13 @@ def _exported(
     return exports.findings, exports.left_out
 
 
-def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
+def _drawn(parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
     """Return the files of the drawings."""
     from scanwright.cad.drawings.files import drawing_files
 
     progress("drawing the parts")
     made = parts.open()
-    return drawing_files(scanner, made.assembly, made.masses_g(), made.assembly.layout.digest)
+    return drawing_files(made.assembly, made.masses_g())
 
 
 def measured(progress: Progress, step: str, fraction: float | None = None, /) -> None:
@@ -336,7 +336,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         add_check(work / "checks.json", height)
         exported, drawn = (
             begin(_exported, scanner, parts.result, work, progress),
-            begin(_drawn, scanner, parts.result, progress),
+            begin(_drawn, parts.result, progress),
         )
         settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {

@@ -150,7 +150,7 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
 
 
 def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Finding], shadow: SelfOcclusion) -> BuiltSetting:
-    from scanwright.cad.assembly.masses import link_bodies
+    from scanwright.cad.assembly.assembly import link_bodies
 
     margins = {
         check.code: check.limit / check.value

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import LIDAR_CENTRE_ERROR_MM
+from scanwright.cad.assembly.assembly import LIDAR_CENTRE_ERROR_MM, Assembly
 from scanwright.cad.checks.loads.retention import hanging_on, material_of, together_of
 from scanwright.cad.checks.table import HELD_G, LEAST_MARGIN, at_least, figures
 from scanwright.cad.layout.joints import Joint

@@ -18,8 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import link_bodies, rotor_of
+from scanwright.cad.assembly.assembly import Assembly, link_bodies, rotor_of
 from scanwright.cad.checks.table import FREQUENCY_RATIO, LEAN_DEG, at_most, figures, tidy
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.loads import FAR_MM, noise_deg
@@ -28,8 +27,7 @@ from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.statics.mount_sag import Carried, mount_sag
 from scanwright.cad.statics.sag import Sag, linkage_sag, with_shaft
-from scanwright.cad.statics.spring import Spring, of_shaft
-from scanwright.cad.statics.vibration import SpringRow, mass_matrix, row_of
+from scanwright.cad.statics.spring import Spring, SpringRow, mass_matrix, of_shaft, row_of
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity
 from scanwright.design.scanner import Scanner
@@ -64,7 +62,7 @@ def bending_checks(assembly: Assembly) -> list[Finding]:
 def deflection_checks(assembly: Assembly, bodies: Mapping[str, Inertial]) -> tuple[list[Finding], Spring | None]:
     """Check the constant part, which a calibration estimates, and the part that changes over a turn.
 
-    Also returns the parts between hub and lidar as a spring, if they support the lidar; bodies of `masses.link_bodies`.
+    Also returns the parts between hub and lidar as a spring, if they support the lidar; bodies of `link_bodies`.
     """
     scanner = assembly.layout.scanner
     down = -scanner.angles.T_world_rot(0.0)[2, :3]
@@ -85,7 +83,7 @@ def deflection_checks(assembly: Assembly, bodies: Mapping[str, Inertial]) -> tup
 
 
 def sag_of(assembly: Assembly, bodies: Mapping[str, Inertial]) -> Sag:
-    """Return the sag of everything between horn and lidar; bodies of `masses.link_bodies`."""
+    """Return the sag of everything between horn and lidar; bodies of `link_bodies`."""
     layout, printer = assembly.layout, assembly.layout.scanner.printer
     stack, linkage = layout.stack, layout.linkage
     seat = np.array([linkage.half_x, linkage.half_y, linkage.seat])
@@ -153,7 +151,7 @@ def mount_checks(assembly: Assembly, bodies: Mapping[str, Inertial]) -> tuple[li
 
 
 def carried(assembly: Assembly, bodies: Mapping[str, Inertial]) -> Carried:
-    """Return all above the mount, its rotor spread about the axis; bodies of `masses.link_bodies`."""
+    """Return all above the mount, its rotor spread about the axis; bodies of `link_bodies`."""
     scanner = assembly.layout.scanner
     rotor, fixed = rotor_of(scanner, bodies), bodies["servo"]
     below = [assembly.inertial(name) for name in (BASE_MOUNT, TRIPOD_FOOT) if name in assembly.made]

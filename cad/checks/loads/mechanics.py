@@ -8,8 +8,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import LIDAR_CENTRE_ERROR_MM, link_bodies, off_axis_error_m, rotor_of, rotor_weight
+from scanwright.cad.assembly.assembly import (
+    LIDAR_CENTRE_ERROR_MM,
+    Assembly,
+    link_bodies,
+    off_axis_error_m,
+    rotor_of,
+    rotor_weight,
+)
 from scanwright.cad.checks.table import SHOCK_G, at_most, figures, horn_check, note, rated, tidy, with_error
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
@@ -140,7 +146,7 @@ def mechanics_checks(assembly: Assembly) -> list[Finding]:
 
 
 def load_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Finding]:
-    """Check torques, backlash and loads; bodies of `masses.link_bodies`."""
+    """Check torques, backlash and loads; bodies of `link_bodies`."""
     scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
     error_m = off_axis_error_m(bodies)

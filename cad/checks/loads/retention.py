@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import lidar_body
+from scanwright.cad.assembly.assembly import Assembly, lidar_body
 from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G, at_least, tidy
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial

@@ -9,8 +9,8 @@ from scanwright.cad.drawings.patterns import counted
 from scanwright.cad.drawings.pen import Pen, document_at
 from scanwright.cad.drawings.sheet import Sheet
 from scanwright.cad.drawings.write import drawn_on, pdf_bytes
+from scanwright.cad.layout.joints import ScrewPattern
 from scanwright.cad.layout.names import DECK, LIDAR_BODY, RING_STATOR, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT
-from scanwright.cad.layout.screw_patterns import ScrewPattern
 from scanwright.design.scanner import Scanner
 
 A4, A3 = (210.0, 297.0), (297.0, 420.0)

@@ -14,8 +14,7 @@ import numpy as np
 
 from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
-from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.route import Ending, short_path
+from scanwright.cad.layout.cables.route import Ending, Path, short_path
 from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.drive import Mounted, Rod
 from scanwright.cad.layout.envelope import Box, around_axis, box_corners

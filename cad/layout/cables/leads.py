@@ -12,8 +12,7 @@ from itertools import product
 import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
-from scanwright.cad.layout.cables.path import Path, PathPiece
-from scanwright.cad.layout.cables.route import GAP, CableSpace, Ending, lattice_about_axis, short_path
+from scanwright.cad.layout.cables.route import GAP, CableSpace, Ending, Path, PathPiece, lattice_about_axis, short_path
 from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Bundle

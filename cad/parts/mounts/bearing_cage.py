@@ -44,7 +44,7 @@ from scanwright.cad.layout.joints import (
 )
 from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import ON_CASE, OnSheet, PartSpec, Row, Step, printed_seat
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step, printed_seat
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
@@ -80,7 +80,7 @@ def bell_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(bearing_cage, p),
         step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
-        sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
+        fits=(printed_seat(p.bearing, p.fit),),
         joints=(joint,),
         avoid=(shape_of(around_axis(p.stack.cage_outer, p.low, p.stack.cage_top)),),
         rows=(Row("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat"),),

@@ -42,7 +42,7 @@ from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import OnSheet, PartSpec, Step, printed_seat
+from scanwright.cad.parts.part_spec import PartSpec, Step, printed_seat
 from scanwright.cad.screws import Thread, Trap, passing_hole, thread_in_part, trap_of
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
@@ -78,7 +78,8 @@ def tower_spec(place: Placement) -> PartSpec | None:
         step=Step(
             "Bearings into the tower", words, "both inner rings turn freely, neither bearing protrudes", (BEARING,)
         ),
-        sheet=OnSheet((printed_seat(stack.carrier, fit),), _nuts_words(foot, printer)),
+        fits=(printed_seat(stack.carrier, fit),),
+        notes=_nuts_words(foot, printer),
         shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
         shapes={"printer.fit_clearance_mm": "every bore and seat"},
         joints=(joint,),

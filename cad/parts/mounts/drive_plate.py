@@ -18,7 +18,7 @@ from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_a
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO_CASE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.mounts.bearing_cage import head_recess
-from scanwright.cad.parts.part_spec import OnSheet, PartSpec, Step, to_centre
+from scanwright.cad.parts.part_spec import PartSpec, Step, to_centre
 from scanwright.cad.screws import passing_hole, thread_in_part
 from scanwright.cad.solids import building
 
@@ -40,7 +40,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(drive_plate, stack, p, slot),
         step=Step("Servo on its plate", words, "the horn still turns freely in the hole of the plate", (SERVO,)),
-        sheet=OnSheet(axis=stack.horn_axis),
+        axis=stack.horn_axis,
         shaped_by=("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm"),
         shapes={"belt.teeth": "the place of the servo"},
         joints=(

@@ -18,7 +18,6 @@ from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import (
     SEATED,
     TURNED_FROM,
-    OnSheet,
     PartSpec,
     Step,
     ToleratedDiameter,
@@ -54,13 +53,11 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
         process="turned",
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm need its seats to f7 (-0.02 to -0.041)",
-        sheet=OnSheet(
-            (seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
-            (
-                *cross_words(stack),
-                f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads "
-                "pass.",
-            ),
+        fits=(seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
+        notes=(
+            *cross_words(stack),
+            f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads "
+            "pass.",
         ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft, and the belt set", LINKAGE_WORDS, SEATED)},

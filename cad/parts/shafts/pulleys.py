@@ -31,7 +31,7 @@ from scanwright.cad.layout.joints import (
     screws,
 )
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import HORN, OnSheet, PartSpec, Step, no_wider
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, no_wider
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
@@ -59,7 +59,8 @@ def shaft_pulley_spec(place: Placement) -> PartSpec | None:
         turns=True,
         make=partial(shaft_pulley, stack, printer),
         step=Step("Pulley and belt on the shaft", words, "the belt is between both rims", (names.BELT,)),
-        sheet=OnSheet((fit,), (_teeth_words(stack),)),
+        fits=(fit,),
+        notes=(_teeth_words(stack),),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
         joints=(
             Joint(
@@ -109,7 +110,9 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer, foot),
         step=Step("Drive pulley and servo", words, "the belt runs a turn in its rims"),
-        sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
+        fits=fits,
+        notes=(_teeth_words(stack),),
+        axis=stack.horn_axis,
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack, foot),
         joints=(replace(horn, axes=placed_axes(horn.axes, stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0])),),

@@ -11,7 +11,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanwright.cad.assembly import masses
+from scanwright.cad.assembly import assembly as masses
 from scanwright.cad.checks import run
 from scanwright.cad.checks.checks_json import checks_text, failure_lines, read_checks
 from scanwright.cad.checks.clearance import together_check, turning_check

@@ -15,8 +15,8 @@ from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.parts.shafts.horn_cup import horn_cup
 from scanwright.cad.solids import box, upright
 from scanwright.cad.statics import elastic
+from scanwright.cad.statics.elastic import Grid, filled
 from scanwright.cad.statics.sag import linkage_sag
-from scanwright.cad.statics.voxels import Grid, filled
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.scanner import scanner_of

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scanwright.cad.assembly.masses import link_bodies
+from scanwright.cad.assembly.assembly import link_bodies
 from scanwright.cad.checks.loads.deflection import carried, mount_checks
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.names import BASE_MOUNT

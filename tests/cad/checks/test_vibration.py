@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scanwright.cad.assembly.masses import link_bodies
+from scanwright.cad.assembly.assembly import link_bodies
 from scanwright.cad.checks.loads.deflection import amplitude_m, vibration_check
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import mesh_of
@@ -16,8 +16,7 @@ from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
 from scanwright.cad.statics.mount_sag import Carried, mount_sag
-from scanwright.cad.statics.spring import Spring, of_shaft
-from scanwright.cad.statics.vibration import mass_matrix, row_of
+from scanwright.cad.statics.spring import Spring, mass_matrix, of_shaft, row_of
 
 E_PA, DIAMETER, LENGTH = 70e9, 0.012, 0.1
 SECOND = math.pi / 64 * DIAMETER**4

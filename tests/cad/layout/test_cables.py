@@ -7,8 +7,7 @@ import pytest
 from scanners import avoided
 
 from scanwright.cad.layout.cables.leads import LENGTH, STEP, WALL, joint_of, leads_of, outlet_mm, rotor_space_of
-from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.route import Ending, short_path
+from scanwright.cad.layout.cables.route import Ending, Path, short_path
 from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scanners import GROUND_AHEAD, ROLLING, bare_linkage, scanner_at
 
+from scanwright.cad.assembly.assembly import link_bodies, rotor_moment, rotor_of
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies, rotor_moment, rotor_of
 from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
 from scanwright.cad.files.manual.instructions import instructions_text
@@ -126,13 +126,13 @@ def test_the_bar_touches_nothing_but_its_ear_and_no_beam_wherever_it_slides(made
 
 
 def test_screws_from_below_and_a_step_that_says_so(made):
-    scanner, assembly = made
+    _, assembly = made
     joints = assembly.layout.joints
     (joint,) = [joint for joint in joints if joint.onto == "counterweight"]
     assert (joint.part, joint.count, joint.fixing, joint.screw.name) == ("alignment_linkage", 2, "thread", "M4")
     bar = assembly.layout.counterweight
     assert bar.ear.high - bar.ear.low + 6 <= joint.length_mm <= bar.ear.high - bar.ear.low + bar.section[1]
-    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0" * 12)
+    text = instructions_text(assembly, scenes_of(assembly), [])
     assert text.index("Lidar on its seat") < text.index("Counterweight on the linkage") < text.index("Linkage on the")
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from quick_tests import samples
 from scanners import GROUND_AHEAD, ROLLING, digest_of, scanner_at
 
-from scanwright.cad.assembly.masses import link_bodies, rotor_weight
+from scanwright.cad.assembly.assembly import link_bodies, rotor_weight
 from scanwright.cad.checks.loads.mechanics import load_checks
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.direct.cage import BearingCage, stiffness_n_per_m

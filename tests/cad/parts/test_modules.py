@@ -28,9 +28,7 @@ def scanner_for(angles, modules, ring=RING):
 
 
 def bought(assembly):
-    scanner = assembly.layout.scanner
-    masses = dict.fromkeys(assembly.made, 1.0)
-    return items_of(scanner, assembly, assembly.layout.joints, masses, digest_of(scanner))
+    return items_of(assembly, dict.fromkeys(assembly.made, 1.0))
 
 
 ON_TRIPOD = scanner_for(GROUND_AHEAD, Modules(tripod_foot=True))

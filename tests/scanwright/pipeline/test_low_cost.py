@@ -20,9 +20,9 @@ def low_cost(parts_of):
 
 @pytest.fixture(scope="module")
 def bought(low_cost):
-    assembly, digest = low_cost.assembly, low_cost.assembly.layout.digest
+    assembly = low_cost.assembly
     masses = {name: solid.Volume() * 1.3e-3 for name, solid in assembly.made.items()}  # of the densest plastic
-    return items_of(low_cost.scanner, assembly, assembly.layout.joints, masses, digest)
+    return items_of(assembly, masses)
 
 
 def test_all_that_is_made_is_printed(low_cost):
