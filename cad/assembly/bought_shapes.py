@@ -36,11 +36,7 @@ LEAD_CHORDS = (0.1, 0.5)  # of its mesh, in mm and rad: a bundle of wires is not
 
 
 def lead_solid(lead: RotorLead) -> cq.Solid:
-    """Return the wires between ring and lidar with the shrink tube over their joint.
-
-    Raises:
-        BuildError: the kernel does not make one valid solid of it, with a closed mesh.
-    """
+    """Return the wires between ring and lidar with the shrink tube over their joint; its mesh must be closed."""
     assert lead.path is not None
     with building(ROTOR_LEAD, "tube along its path", "diameter", f"{lead.diameter:g} mm") as checked:
         tube: cq.Shape = _tube_along(lead.path, lead.diameter / 2)
@@ -52,11 +48,7 @@ def lead_solid(lead: RotorLead) -> cq.Solid:
 
 
 def cable_solid(cable: FixedCable) -> cq.Solid:
-    """Return a cable that does not turn.
-
-    Raises:
-        BuildError: the kernel does not make one valid solid of it, with a closed mesh.
-    """
+    """Return a cable that does not turn; its mesh must be closed."""
     assert cable.path is not None
     with building(cable.name, "tube along its path", "diameter", f"{cable.diameter:g} mm") as checked:
         return _closed(cable.name, checked(_tube_along(cable.path, cable.diameter / 2)))

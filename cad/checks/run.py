@@ -35,11 +35,7 @@ def check_files(assembly: Assembly, progress: Progress) -> dict[str, bytes]:
 
 
 def check_scanner(scanner: Scanner, progress: Progress) -> list[Finding]:
-    """Make the parts of a scanner in memory and check them.
-
-    Raises:
-        BuildError: a part cannot be made.
-    """
+    """Make the parts of a scanner in memory and check them; BuildError if a part cannot be made."""
     progress("making the parts")
     return run_checks(make_parts(scanner), progress)[0]
 

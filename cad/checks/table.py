@@ -181,15 +181,7 @@ def at_most(
 ) -> Finding:
     """Return an error if the value exceeds the limit or is NaN, a warning if value + error does.
 
-    Args:
-        code: of the finding.
-        value: measured.
-        limit: largest value that passes.
-        unit: of value, limit and error.
-        subject: part or product.
-        what: name of the value, for the message.
-        error: uncertainty of the value; None if unknown.
-        hint: what to do if it does not pass.
+    `subject` is a part or product, `what` the name of the value, `hint` what to do if it does not pass.
     """
     within, surely = value <= limit, value + (error or 0.0) <= limit
     severity: Severity = "ok" if surely else "warning" if within else "error"

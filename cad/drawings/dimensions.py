@@ -53,12 +53,8 @@ def spread(wanted: Sequence[float], step: float) -> Array:
 def ordinates(pen: Pen, values: dict[float, float], edge: float, *, below: bool, sign: float = 1.0) -> None:
     """Draw horizontal positions under a view, or vertical ones at its left.
 
-    Args:
-        pen: about the view's origin.
-        values: by position the place of its feature across it [mm of the model].
-        edge: of the view, lower or left.
-        below: whether under the view.
-        sign: -1 if the measured axis points to the left.
+    `values` are places across them by position [mm of the model]; `edge` is the lower or left one of the view; `sign`
+    is -1 if the measured axis points to the left.
     """
     places = thinned(values)
     for (value, aside), place in zip(places, spread([v * pen.scale for v, _ in places], STEP_MM), strict=True):

@@ -61,14 +61,7 @@ Curve = Arc | Chain
 
 
 def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
-    """Return the lines of a solid in the plane of a view, in a fixed order.
-
-    Args:
-        solid: to draw.
-        right: unit vector that points to the right of the view.
-        up: unit vector that points up in it; the viewer is at right x up.
-        zero: point that the plane has its zero at.
-        hidden: whether to include hidden lines.
+    """Return the lines of a solid in the plane of a view, in a fixed order; `zero` is at the zero of the plane.
 
     Raises:
         BuildError: the kernel finds no lines.

@@ -48,14 +48,7 @@ def cut_along_axis(solid: cq.Solid, right: Vector, up: Vector) -> cq.Shape:
 
 
 def hatching(cut: cq.Shape, right: Vector, up: Vector, zero: Vector) -> list[Line]:
-    """Return lines over the faces of a cut, in the plane of its view, from the lowest to the highest.
-
-    Args:
-        cut: of `cut_along_axis`.
-        right: unit vector that points to the right of the view.
-        up: unit vector that points up in it.
-        zero: point that the plane has its zero at.
-    """
+    """Return lines over the faces of `cut_along_axis` in the plane of its view, from the lowest to the highest."""
     along = math.cos(SLOPE_RAD) * right + math.sin(SLOPE_RAD) * up
     across = np.cross(np.cross(right, up), along)
     frame = np.stack([along, across])

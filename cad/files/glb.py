@@ -55,11 +55,8 @@ def glb_bytes(
 ) -> bytes:
     """Return the file of a scene.
 
-    Args:
-        nodes: parents before children; the first one is the root.
-        surfaces: of the nodes with a mesh by name, of `shaded`.
-        extras: values in `asset.extras`.
-        spin: name of a node that turns counter-clockwise about its z, and the seconds of one turn.
+    Of `nodes` the first is the root, and parents come before children; `surfaces` are those of `shaded` by node; `spin`
+    is a node that turns counter-clockwise about its z, and the seconds of one turn.
     """
     index = {node.name: i + 1 for i, node in enumerate(nodes)}
     children: dict[str, list[int]] = {}

@@ -50,13 +50,9 @@ class PartsResult:
 
 
 def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Progress) -> PartsResult:
-    """Label every part and write it into a build folder.
+    """Label every part and write it into `parts/` of a build folder.
 
-    Args:
-        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.
-        assembly: its parts.
-        folder: the build folder; `parts/` is made in it.
-        progress: callback for progress.
+    `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.
 
     Raises:
         BuildError: a part has no closed mesh, or the angle set states another place of the optical centre.

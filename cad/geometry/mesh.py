@@ -88,11 +88,7 @@ def checked_mesh(solid: cq.Solid, part: str) -> TriMesh:
 
 
 def checked(mesh: TriMesh, solid: cq.Solid, part: str) -> TriMesh:
-    """Return the mesh if it is closed and has the volume of its solid.
-
-    Raises:
-        BuildError: as `checked_mesh`.
-    """
+    """Return the mesh if it is closed and has the volume of its solid; raises as `checked_mesh`."""
     if not mesh.is_closed():
         raise BuildError(f"{part}: mesh: tolerance = {CHORD_ERROR} mm: the surface is not closed")
     off = mesh.volume() / solid.Volume() - 1

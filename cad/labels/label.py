@@ -167,11 +167,7 @@ def label_on(ground: Ground, texts: list[str], before: FreeDistance) -> tuple[Pl
 
 
 def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, TriMesh]:
-    """Return the part with lettering, and its mesh.
-
-    Raises:
-        BuildError: the grooves spoil the part.
-    """
+    """Return the part with lettering, and its mesh; BuildError if the grooves spoil it."""
     grooves = [(place.flat, place.outlines(lines, groove.width)) for place, lines in words]
     with solids.building("label", "lettering", "lines", [lines.lines for _, lines in words]) as checked:
         cut = checked(engrave(solid, grooves, groove.depth))

@@ -73,10 +73,7 @@ def text_width(text: str, height: float) -> float:
 def letters(text: str, height: float, stroke: float) -> list[shapely.Polygon]:
     """Return outlines of one line of text, origin at its lower left corner; strokes that meet are one outline.
 
-    Args:
-        text: letters, digits and ". - + _ /"; anything else is a blank.
-        height: of capitals, to the middle of their strokes [mm].
-        stroke: width [mm].
+    The height [mm] of capitals is that to the middle of their strokes; a sign without a glyph is a blank.
     """
     unit = height / 6
     strokes = []

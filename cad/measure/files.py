@@ -30,14 +30,7 @@ UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 
 
 def read_model(path: Path, unit: str | None = None) -> Array:
-    """Read the triangles of a model in its own axes.
-
-    Args:
-        path: STEP, which states its unit, or STL.
-        unit: of an STL file; None for mm.
-
-    Returns:
-        Corners [mm], shape (t, 3, 3).
+    """Read the corners of a model's triangles in its own axes [mm], shape (t, 3, 3); `unit` is that of an STL file.
 
     Raises:
         SceneError: the file is missing or unreadable, or no device has its size.
@@ -74,12 +67,7 @@ def _step_triangles(path: Path) -> Array:
 
 
 def turned(triangles: Array, up: str, front: str) -> Array:
-    """Return the triangles in axes with z up and x to the front of the device.
-
-    Args:
-        triangles: corners in the axes of the model, shape (t, 3, 3).
-        up: axis of the model that points up, out of the base or out of the horn, such as "+y".
-        front: axis of the model that points to the front.
+    """Return the triangles in axes with z up, out of the base or horn, and x to the front; `up` and `front` as "+y".
 
     Raises:
         SceneError: the two axes are parallel.
@@ -106,13 +94,7 @@ def picture_svg(proposal: Proposal, model: str) -> bytes:
 
 
 def silhouette(triangles: Array, right: Array, up: Array) -> list[Array]:
-    """Return the outlines of a mesh in a view, closed polygons with shape (n, 2) each.
-
-    Args:
-        triangles: corners, shape (t, 3, 3).
-        right: unit vector to the right of the view.
-        up: unit vector upwards.
-    """
+    """Return the outlines of triangles (t, 3, 3) in a view, closed polygons with shape (n, 2) each."""
     flat = triangles @ np.stack([right, up], axis=1)
     flat = np.unique(np.round(flat / GRID_MM) * GRID_MM, axis=0)
     (ax, ay), (bx, by), (cx, cy) = np.moveaxis(flat, 0, -1)
@@ -151,16 +133,9 @@ def measure_files(
     unit: str | None = None,
     progress: Progress = no_progress,
 ) -> MeasuredFiles:
-    """Measure a maker's model, and write the proposal and the picture.
+    """Measure a maker's model, and write the proposal and the picture, whose suffix is .svg.
 
-    Args:
-        model: STEP or STL file.
-        out: TOML file of the proposal; the picture has its name and the suffix .svg.
-        kind: lidar or servo.
-        up: axis of the model that points up, or out of the servo's horn.
-        front: axis of the model that is +x of the device.
-        unit: of an STL file; None for mm.
-        progress: callback for progress.
+    The axes `up`, for a servo out of its horn, and `front` are those of the model; `unit` is that of an STL file.
 
     Raises:
         SceneError: the model is missing or unreadable, or shows no device.

@@ -105,13 +105,10 @@ class Proposal:
 
 
 def propose(triangles: Array, kind: Literal["lidar", "servo"], origin: Sequence[float] | None = None) -> Proposal:
-    """Measure a model.
+    """Measure a model; corners with z up (out of the servo's horn) and x to the front [mm], shape (t, 3, 3).
 
-    Args:
-        triangles: corners with z up (out of the servo's horn) and x to the front [mm], shape (t, 3, 3).
-        kind: lidar or servo.
-        origin: of the device's frame, in the axes of the triangles [mm]; None to detect it: the axis of the lidar's
-            window and its lowest point, or the face of the servo's horn.
+    Without an origin of the device's frame it is detected: the axis of the lidar's window and its lowest point, or the
+    face of the servo's horn.
 
     Raises:
         SceneError: no servo's horn was detected.

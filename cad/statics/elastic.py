@@ -41,14 +41,9 @@ class Grid:
 
 
 def filled(triangles: Array, grid: Grid) -> Array:
-    """Share of each cube that is inside: exact along z, the mean of RAYS x RAYS lines across it.
+    """Return the share of each cube inside a closed surface: exact along z, the mean of RAYS x RAYS lines across it.
 
-    Args:
-        triangles: corners of a closed surface, counter-clockwise from outside, shape (t, 3, 3) [mm].
-        grid: the cells.
-
-    Returns:
-        Shape (nx, ny, nz) * parts, 0 to 1.
+    Triangles (t, 3, 3) [mm] are counter-clockwise from outside; the result has shape (nx, ny, nz) * parts.
     """
     solid = ray_caster.build_scene(triangles / 1000)
     below = min(float(grid.low[2]), float(triangles[:, :, 2].min())) - 1.0
@@ -131,18 +126,9 @@ def places(model: Model, points: Array) -> Places:
 
 
 def solve(model: Model, modulus: float, poisson: float, clamped: Places, clamped_mm2: float, loads: Array) -> Array:
-    """Return the displacements of all nodes.
+    """Return the displacements of all nodes [mm] by loads (n, 3, cases) [N].
 
-    Args:
-        model: the body.
-        modulus: of elasticity [MPa].
-        poisson: ratio.
-        clamped: points spread evenly over the surface that cannot move.
-        clamped_mm2: its area.
-        loads: [N], shape (n, 3, cases).
-
-    Returns:
-        [mm], of the loads' shape.
+    `clamped` are points spread evenly over the surface that cannot move, whose area is `clamped_mm2`.
 
     Raises:
         RuntimeError: nothing holds the body.

@@ -81,13 +81,9 @@ def spring_of(
 ) -> Spring:
     """Return a part as a spring.
 
-    Args:
-        model: its cells.
-        density_g_cm3: of its material.
-        seat: points of the second body's seat in it, the same in the grid's frame (p, 3) [mm], and the displacements
-            [mm] of all nodes by `wrenches`, shape (n, 3, 6).
-        R: grid's frame in the rotation frame, shape (3, 3).
-        origin: of the rotation frame, in the grid's frame [mm], shape (3,).
+    R is the grid's frame in the rotation frame, whose `origin` [mm] is in the grid's frame. `seat` has the points of
+    the second body's seat in the model and in the grid's frame (p, 3) [mm], and the displacements [mm] of all nodes by
+    `wrenches`, shape (n, 3, 6).
     """
     at, points, moved = seat
     shift, rotation = rigid_motion(points, elastic.moved(model, at, moved))
@@ -119,12 +115,9 @@ class SpringRow:
         return np.sqrt(eigh(self.stiffness, self.mass, eigvals_only=True)) / (2 * np.pi)
 
     def moved(self, load: Array, frequency_hz: float, loss: float) -> Array:
-        """Return the displacement of the last body by a load on it that turns or swings, complex, shape (6,).
+        """Return the displacement of the last body by a complex load (6,) on it that turns or swings, shape (6,).
 
-        Args:
-            load: complex amplitudes at the origin, shape (6,).
-            frequency_hz: of the load.
-            loss: factor of the material: energy lost per radian over the energy stored.
+        `loss` is the energy that the material loses per radian over the energy stored.
         """
         count = len(self.mass) // 6
         dynamic = (1 + 1j * loss) * self.stiffness - (2 * np.pi * frequency_hz) ** 2 * self.mass

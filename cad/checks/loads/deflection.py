@@ -95,10 +95,7 @@ def sag_of(assembly: Assembly, bodies: Mapping[str, Inertial]) -> Sag:
 def split(rotation_rad: Array, shift_m: Array, down: Array) -> tuple[BeamError, BeamError]:
     """Return the constant part of a sag and the rest.
 
-    Args:
-        rotation_rad: per direction of gravity in the rotation frame, shape (3, 3).
-        shift_m: likewise.
-        down: unit vector of gravity in the rotation frame at gamma = 0.
+    Rotation and shift are per direction of gravity, rotation frame, shape (3, 3); `down` is gravity at gamma = 0.
     """
     gamma = 2 * np.pi * np.arange(POSITIONS) / POSITIONS
     turn = np.zeros((POSITIONS, 3, 3))

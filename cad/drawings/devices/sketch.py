@@ -80,11 +80,7 @@ def spots_of(holes: Iterable[Hole], mark: str = "") -> tuple[Spot, ...]:
 
 @singledispatch
 def outline_of(product: Product) -> DeviceOutline:
-    """Return the geometry of a product's sketch.
-
-    Raises:
-        TaskError: its record has no dimensions.
-    """
+    """Return the geometry of a product's sketch; TaskError if its record has no dimensions."""
     raise TaskError(f"{product.name}: a {product.kind} has no dimensions to draw")
 
 
@@ -163,11 +159,7 @@ class SketchView:
 
 
 def sketch_svg(product: Product) -> bytes:
-    """Return the sketch of a product as SVG.
-
-    Raises:
-        TaskError: its record has no dimensions.
-    """
+    """Return the sketch of a product as SVG; TaskError if its record has no dimensions."""
     outline = outline_of(product)
     notes = ["Millimetres, frame of the catalogue."]
     if outline.unverified:

@@ -60,11 +60,7 @@ BUILT = (
 
 
 def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """Return the drive of a scanner with a capsule ring.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Return the drive of a scanner with a capsule ring."""
     stack, ring = belt_stack(scanner, envelope), scanner.slip_ring
     assert ring is not None
     plate, mounted = plate_of(scanner), _mounted(stack, tower_foot_of(scanner.printer, stack))

@@ -161,13 +161,7 @@ def short_path(
 ) -> Path | None:
     """Return a short path between two ends, within GREED of the shortest; None if there is none.
 
-    Args:
-        space: space for the cable.
-        starts: alternative ends at the one device.
-        goals: alternative ends at the other one.
-        half: radius of the cable.
-        radius: least bend radius.
-        lattice: points of possible corners, shape (n, 3).
+    `starts` and `goals` are alternative ends at either device, `lattice` are points of possible corners, shape (n, 3).
     """
     first, last = (
         [(end, tip) for end in ends for tip in range(len(end.lengths)) if _clear(space, end, tip, half)]

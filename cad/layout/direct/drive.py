@@ -91,11 +91,7 @@ def stator_exit(scanner: Scanner, stack: DirectStack, cage: BearingCage | None) 
 
 
 def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """Return the drive of a scanner with a through-bore ring or without a ring.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Return the drive of a scanner with a through-bore ring or without a ring."""
     stack, ears = direct_stack(scanner, envelope)
     adapter = adapter_of(scanner, stack)
     cage = None if ears is None else cage_of(scanner, stack, ears)
