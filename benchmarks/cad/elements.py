@@ -29,8 +29,7 @@ from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
 from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
-from scanwright.cad.statics.mount_sag import mount_sag
-from scanwright.cad.statics.sag import POISSON, linkage_sag
+from scanwright.cad.statics.sag import POISSON, linkage_sag, mount_sag
 from scanwright.design.angles import load_angles
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, Rz

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from scanwright.cad.assembly.print_settings import slicer_settings
 from scanwright.cad.checks.products import without_traps
-from scanwright.cad.drawings.devices.template import template_pdf
+from scanwright.cad.drawings.files import template_pdf
 from scanwright.cad.files.bom import bom_text, items_of
 from scanwright.cad.files.glb import scene_files
 from scanwright.cad.files.manual.instructions import step_files
@@ -14,8 +14,7 @@ from scanwright.cad.files.plates import plate_files, plates_of, threemf_bytes
 from scanwright.cad.files.wiring import wiring_files
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
-from scanwright.cad.labels.fit_coupon import fit_coupon
-from scanwright.cad.labels.test_plate import make_test_plate
+from scanwright.cad.labels.fit_coupon import fit_coupon, make_test_plate
 from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
 from scanwright.design.findings import Finding

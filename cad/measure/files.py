@@ -11,7 +11,7 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from scanwright.cad.drawings.devices.sketch import AXES, sketch_of, spots_of, views_of
+from scanwright.cad.drawings.sketch import AXES, sketch_of, spots_of, views_of
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.measure.proposal import Proposal, propose, toml_text
 from scanwright.design.arrays import Array

@@ -25,8 +25,7 @@ from scanwright.cad.layout.loads import FAR_MM, noise_deg
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, LIDAR, TRIPOD_FOOT
 from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
-from scanwright.cad.statics.mount_sag import Carried, mount_sag
-from scanwright.cad.statics.sag import Sag, linkage_sag, with_shaft
+from scanwright.cad.statics.sag import Carried, Sag, linkage_sag, mount_sag, with_shaft
 from scanwright.cad.statics.spring import Spring, SpringRow, mass_matrix, of_shaft, row_of
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity

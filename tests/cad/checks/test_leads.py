@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scanners import scanner_at
 
-from scanwright.cad.assembly.bought_shapes import lead_solid
+from scanwright.cad.assembly.bought import lead_solid
 from scanwright.cad.assembly.scenes import steps_of
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
 from scanwright.cad.checks.cables import rotor_cable_checks

@@ -12,7 +12,7 @@ from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
-from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.cad.statics.sag import Carried, mount_sag
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 
 HALF, HIGH, MODULUS, DENSITY = 12.0, 120.0, 2000.0, 1.2  # mm, MPa, g/cm3

@@ -15,7 +15,7 @@ from scanwright.cad.layout.direct.loads import shaft_bend
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
-from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.cad.statics.sag import Carried, mount_sag
 from scanwright.cad.statics.spring import Spring, mass_matrix, of_shaft, row_of
 
 E_PA, DIAMETER, LENGTH = 70e9, 0.012, 0.1

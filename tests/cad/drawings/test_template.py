@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, UPRIGHT, scanner_at
 
-from scanwright.cad.drawings.devices.template import template_pdf
+from scanwright.cad.drawings.files import template_pdf
 from scanwright.cad.drawings.write import POINTS_PER_MM
 from scanwright.cad.geometry.mesh import mesh_of
-from scanwright.cad.labels.test_plate import EDGE_MM, make_test_plate
+from scanwright.cad.labels.fit_coupon import EDGE_MM, make_test_plate
 from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.names import LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT
 from scanwright.cad.measure.bores import bores_of, walls_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cad.combinations import screws_without_a_hole
-from scanwright.cad.assembly.bought_shapes import lidar_body, lidar_cable
+from scanwright.cad.assembly.bought import lidar_body, lidar_cable
 from scanwright.cad.layout.envelope import side_walls
 from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.placement import placement_of
