@@ -4,18 +4,19 @@ Mass properties of its bodies, for the URDF, the checks and the counterweight, a
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.assembly.bought import BodySpec
+from scanwright.cad.assembly.bought import BodySpec, Frame
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial, of_solid
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
 from scanwright.cad.geometry.print_pose import PrintPose, print_pose
-from scanwright.cad.layout.cables.leads import SAMPLE
+from scanwright.cad.layout.cables.fixed import FixedCable
+from scanwright.cad.layout.cables.leads import SAMPLE, RotorLead
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.loads import Weight, weight_of
@@ -56,13 +57,9 @@ class Assembly:
         """Return the names of all parts and bodies that turn about the axis."""
         return frozenset(name for name in (*self.made, *self.bought) if self.spec(name).turns)
 
-    def fixed_parts(self) -> list[str]:
-        """Return the names of the made parts that do not turn."""
-        return [name for name in self.made if not self.parts[name].turns]
-
-    def turning_parts(self) -> list[str]:
-        """Return the names of the made parts that turn about the axis."""
-        return [name for name in self.made if self.parts[name].turns]
+    def parts_in(self, frame: Frame) -> list[str]:
+        """Return the names of the made parts that move with a frame."""
+        return [name for name in self.made if self.parts[name].frame == frame]
 
     def carriers(self) -> list[str]:
         """Return the names of the made parts between hub and lidar."""
@@ -131,15 +128,16 @@ def link_bodies(assembly: Assembly) -> dict[str, Inertial]:
 
     Bought parts are homogeneous boxes, of which a share may turn; cables are lines.
     """
-    masses = assembly.layout.drive.masses
-    fixed = [assembly.inertial(name) for name in assembly.fixed_parts()]
-    fixed += [inertia.of_box((1 - each.turning) * mass_g, *box) for each, mass_g, box in masses]
-    fixed += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.cables if lead.path]
-    turning = [assembly.inertial(name) for name in assembly.turning_parts()]
-    turning += [inertia.of_box(each.turning * mass_g, *box) for each, mass_g, box in masses if each.turning > 0]
-    turning += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in assembly.layout.leads if lead.path]
-    lidar = lidar_body(assembly.layout.scanner.lidar)
-    return {"servo": inertia.together(fixed), "rot": inertia.together(turning), "laser": lidar}
+    layout, bodies = assembly.layout, {"laser": lidar_body(assembly.layout.scanner.lidar)}
+    cables: tuple[tuple[Frame, Sequence[FixedCable | RotorLead]], ...] = ("servo", layout.cables), ("rot", layout.leads)
+    for frame, lines in cables:
+        own = [assembly.inertial(name) for name in assembly.parts_in(frame)]
+        for each, mass_g, box in layout.drive.masses:
+            share = each.turning if frame == "rot" else 1 - each.turning
+            own += [inertia.of_box(share * mass_g, *box)] if share > 0 else []
+        own += [inertia.of_line(lead.mass_g, lead.path.points(SAMPLE)) for lead in lines if lead.path]
+        bodies[frame] = inertia.together(own)
+    return bodies
 
 
 def lidar_body(lidar: Lidar) -> Inertial:

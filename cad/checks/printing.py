@@ -107,16 +107,15 @@ def _bed(name: str, pose: PrintPose, printer: Printer) -> Finding:
 def _surface(mesh: TriMesh) -> tuple[Array, Array, float]:
     """Return points spread over the surface by area, their normals, and the area: the same points in every run."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    cross = np.cross(b - a, c - a)
-    doubled = np.linalg.norm(cross, axis=1)
-    upto = np.cumsum(doubled)
+    normals, areas = mesh.across()
+    upto = np.cumsum(areas)
     where = (np.arange(POINTS) + 0.5) / POINTS * upto[-1]
     face = np.searchsorted(upto, where)
     # a low-discrepancy pair inside each triangle
     u = np.sqrt((0.5 + np.arange(POINTS) * 0.7548776662466927) % 1.0)
     v = (0.5 + np.arange(POINTS) * 0.5698402909980532) % 1.0
     points = (1 - u)[:, None] * a[face] + (u * (1 - v))[:, None] * b[face] + (u * v)[:, None] * c[face]
-    return points, cross[face] / doubled[face, None], float(upto[-1] / 2)
+    return points, normals[face], float(upto[-1])
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,14 +141,10 @@ def shaded(mesh: TriMesh) -> Surface:
     A vertex is repeated for each of its normals. The normal at a corner is the mean of those of the faces around it
     without an edge towards this one, weighted by their angles.
     """
-    corners = mesh.vertices[mesh.faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(cross, axis=1)
-    normal = cross / np.maximum(length, 1e-300)[:, None]
-    vertex = mesh.faces.ravel()
+    corners, vertex, (normal, area) = mesh.vertices[mesh.faces], mesh.faces.ravel(), mesh.across()
     one, other = _about_one_vertex(vertex)
     alike = np.einsum("ij,ij->i", normal[one // 3], normal[other // 3]) > np.cos(CREASE_RAD)
-    alike |= length[one // 3] == 0  # a sliver has no normal of its own
+    alike |= area[one // 3] == 0  # a sliver has no normal of its own
     weight = np.where(alike, _widths(corners).ravel()[other], 0.0)
     mean = np.stack([np.bincount(one, weight * normal[other // 3, k], len(vertex)) for k in range(3)], axis=1)
     unit = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)

@@ -92,7 +92,7 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
     bodies = link_bodies(assembly)
-    meshes = {"servo": assembly.fixed_parts(), "rot": assembly.turning_parts()}
+    meshes = {"servo": assembly.parts_in("servo"), "rot": assembly.parts_in("rot")}
     files["scanner.urdf"] = urdf_text(scanner, assembly.layout.drive, bodies, meshes).encode("utf-8")
     write_files(folder, files)
     return PartsResult(

@@ -17,7 +17,7 @@ from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, sha
 from scanwright.cad.layout.cables.route import Ending, Path, short_path
 from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
 from scanwright.cad.layout.drive import Mounted, Rod
-from scanwright.cad.layout.envelope import Box, around_axis, box_corners
+from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import triple
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from scanwright.cad.layout.placement import Placement
@@ -59,19 +59,6 @@ class FixedSpace:
         return replace(self, others=(np.concatenate([middles, self.others[0]]), max(radius, self.others[1])))
 
 
-def fixed_space_of(place: Placement, avoid: Iterable[Shape]) -> FixedSpace:
-    """Return the space around all that does not turn, without cables; `avoid` are shapes of parts."""
-    products = [_around(each.shape) for each in place.drive.stations if each.shape is not None]
-    shapes = (*(shape_of(corners) for corners in products), *avoid)
-    return FixedSpace(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0))
-
-
-def _around(shape: Box | Rod) -> Array:
-    if isinstance(shape, Rod):
-        return around_axis(shape.radius, shape.low, shape.high)
-    return box_corners(shape)
-
-
 @dataclass(frozen=True, slots=True)
 class FixedCable:
     """One cable that does not turn."""
@@ -104,7 +91,13 @@ class Leaving:
 
 def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
     """Return the cables that the catalogue describes, clear of the shapes to avoid."""
-    space, cables = fixed_space_of(place, avoid), []
+    products = [
+        around_axis(shape.radius, shape.low, shape.high) if isinstance(shape, Rod) else box_corners(shape)
+        for shape in (station.shape for station in place.drive.stations)
+        if shape is not None
+    ]
+    shapes = (*map(shape_of, products), *avoid)
+    space, cables = FixedSpace(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0)), []
     for lane, leaving in enumerate(_leaving(place)):
         path = _path(place, space, leaving, lane)
         cables.append(FixedCable(leaving.name, leaving.device, leaving.diameter, leaving.radius, path))

@@ -7,27 +7,11 @@ import numpy as np
 
 from scanwright.cad.layout import names
 from scanwright.cad.layout.direct.cage import BearingCage, adapter_of, cage_of, stator_leads_y, stiffness_n_per_m
-from scanwright.cad.layout.direct.frame import (
-    FOOT,
-    FOOT_SCREW,
-    ServoFrame,
-    corner_holes,
-    frame_of,
-    needs_frame,
-)
+from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, corner_holes, frame_of, needs_frame
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import BELOW_HUB, DirectStack
-from scanwright.cad.layout.drive import (
-    Bundle,
-    DriveLayout,
-    LeadExit,
-    Mounted,
-    Rod,
-    Station,
-    StatorExit,
-    towards,
-)
+from scanwright.cad.layout.drive import Bundle, DriveLayout, LeadExit, Mounted, Rod, Station, StatorExit, towards
 from scanwright.cad.layout.envelope import Envelope, around_axis, box_corners
 from scanwright.cad.layout.hub import BUNDLE_GAP
 from scanwright.cad.layout.joints import fixing_of

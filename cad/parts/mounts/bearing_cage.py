@@ -33,15 +33,7 @@ from scanwright.cad.layout.direct.cage import (
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import around_axis, box_corners
-from scanwright.cad.layout.joints import (
-    ALL_SCREWS,
-    Joint,
-    fixing_in,
-    inward_axes,
-    round_wall_mm,
-    screws,
-    upright_axes,
-)
+from scanwright.cad.layout.joints import ALL_SCREWS, Joint, fixing_in, inward_axes, round_wall_mm, screws, upright_axes
 from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step, printed_seat

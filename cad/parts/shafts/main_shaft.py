@@ -15,14 +15,7 @@ from scanwright.cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltSt
 from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import (
-    SEATED,
-    TURNED_FROM,
-    PartSpec,
-    Step,
-    ToleratedDiameter,
-    spigot_in_hub,
-)
+from scanwright.cad.parts.part_spec import SEATED, TURNED_FROM, PartSpec, Step, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.parts.shafts.servo_shaft import cross_holes, cross_words
 from scanwright.cad.solids import building
 

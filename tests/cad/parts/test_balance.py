@@ -54,7 +54,7 @@ def test_the_rotor_is_balanced_by_its_meshes(made):
     plastic = scanner.printer.density_g_cm3 / 1000
     density = {"counterweight": STEEL, "servo_shaft": ALUMINIUM}
     moment = np.zeros(2)
-    for name, mesh in meshes(assembly, assembly.turning_parts()).items():
+    for name, mesh in meshes(assembly, assembly.parts_in("rot")).items():
         moment += density.get(name, plastic) * mesh.volume * mesh.center_mass[:2]
     lidar = scanner.lidar
     to_middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
