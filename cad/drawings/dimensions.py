@@ -108,16 +108,24 @@ def callouts_right(pen: Pen, callouts: list[Callout], edge: float) -> None:
         own.text((x + 2.8, y - TEXT_MM / 2 + 0.2), callout.words)
 
 
-def text_box(at: Point, words: str, height: float = TEXT_MM, anchor: str = "left") -> tuple[float, float, float, float]:
-    """Return left, bottom, right and top of the space around a line of text."""
-    width = width_of(words, height)
-    left = at[0] - ANCHORS[anchor][1] * width
-    return left - CLEAR_MM, at[1] - CLEAR_MM, left + width + CLEAR_MM, at[1] + height + CLEAR_MM
+def free_text(
+    pen: Pen,
+    words: str,
+    choices: Sequence[tuple[Point, str]],
+    lines: Sequence[Sequence[Point]],
+    height: float = TEXT_MM,
+) -> None:
+    """Write a text at the first of some places, each with an anchor, that no line meets, else at the first."""
 
+    def space(at: Point, anchor: str) -> shapely.Polygon:
+        width = width_of(words, height)
+        left = at[0] - ANCHORS[anchor][1] * width
+        return shapely.box(left - CLEAR_MM, at[1] - CLEAR_MM, left + width + CLEAR_MM, at[1] + height + CLEAR_MM)
 
-def meets(path: Sequence[Point], box: tuple[float, float, float, float]) -> bool:
-    """Return whether straight pieces through points meet a box."""
-    return bool(shapely.LineString(path).intersects(shapely.box(*box)))
+    drawn = [shapely.LineString(line) for line in lines]
+    free = (choice for choice in choices if not any(line.intersects(space(*choice)) for line in drawn))
+    place, anchor = next(free, choices[0])
+    pen.text(place, words, height=height, anchor=anchor)
 
 
 def angle_between(pen: Pen, at: Point, first: float, second: float, radius: float, words: str) -> None:

@@ -11,10 +11,9 @@ from scanwright.cad.drawings.dimensions import (
     angle_between,
     callouts_right,
     centre_mark,
+    free_text,
     leaders_right,
-    meets,
     ordinates,
-    text_box,
 )
 from scanwright.cad.drawings.patterns import (
     SIDE_MM2,
@@ -128,13 +127,11 @@ def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, flo
 
 def _name_centre(pen: Pen, view: View, at: Point) -> None:
     """Write the name at the optical centre, on the first side without a line of the part."""
-    words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP_MM
+    (x, y), right = at, at[0] + CENTRE_GAP_MM
     below = y - 1.0 - TEXT_MM
     choices = [((x - CENTRE_GAP_MM, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP_MM, below), "right")]
     lines = [[pen.paper(point) for point in _points(curve)] for curve in view.curves]
-    free = (c for c in choices if not any(meets(line, text_box(c[0], words, anchor=c[1])) for line in lines))
-    place, anchor = next(free, choices[0])
-    pen.text(place, words, anchor=anchor)
+    free_text(pen, "OPTICAL CENTRE", choices, lines)
 
 
 def _points(curve: Curve) -> list[Point]:
@@ -158,13 +155,7 @@ def _cut_marks(pen: Pen, left: float, right: float, lines: list[list[Point]]) ->
             ((end, -2 * MARK_MM - CAPITALS_MM - 1.5), "middle"),
             ((end, 1.5), "middle"),
         ]
-        free = (
-            choice
-            for choice in choices
-            if not any(meets(line, text_box(choice[0], "S", CAPITALS_MM, choice[1])) for line in lines)
-        )
-        place, anchor = next(free, choices[0])
-        pen.text(place, "S", height=CAPITALS_MM, anchor=anchor)
+        free_text(pen, "S", choices, lines, CAPITALS_MM)
 
 
 def _holes(sizes: Sizes, view: View, part: Part) -> None:

@@ -19,7 +19,7 @@ from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG
 from scanwright.cad.layout.drive import DriveLayout, products_of
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.tightening import hold_of
-from scanwright.cad.screws import INSERT_LENGTH, SCREWS
+from scanwright.cad.screws import INSERT_LENGTH
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
@@ -116,30 +116,25 @@ def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
 
 def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
-    nuts: Counter[tuple[str, str]] = Counter()
-    inserts: Counter[str] = Counter()
-    washers: Counter[str] = Counter()
+    small: Counter[tuple[int, str, str, str, str]] = Counter()  # by place in the list, kind, name, number, note
     for joint in joints:
+        screw = joint.screw
         if joint.protrudes_mm is None:
             screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
-            nuts[joint.screw.name, joint.screw.nut_standard] += joint.count
+            small[0, "nut", "hexagon nut", f"{screw.nut_standard} {screw.name}", ""] += joint.count
         if joint.washer_mm is not None:
-            washers[f"ISO 7093 {joint.screw.name}"] += joint.count
+            small[1, "washer", "plain washer", f"ISO 7093 {screw.name}", ""] += joint.count
         if joint.inserts:
-            inserts[joint.screw.name] += joint.count
+            note = f"length {INSERT_LENGTH:g}, for a hole of {screw.insert:g} mm"
+            small[2, "insert", "heat-set insert", screw.name, note] += joint.count
     for number, used in sorted(screws.items()):
         kind = "grub screw" if used[0].fixing == "grub" else "cap screw"
         places = ", ".join(f"{joint.count} {joint.part} to {joint.onto}" for joint in used)
         total = sum(joint.count for joint in used)
         yield BomItem("screw", kind, number, total, source=JOINTS, note=places, estimate="screw")
-    for (name, standard), count in sorted(nuts.items()):
-        yield BomItem("nut", "hexagon nut", f"{standard} {name}", count, source=JOINTS, estimate="nut")
-    for number, count in sorted(washers.items()):
-        yield BomItem("washer", "plain washer", number, count, source=JOINTS, estimate="washer")
-    for name, count in sorted(inserts.items()):
-        note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm"
-        yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note, estimate="insert")
+    for (_, kind, name, number, note), count in sorted(small.items()):
+        yield BomItem(kind, name, number, count, source=JOINTS, note=note, estimate=kind)
 
 
 def _wiring(scanner: Scanner) -> Iterator[BomItem]:
