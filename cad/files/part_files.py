@@ -42,7 +42,6 @@ class PartsResult:
     parts: tuple[PartReport, ...]  # properties of each made part
     findings: tuple[Finding, ...]  # remarks for a person
     left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
-    files: tuple[str, ...]  # relative to the build folder
 
     def masses_g(self) -> dict[str, float]:
         """Return the masses of the made parts by name."""
@@ -101,7 +100,6 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
         parts=tuple(reports),
         findings=tuple(remarks_of(assembly)),
         left_out=(*layout.left_out, *labels.left_out),
-        files=tuple(sorted(files)),
     )
 
 

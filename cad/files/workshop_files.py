@@ -1,6 +1,5 @@
 """Files for the workshop besides STEP, STL and drawings: print files, scenes, parts list, wiring, assembly steps."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.cad.assembly.print_settings import slicer_settings
@@ -23,17 +22,13 @@ from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 
 
-@dataclass(frozen=True, slots=True)
-class Exports:
-    """Written files, relative to the build folder, files that are not included, and remarks for a person."""
+def export_scanner(
+    scanner: Scanner, made: PartsResult, folder: Path, progress: Progress
+) -> tuple[list[Finding], list[LeftOut]]:
+    """Write all of them into a build folder; returns remarks for a person, and files that are not included.
 
-    files: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
-    findings: tuple[Finding, ...]
-
-
-def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: Progress) -> Exports:
-    """Write all of them into a build folder; `made` is the result of `part_files.build_parts`."""
+    `made` is the result of `part_files.build_parts`.
+    """
     assembly = made.assembly
     digest, joints = assembly.layout.digest, assembly.layout.joints
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"
@@ -63,10 +58,8 @@ def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: 
     files |= step_files(assembly, made.meshes, named)
     files |= wiring_files(scanner, digest)
     write_files(folder, files)
-    findings = without_traps(scanner.printer, joints)
-    left_out = tuple(
+    return without_traps(scanner.printer, joints), [
         LeftOut(f"print/{part}.3mf", "of metal: made after its STEP file", 1, "print files")
         for part in made.meshes
         if part in metal
-    )
-    return Exports(tuple(sorted(files)), left_out, tuple(findings))
+    ]

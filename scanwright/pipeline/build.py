@@ -282,12 +282,11 @@ def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progres
 
 def _exported(
     scanner: Scanner, parts: Packed[PartsResult], folder: Path, progress: Progress
-) -> tuple[tuple[Finding, ...], tuple[LeftOut, ...]]:
+) -> tuple[list[Finding], list[LeftOut]]:
     """Write the files for the workshop except the drawings; returns findings and omissions."""
     from scanwright.cad.files.workshop_files import export_scanner
 
-    exports = export_scanner(scanner, parts.open(), folder, progress)
-    return exports.findings, exports.left_out
+    return export_scanner(scanner, parts.open(), folder, progress)
 
 
 def _drawn(parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:

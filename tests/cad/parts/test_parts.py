@@ -2,7 +2,6 @@
 
 import itertools
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import cadquery as cq
@@ -243,8 +242,3 @@ def test_findings_name_what_to_do(built):
     else:
         bearing = [] if built.name in BEARING else ["bearing_cage"]
         assert left_out == ["servo_frame", *bearing] + ([] if built.name in BALANCED else ["counterweight"]) + MODULES
-
-
-def test_every_file_is_where_the_result_says(built):
-    on_disk = sorted(str(Path(p).relative_to(built.folder)) for p in built.folder.rglob("*") if p.is_file())
-    assert on_disk == sorted(built.result.files)
